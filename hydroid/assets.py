@@ -1,0 +1,33 @@
+"""Where the shipped models, meshes and configs lie: in the wheel, or at the top of a checkout."""
+
+from pathlib import Path
+
+from hydroid.errors import SettingsError
+
+_PACKAGE = Path(__file__).parent
+
+
+def assets() -> Path:
+    """Return the folder that holds `models/`, `meshes/` and `configs/`."""
+    inside = _PACKAGE / "assets"
+    return inside if inside.is_dir() else _PACKAGE.parent
+
+
+def find_config(name: str | Path, beside: Path | None = None) -> Path:
+    """Return the config file that `name` means.
+
+    Args:
+        name: a path, or the name of a shipped config with or without `.yaml`.
+        beside: a folder in which a relative path is looked up first.
+
+    Raises:
+        SettingsError: no such file, with the names of the shipped configs.
+    """
+    shipped = assets() / "configs"
+    folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]
+    for folder in folders:
+        for candidate in (folder / name, folder / f"{name}.yaml"):
+            if candidate.is_file():
+                return candidate
+    known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
+    raise SettingsError("no such config", where=str(name), cure=f"give a YAML file or one of: {known}")

@@ -1,0 +1,94 @@
+"""`hydroid`: one file a command, and how commands end.
+
+Nothing heavy is imported before a command runs, so that `--help` answers at once.
+"""
+
+import signal
+import sys
+from types import FrameType
+
+import typer
+
+from hydroid.cli import check, fit_mech, model, simulate, validate
+
+app = typer.Typer(
+    name="hydroid",
+    help="Find the physical parameters of a hydraulic manipulator from logs of commands and joint angles.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,  # plain help: importing rich would triple the time it takes
+    pretty_exceptions_enable=False,
+)
+app.command("fit-mech")(fit_mech.fit_mech)
+app.command("validate")(validate.validate)
+app.command("simulate")(simulate.simulate)
+app.command("check")(check.check)
+app.command("build-model")(model.build_model)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from hydroid import __version__
+
+        typer.echo(f"hydroid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version."
+    ),
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run a command: exit 0 done, 2 for what the user can mend, 130 when stopped."""
+    from hydroid.errors import HydroidError
+
+    # a cluster's "time is nearly up" stops a run as Ctrl-C does: with a checkpoint
+    for name in ("SIGTERM", "SIGUSR1"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _stop)
+    try:
+        code = app(standalone_mode=False)
+    except typer.Exit as end:
+        code = end.exit_code
+    except HydroidError as error:
+        code = _fail(str(error))
+    except KeyboardInterrupt:
+        code = _stopped()
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader has left; Python would complain at exit
+        code = 0
+    except Exception as error:
+        code = _usage(error)
+    sys.exit(code or 0)
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _fail(message: str) -> int:
+    typer.echo(f"hydroid: {' '.join(message.split())}", err=True)
+    return 2
+
+
+def _stopped() -> int:
+    typer.echo(
+        "hydroid: stopped; what was computed is kept, the same command with --resume goes on", err=True
+    )
+    return 130
+
+
+def _usage(error: Exception) -> int:
+    """Show click's own errors (a missing argument, an unknown option) its way; let defects through."""
+    show = getattr(error, "show", None)
+    if show is None:
+        if type(error).__name__ == "Abort":
+            return _stopped()
+        raise error
+    show()
+    return int(getattr(error, "exit_code", 2))

@@ -1,0 +1,30 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Logs = Annotated[
+    list[Path], typer.Argument(metavar="LOG.csv...", help="Logs: commands [%] and joint angles.")
+]
+Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped one.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace one setting, such as search.ga.generations=80."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for scripts.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Repair = Annotated[bool, typer.Option(help="Fill short gaps of the logs, and say how many.")]
+
+
+def overrides(texts: list[str] | None) -> dict[str, Any]:
+    """Read the `--set` options, by key."""
+    from hydroid.settings.load import parse_override
+
+    return dict(parse_override(text) for text in texts or [])
+
+
+def warn(finding: object) -> None:
+    """Print a finding about a log."""
+    typer.echo(f"hydroid: {getattr(finding, 'level', 'note')}: {finding}", err=True)

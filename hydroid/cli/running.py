@@ -1,0 +1,101 @@
+"""What a fit command does: run one or several fits, show how far they are, print what they found."""
+
+import json as jsonlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from hydroid.cli.progress import Progress
+from hydroid.errors import RunError, SettingsError
+from hydroid.identification.fit import Fit
+from hydroid.identification.folder import RunFolder
+from hydroid.identification.problem import Problem
+from hydroid.jobs import Warn, fit_logs, load_settings
+from hydroid.report.tables import parameter_table
+from hydroid.report.write import write_runs
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings
+
+
+def run_fits(
+    logs: Sequence[Path],
+    config: str,
+    changes: dict[str, Any],
+    out: Path | None,
+    runs: int,
+    *,
+    resume: bool,
+    repair: bool,
+    json: bool,
+    quiet: bool,
+    warn: Warn,
+) -> None:
+    """Fit over one seed or several and print the tables, or JSON."""
+    settings, arm = load_settings(config, changes)
+    if not logs:
+        logs, settings, arm = _continued(out, changes, resume, runs)
+    out = out or Path("runs") / f"{logs[0].stem}-{settings.search.algorithm}"
+    results: list[tuple[int, Problem, Fit]] = []
+    for seed in range(settings.search.seed, settings.search.seed + runs):
+        search = settings.search.model_copy(update={"seed": seed})
+        seeded = settings.model_copy(update={"search": search})
+        folder = out / f"seed-{seed}" if runs > 1 else out
+        with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
+            problem, fit = fit_logs(seeded, arm, logs, folder, progress, warn, resume=resume, repair=repair)
+        results.append((seed, problem, fit))
+        warn = _silent  # the logs are the same for every seed
+    if runs > 1:
+        table = write_runs(out, results)
+    else:
+        table = parameter_table(results[0][1], results[0][2])
+    if json:
+        found = [summary(problem, fit) | {"seed": seed} for seed, problem, fit in results]
+        typer.echo(jsonlib.dumps({"out": str(out), "runs": found}))
+    elif not quiet:
+        table.show()
+        typer.echo(f"{out / ('tables' if runs > 1 else 'report.html')}")
+
+
+def summary(problem: Problem, fit: Fit) -> dict[str, Any]:
+    """Return a fit as plain values: parameters by name, errors in deg, what has no effect."""
+    mapping = problem.parameters.mapping
+    return {
+        "final": fit.final,
+        "parameters": mapping(fit.best.theta),
+        "estimates": {
+            name: {"parameters": mapping(e.theta), "rms_deg": float(np.rad2deg(e.rms)), "norm": e.overall}
+            for name, e in fit.estimates.items()
+        },
+        "without_effect": [
+            name for name, none in zip(problem.parameters.names, fit.without_effect, strict=True) if none
+        ],
+        "evaluations": int(fit.history[-1, 1]),
+        "simulated": int(fit.history[-1, 2]),
+        "infeasible": int(fit.history[-1, 3]),
+    }
+
+
+def _continued(
+    out: Path | None, changes: dict[str, Any], resume: bool, runs: int
+) -> tuple[list[Path], FitSettings, Arm]:
+    """The logs and settings of a run that is continued by its folder alone."""
+    if not resume or out is None:
+        raise SettingsError(
+            "no log given", cure="name at least one LOG.csv, or --resume a run with --out DIR"
+        )
+    if runs > 1:
+        raise SettingsError("--runs needs its logs to be named", where="--resume")
+    folder = RunFolder(out)
+    logs = [Path(name) for name in folder.identity().get("logs", {})]
+    missing = [str(p) for p in logs if not p.is_file()]
+    if missing or not logs:
+        raise RunError(f"its log {', '.join(missing)} is not there", where=str(out), cure="name the log")
+    settings, arm = folder.settings(changes)
+    return logs, settings, arm
+
+
+def _silent(finding: object) -> None:
+    """Say nothing."""

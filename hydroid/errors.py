@@ -1,0 +1,48 @@
+"""What the user can mend: each error says what is wrong, where, and what is allowed or to be done.
+
+Every class here ends a command with one line and exit status 2. Anything else that escapes is a
+defect of hydroid and keeps its traceback.
+"""
+
+
+class HydroidError(Exception):
+    """A fault the user can mend.
+
+    Args:
+        what: what is wrong, a clause without a full stop.
+        where: the file, with line, column or setting where known.
+        cure: what is allowed, or what to do.
+    """
+
+    def __init__(self, what: str, *, where: str = "", cure: str = "") -> None:
+        self.what, self.where, self.cure = what, where, cure
+        text = f"{where}: {what}" if where else what
+        super().__init__(f"{text}; {cure}" if cure else text)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Keep the three parts when an error crosses a process boundary."""
+        return _rebuild, (type(self), self.what, self.where, self.cure)
+
+
+def _rebuild(kind: type[HydroidError], what: str, where: str, cure: str) -> HydroidError:
+    return kind(what, where=where, cure=cure)
+
+
+class LogError(HydroidError):
+    """A CSV log that cannot be used as it is."""
+
+
+class SettingsError(HydroidError):
+    """A YAML file or a --set that asks for something that does not exist or is not allowed."""
+
+
+class MeshError(HydroidError):
+    """A mesh from which no mass properties can be computed."""
+
+
+class ModelError(HydroidError):
+    """An MJCF model that does not fit the arm's settings."""
+
+
+class RunError(HydroidError):
+    """A run folder that cannot be written, continued or read."""

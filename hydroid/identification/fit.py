@@ -1,0 +1,175 @@
+"""A fit: search, the estimates taken from it, the polish, and what moves the response at the end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.identification.problem import Evaluation, Memo, Problem
+from hydroid.identification.search import Checkpoint, Search, SearchState
+from hydroid.parameters import Array
+from hydroid.search import compromise
+from hydroid.search.least_squares import Polish, polish
+from hydroid.search.pareto import non_dominated
+
+NO_EFFECT = 1e-8
+"""a parameter that moves the response less than this times the strongest one's has no effect on it"""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter set with its response.
+
+    theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over the whole record.
+    rms: of the output error [rad]. responses: simulated outputs [rad], (T, K) a log.
+    """
+
+    name: str
+    theta: Array
+    segments: Array
+    overall: float
+    rms: float
+    responses: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a fit found.
+
+    estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
+    objectives. history: shape (G, len(HISTORY)). effects: rms change of the response [rad] per 1 % of each
+    parameter, shape (P,).
+    """
+
+    estimates: dict[str, Estimate]
+    final: str
+    front: tuple[Array, Evaluation]
+    history: Array
+    polish: Polish | None
+    effects: Array
+
+    @property
+    def best(self) -> Estimate:
+        """The estimate to use."""
+        return self.estimates[self.final]
+
+    @property
+    def searched(self) -> Estimate:
+        """The search's own estimate, before the polish."""
+        return next(iter(self.estimates.values()))
+
+    @property
+    def without_effect(self) -> NDArray[np.bool_]:
+        """Parameters that the outputs do not feel at all, shape (P,)."""
+        return self.effects <= NO_EFFECT * np.nanmax(self.effects, initial=0.0)
+
+
+class Watcher(Protocol):
+    """What a fit tells while it runs."""
+
+    def generation(self, row: Array) -> None:
+        """Take a row of HISTORY."""
+        ...
+
+    def polishing(self, simulated: int) -> None:
+        """Take the number of simulations the polish has made."""
+        ...
+
+
+def fit(
+    problem: Problem,
+    save: Callable[[SearchState, Memo], None],
+    watch: Watcher,
+    checkpoint: Checkpoint | None = None,
+) -> Fit:
+    """Search, take the estimates, polish.
+
+    Args:
+        problem: the estimation problem with its settings.
+        save: keeps the search's state now and then.
+        watch: is told how far the fit is.
+        checkpoint: where an interrupted search was.
+
+    Raises:
+        RunError: every simulated parameter set diverged.
+    """
+    settings = problem.settings
+    memo = Memo(problem)
+    if checkpoint is not None:
+        memo.restore(*checkpoint.memo)
+    search = Search(problem, settings.search, memo)
+    state = search.run(checkpoint.state if checkpoint else None, save, watch.generation)
+    theta = search.theta(state.population)
+    evaluation = memo.evaluate(theta)
+    if settings.search.algorithm == "ga":
+        found = {"best": compromise.best(theta, evaluation.overall)}
+    else:
+        found = _from_front(theta, evaluation, settings.search.compromise)
+    estimates = _estimates(problem, found)
+    final, polished = next(iter(estimates)), None
+    if settings.polish is not None:
+        start = min(estimates.values(), key=lambda e: e.rms if np.isfinite(e.rms) else np.inf)
+        polished = _polish(problem, start, watch)
+        theta_polished = problem.parameters.from_unit(polished.point[None])
+        estimates |= _estimates(problem, {"polished": theta_polished[0]})
+        final = "polished"
+    return Fit(
+        estimates,
+        final,
+        _front(theta, evaluation, memo),
+        state.history,
+        polished,
+        problem.effects(estimates[final].theta),
+    )
+
+
+def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]:
+    theta = np.array(list(found.values()))
+    evaluation, responses = problem.evaluate(theta), problem.responses(theta)
+    rms = np.sqrt(np.mean(problem.residuals(theta) ** 2, axis=1))
+    return {
+        name: Estimate(
+            name,
+            theta[i],
+            evaluation.segments[i],
+            float(evaluation.overall[i]),
+            float(rms[i]),
+            tuple(r[i] for r in responses),
+        )
+        for i, name in enumerate(found)
+    }
+
+
+def _from_front(theta: Array, evaluation: Evaluation, first: str) -> dict[str, Array]:
+    """The three ways to one estimate, the one that the settings ask for first."""
+    found = {
+        "average": compromise.average(theta, evaluation.segments),
+        "utopia": compromise.utopia(theta, evaluation.segments),
+        "best": compromise.best(theta, evaluation.overall),
+    }
+    return {first: found[first]} | found
+
+
+def _front(theta: Array, evaluation: Evaluation, memo: Memo) -> tuple[Array, Evaluation]:
+    """The different non-dominated sets of the last population."""
+    _, first = np.unique(theta, axis=0, return_index=True)
+    keep = np.sort(first)
+    theta = theta[keep]
+    theta = theta[non_dominated(evaluation.segments[keep])]
+    return theta, memo.evaluate(theta)
+
+
+def _polish(problem: Problem, start: Estimate, watch: Watcher) -> Polish:
+    assert problem.settings.polish is not None
+    simulated = 0
+
+    def residuals(unit: Array) -> Array:
+        nonlocal simulated
+        simulated += len(unit)
+        watch.polishing(simulated)
+        return problem.residuals(problem.parameters.from_unit(unit))
+
+    unit = problem.parameters.to_unit(start.theta[None])[0]
+    return polish(unit, residuals, problem.settings.polish)

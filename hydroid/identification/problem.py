@@ -1,0 +1,146 @@
+"""The estimation problem: parameters in, objectives out (equations (17) to (22)).
+
+Evaluating a population is one function, `Problem.evaluate`, behind which threads, processes or a
+cluster may stand; the search knows only its arrays.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.arm.model import load_model
+from hydroid.identification.stage import MechanicalStage
+from hydroid.log import Log
+from hydroid.objective.norms import overall_objective
+from hydroid.objective.segments import segment_bounds, segment_objectives
+from hydroid.parameters import Array
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings
+from hydroid.simulation import ArmSimulation
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Objectives of n parameter sets: by segment, shape (n, S), and over all, shape (n,) [rad or relative].
+
+    A set whose simulation diverged has inf throughout.
+    """
+
+    segments: Array
+    overall: Array
+
+    def __len__(self) -> int:
+        return len(self.overall)
+
+
+class Problem:
+    """Logs, the model that is to reproduce them, and how the difference is measured.
+
+    Args:
+        arm: the arm's settings.
+        settings: the fit's settings.
+        logs: one or more records, each with its own start pose.
+    """
+
+    def __init__(self, arm: Arm, settings: FitSettings, logs: Sequence[Log]) -> None:
+        spec = load_model(arm.model, arm)
+        outputs = [j - 1 for j in settings.outputs]
+        self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
+        self.stage = MechanicalStage(arm, settings)
+        self.parameters = self.stage.parameters
+        self._simulations = [ArmSimulation(spec, arm, log, outputs, settings.simulation) for log in logs]
+        self._measured = [log.angle[:, outputs].T for log in logs]  # (K, T) a log
+        # one channel a log and output, one after the other: errors of several logs are one long row
+        channels = [
+            (log, angle) for log, measured in zip(logs, self._measured, strict=True) for angle in measured
+        ]
+        self.measured = np.concatenate([angle for _, angle in channels])
+        starts = np.cumsum([0, *(len(angle) for _, angle in channels)])
+        how = settings.objective.segments
+        self.bounds: NDArray[np.int64] = np.concatenate(
+            [
+                segment_bounds(angle, log.period, how) + start
+                for (log, angle), start in zip(channels, starts[:-1], strict=True)
+            ]
+        )
+
+    def evaluate(self, theta: Array) -> Evaluation:
+        """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
+        how = self.settings.objective
+        segments = np.empty((len(theta), len(self.bounds)))
+        overall = np.empty(len(theta))
+        for rows in self._chunks(len(theta)):
+            error = self.residuals(theta[rows])
+            segments[rows] = segment_objectives(error, self.measured, self.bounds, how)
+            overall[rows] = overall_objective(error, self.measured, how)
+        return Evaluation(segments, overall)
+
+    def residuals(self, theta: Array) -> Array:
+        """Output errors epsilon = y - y_hat of (17) [rad], shape (n, R): channel after channel; NaN if diverged."""
+        parts = [
+            measured - simulated.transpose(0, 2, 1)
+            for measured, simulated in zip(self._measured, self.responses(theta), strict=True)
+        ]
+        return np.concatenate([p.reshape(len(theta), -1) for p in parts], axis=1)
+
+    def responses(self, theta: Array) -> list[Array]:
+        """Simulated outputs [rad], one array of shape (n, T, K) a log."""
+        members = self.stage.arm_parameters(theta)
+        return [simulation.simulate(members).angle for simulation in self._simulations]
+
+    def effects(self, theta: Array, step: float = 1e-4) -> Array:
+        """Return how far each parameter moves the response: rms [rad] per 1 % of its value, shape (P,).
+
+        A fixed parameter counts too; NaN where the changed set diverges.
+        """
+        moved = theta + np.diag(step * theta)
+        change = self.residuals(np.vstack([theta, moved]))
+        rms = np.sqrt(np.mean((change[1:] - change[0]) ** 2, axis=1))
+        return rms * 0.01 / step
+
+    def _chunks(self, n: int) -> Iterator[slice]:
+        size = min(simulation.chunk for simulation in self._simulations)
+        return (slice(i, min(i + size, n)) for i in range(0, n, size))
+
+
+class Memo:
+    """Evaluates each parameter set once: identical chromosomes are not simulated again."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._known: dict[bytes, tuple[Array, float]] = {}
+
+    @property
+    def simulated(self) -> int:
+        """Sets simulated so far."""
+        return len(self._known)
+
+    @property
+    def infeasible(self) -> int:
+        """Sets whose simulation diverged."""
+        return sum(not np.isfinite(overall) for _, overall in self._known.values())
+
+    def evaluate(self, theta: Array) -> Evaluation:
+        """Evaluate theta, shape (n, P), simulating what is new in it."""
+        new = {row.tobytes(): row for row in theta if row.tobytes() not in self._known}
+        if new:
+            self._keep(np.array(list(new.values())))
+        known = [self._known[row.tobytes()] for row in theta]
+        return Evaluation(np.array([s for s, _ in known]), np.array([o for _, o in known]))
+
+    def _keep(self, theta: Array) -> None:
+        result = self._problem.evaluate(theta)
+        for row, segments, overall in zip(theta, result.segments, result.overall, strict=True):
+            self._known[row.tobytes()] = (segments, float(overall))
+
+    def arrays(self) -> tuple[Array, Array]:
+        """All sets and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
+        theta = np.array([np.frombuffer(key) for key in self._known])
+        values = np.array([np.append(segments, overall) for segments, overall in self._known.values()])
+        return theta, values
+
+    def restore(self, theta: Array, values: Array) -> None:
+        """Take back what `arrays` returned."""
+        self._known = {t.tobytes(): (v[:-1].copy(), float(v[-1])) for t, v in zip(theta, values, strict=True)}

@@ -1,0 +1,124 @@
+"""The search loop: ask, simulate, tell, and a state small enough to keep after every generation."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hydroid.identification.problem import Evaluation, Memo, Problem
+from hydroid.parameters import Array
+from hydroid.search.algorithm import Algorithm, Population
+from hydroid.search.ga import SimpleGa
+from hydroid.search.nsga2 import Nsga2
+from hydroid.settings.fit import SearchSettings
+
+HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
+"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or (19)
+over the whole record."""
+
+SAVE_EVERY = 5.0
+"""seconds between checkpoints: a lost one costs no more than that, and writing it is noise beside the search"""
+
+
+@dataclass(frozen=True)
+class SearchState:
+    """All that a search needs to go on: its population, the generator's state, its history."""
+
+    population: Population
+    rng: Mapping[str, Any]
+    history: Array  # (generations so far, len(HISTORY))
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A search's state, and what it had simulated, shapes (m, P) and (m, S + 1)."""
+
+    state: SearchState
+    memo: tuple[Array, Array]
+
+
+class Search:
+    """One search over one problem.
+
+    Args:
+        problem: what is minimised.
+        settings: algorithm and seed.
+        memo: what has been simulated already.
+    """
+
+    def __init__(self, problem: Problem, settings: SearchSettings, memo: Memo) -> None:
+        self._parameters, self._memo, self._seed = problem.parameters, memo, settings.seed
+        self._single = settings.algorithm == "ga"
+        free = int(problem.parameters.free.sum())
+        self._algorithm: Algorithm = (
+            SimpleGa(settings.ga, free) if self._single else Nsga2(settings.nsga2, free)
+        )
+
+    def run(
+        self,
+        state: SearchState | None,
+        save: Callable[[SearchState, Memo], None],
+        watch: Callable[[Array], None],
+    ) -> SearchState:
+        """Run from `state`, or from the seed, to the last generation or the target.
+
+        Args:
+            state: a state to continue from.
+            save: called with the state now and then, at the end, and when interrupted.
+            watch: called with a row of HISTORY after every generation.
+        """
+        saved = time.monotonic()
+        try:
+            while state is None or not self._finished(state):
+                state = self._next(state)  # an interrupt in here leaves the state before it
+                watch(state.history[-1])
+                if time.monotonic() - saved > SAVE_EVERY:
+                    save(state, self._memo)
+                    saved = time.monotonic()
+        finally:
+            if state is not None:
+                save(state, self._memo)
+        return state
+
+    def theta(self, population: Population) -> Array:
+        """Return the population's parameter sets, shape (n, P)."""
+        return self._parameters.from_unit(self._algorithm.decode(population.chromosomes))
+
+    @property
+    def generations(self) -> int:
+        """Populations the search evaluates at most, the first, random one included."""
+        return 1 + self._algorithm.settings.generations
+
+    def _finished(self, state: SearchState) -> bool:
+        return len(state.history) >= self.generations or self._algorithm.reached(state.population)
+
+    def _next(self, state: SearchState | None) -> SearchState:
+        rng = np.random.default_rng(self._seed)
+        if state is not None:
+            rng.bit_generator.state = state.rng
+        before = None if state is None else state.population
+        chromosomes = self._algorithm.start(rng) if before is None else self._algorithm.ask(before, rng)
+        unit = self._algorithm.decode(chromosomes)
+        result = self._memo.evaluate(self._parameters.from_unit(unit))
+        objectives = result.overall[:, None] if self._single else result.segments
+        population = self._algorithm.tell(before, Population(chromosomes, objectives))
+        history = np.empty((0, len(HISTORY))) if state is None else state.history
+        row = self._row(history, population, result)
+        return SearchState(population, rng.bit_generator.state, np.vstack([history, row]))
+
+    def _row(self, history: Array, population: Population, result: Evaluation) -> Array:
+        overall = self._memo.evaluate(self.theta(population)).overall
+        finite = overall[np.isfinite(overall)]
+        evaluations, best = (history[-1, 1], history[-1, 4]) if len(history) else (0, np.inf)
+        return np.array(
+            [
+                len(history) + 1,
+                evaluations + len(result),
+                self._memo.simulated,
+                self._memo.infeasible,
+                min(best, result.overall.min()),
+                np.median(finite) if finite.size else np.inf,
+            ]
+        )

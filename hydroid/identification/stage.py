@@ -1,0 +1,94 @@
+"""Stage 1 of the article: which parameters are free, and where each enters the arm (section 3, (15))."""
+
+from dataclasses import fields
+
+import mujoco
+import numpy as np
+
+from hydroid.errors import SettingsError
+from hydroid.parameters import Array, Parameter, ParameterSet
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings, ParameterSettings
+from hydroid.simulation import ArmParameters
+
+
+class MechanicalStage:
+    """Gain, dampers, springs, dry friction and link masses; the hydraulics stand as the gain.
+
+    What no parameter names is 0, a mass that no parameter names its nominal one.
+
+    Args:
+        arm: the arm's settings.
+        settings: the fit's settings, whose `parameters` say what is estimated.
+
+    Raises:
+        SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
+    """
+
+    def __init__(self, arm: Arm, settings: FitSettings) -> None:
+        self._arm = arm
+        self._slots = {name: _slots(arm, name, p) for name, p in settings.parameters.items()}
+        self._quantities = {name: p.quantity for name, p in settings.parameters.items()}
+        self._refuse_overlap()
+        self.parameters = ParameterSet(tuple(_parameter(name, p) for name, p in settings.parameters.items()))
+
+    def arm_parameters(self, theta: Array) -> ArmParameters:
+        """Spread theta, shape (n, P), over joints and links."""
+        n = len(theta)
+        joints = len(self._arm.joint_names)
+        values = {f.name: np.zeros((n, joints)) for f in fields(ArmParameters)}
+        values["mass"] = np.tile(self._arm.masses, (n, 1))
+        for column, (name, slots) in enumerate(self._slots.items()):
+            values[self._quantities[name]][:, slots] = theta[:, column, None]
+        return ArmParameters(**values)
+
+    def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
+        """Set the arm's MJCF to theta, shape (P,): masses with their inertias, dampers, springs, friction, gain.
+
+        The motor of a joint then takes the command in %. Springs are slack at their `springref`, which a
+        simulation sets to its start pose.
+        """
+        values = self.arm_parameters(theta[None])
+        for name, mass, nominal in zip(self._arm.link_names, values.mass[0], self._arm.masses, strict=True):
+            body = spec.body(name)
+            body.fullinertia = np.asarray(body.fullinertia) * (
+                mass / nominal
+            )  # the tensor scales with the mass
+            body.mass = mass
+        for j, name in enumerate(self._arm.joint_names):
+            joint, motor = spec.joint(name), spec.actuator(name)
+            joint.damping[0], joint.stiffness[0] = values.damping[0, j], values.stiffness[0, j]
+            joint.frictionloss = values.friction[0, j]
+            motor.gear[0] = values.gain[0, j]
+
+    def _refuse_overlap(self) -> None:
+        taken: dict[tuple[str, int], str] = {}
+        for name, slots in self._slots.items():
+            for slot in slots:
+                other = taken.setdefault((self._quantities[name], slot), name)
+                if other != name:
+                    raise SettingsError(
+                        f"{other} and {name} both set the {self._quantities[name]} of the same joint or link",
+                        where=f"parameters.{name}",
+                        cure="give each its own joints, or remove one",
+                    )
+
+
+def _slots(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
+    """0-based joints or links that the parameter acts on."""
+    where = f"parameters.{name}"
+    if settings.link is not None:
+        if settings.link not in arm.link_names:
+            known = ", ".join(arm.link_names)
+            raise SettingsError(f"no link {settings.link!r}", where=where, cure=f"links: {known}")
+        return [arm.link_names.index(settings.link)]
+    count = len(arm.joint_names)
+    joints = settings.joints if settings.joints is not None else range(1, count + 1)
+    if any(j > count for j in joints):
+        raise SettingsError(f"the arm has joints 1 to {count}", where=f"{where}.joints")
+    return [j - 1 for j in joints]
+
+
+def _parameter(name: str, settings: ParameterSettings) -> Parameter:
+    lower, upper = settings.bounds or (settings.fixed or 0.0,) * 2
+    return Parameter(name, settings.unit, lower, upper, settings.fixed)

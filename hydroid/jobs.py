@@ -1,0 +1,230 @@
+"""The commands as plain functions: from files to results and back to files.
+
+The command line is a thin cover of these; a script or a notebook calls them directly.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hydroid.arm.model import load_model
+from hydroid.assets import find_config
+from hydroid.errors import RunError, SettingsError
+from hydroid.identification.fit import Fit, Watcher, fit
+from hydroid.identification.folder import RunFolder
+from hydroid.identification.problem import Problem
+from hydroid.identification.stage import MechanicalStage
+from hydroid.identification.validation import ErrorIndices, error_indices
+from hydroid.log import Finding, Log, check_log, read_log, write_log
+from hydroid.parameters import Array
+from hydroid.report.write import write_report
+from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load, read_yaml
+from hydroid.simulation import ArmSimulation
+
+Warn = Callable[[Finding], None]
+
+
+def load_settings(config: str | Path, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
+    """Read a fit's settings, and the arm they name, from a path or a shipped config's name."""
+    path = find_config(config)
+    settings = load(path, FitSettings, overrides)
+    return settings, load_arm(settings.arm, path.parent)
+
+
+def read_logs(
+    paths: Sequence[Path], settings: FitSettings, arm: Arm, warn: Warn, repair: bool = False
+) -> list[Log]:
+    """Read logs as the settings map them; warnings and notes go to `warn`.
+
+    Raises:
+        LogError: the first fault that cannot be worked around.
+    """
+    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    logs: list[Log] = []
+    for path in paths:
+        log, findings = read_log(path, settings.log, ranges, outputs=settings.outputs, repair=repair)
+        for finding in findings:
+            warn(finding)
+        # what the log does not measure stands in the settings' pose
+        pose = np.where(log.measured, log.angle, arm.pose(settings.start_pose))
+        logs.append(replace(log, angle=pose))
+    return logs
+
+
+def check_logs(
+    paths: Sequence[Path], settings: FitSettings, arm: Arm, *, repair: bool = False
+) -> Iterator[tuple[Path, Log | None, list[Finding]]]:
+    """Check logs one by one: all that was found, and the log where it can be used."""
+    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    for path in paths:
+        yield path, *check_log(path, settings.log, ranges, outputs=settings.outputs, repair=repair)
+
+
+def fit_logs(
+    settings: FitSettings,
+    arm: Arm,
+    paths: Sequence[Path],
+    out: Path,
+    watch: Watcher,
+    warn: Warn,
+    *,
+    resume: bool = False,
+    repair: bool = False,
+) -> tuple[Problem, Fit]:
+    """Fit one run: logs in, a run folder out.
+
+    Args:
+        settings: the fit's settings.
+        arm: the arm.
+        paths: the logs.
+        out: the run folder.
+        watch: is told how far the fit is.
+        warn: takes what is odd about the logs.
+        resume: go on where a run in `out` stopped; without one, begin.
+        repair: fill short gaps of the logs.
+
+    Raises:
+        HydroidError: what the user can mend.
+    """
+    problem = Problem(arm, settings, read_logs(paths, settings, arm, warn, repair))
+    folder = RunFolder(out)
+    checkpoint = None
+    if not folder.exists:
+        folder.begin(settings, arm, paths)
+    elif resume:
+        folder.check(settings, paths)
+        checkpoint = folder.checkpoint()
+    else:
+        cure = "continue it with --resume, or choose another --out"
+        raise RunError("holds a run already", where=str(out), cure=cure)
+    try:
+        result = fit(problem, folder.save, watch, checkpoint)
+    except KeyboardInterrupt:
+        folder.status("interrupted")
+        raise
+    folder.write_estimate(problem, result)
+    write_report(folder, problem, result)
+    folder.status("done")
+    return problem, result
+
+
+@dataclass(frozen=True)
+class Validation:
+    """One fit's response to one log: simulated outputs [rad], shape (T, K), and indices by joint (1-based)."""
+
+    fit: str
+    log: Log
+    response: Array
+    indices: dict[int, ErrorIndices]
+
+
+def validate_fits(
+    folders: Sequence[Path], paths: Sequence[Path], warn: Warn, overrides: dict[str, Any] | None = None
+) -> list[Validation]:
+    """Simulate each fit's estimate on each log, with the settings it was fitted with."""
+    results: list[Validation] = []
+    for path in folders:
+        folder = RunFolder(path)
+        settings, arm = folder.settings(overrides)
+        source = str(path / "estimate.yaml")
+        for log in read_logs(paths, settings, arm, warn):
+            response = respond(settings, arm, log, folder.estimate(), source, settings.outputs)
+            indices = {
+                joint: error_indices(log.angle[:, joint - 1], response[:, column])
+                for column, joint in enumerate(settings.outputs)
+            }
+            results.append(Validation(path.name, log, response, indices))
+    return results
+
+
+def read_parameters(path: Path) -> dict[str, Any]:
+    """Read parameter values by name: a mapping, or an `estimate.yaml`.
+
+    Raises:
+        SettingsError: not a mapping.
+    """
+    values, _ = read_yaml(path)
+    inner = values.get("parameters", values)
+    if not isinstance(inner, dict):
+        raise SettingsError("parameters must be a mapping", where=str(path), cure="write `K: 0.2` lines")
+    return inner
+
+
+def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str) -> Log:
+    """Return the log with the angles that the model gives for its commands, from its first pose.
+
+    Joints that the simulation locks stay where they start; prescribed ones keep their logged motion.
+
+    Raises:
+        RunError: the simulation diverged.
+    """
+    passive = settings.simulation.other_joints == "passive"
+    moving = [j + 1 for j in range(log.joints) if passive or log.driven[j]]
+    angle = log.angle.copy()
+    if settings.simulation.other_joints == "locked":
+        angle[:] = log.angle[0]
+    angle[:, [j - 1 for j in moving]] = respond(settings, arm, log, values, source, moving)
+    return replace(log, angle=angle)
+
+
+def simulate_file(
+    settings: FitSettings,
+    arm: Arm,
+    commands: Path,
+    values: dict[str, Any],
+    source: str,
+    out: Path,
+    warn: Warn,
+    *,
+    pose: str | None = None,
+    noise_deg: float = 0.0,
+    seed: int = 0,
+) -> None:
+    """Simulate a CSV of commands and write a log.
+
+    Args:
+        settings: the model's settings.
+        arm: the arm.
+        commands: commands, and angles whose first sample is the start pose unless `pose` is given.
+        values: parameters by name.
+        source: where they came from, for messages.
+        out: the log to write.
+        warn: takes what is odd about the commands.
+        pose: a pose of the arm to start from.
+        noise_deg: standard deviation of Gaussian noise on every angle [deg].
+        seed: of the noise.
+    """
+    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    log, findings = read_log(commands, settings.log, ranges, angles_required=False)
+    for finding in findings:
+        warn(finding)
+    start = arm.pose(pose or settings.start_pose)
+    known = log.measured & (pose is None)
+    log = replace(log, angle=np.where(known, log.angle, start))
+    result = simulate_log(settings, arm, log, values, source)
+    noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
+    write_log(out, replace(result, angle=result.angle + noise), settings.log)
+
+
+def respond(
+    settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str, joints: Sequence[int]
+) -> Array:
+    """Simulate a log's commands with parameters by name; return the angles [rad] of `joints`, shape (T, K).
+
+    Raises:
+        SettingsError: a parameter that is missing or unknown.
+        RunError: the simulation diverged.
+    """
+    stage = MechanicalStage(arm, settings)
+    theta = stage.parameters.vector(values, source)
+    outputs = [j - 1 for j in joints]
+    simulation = ArmSimulation(load_model(arm.model, arm), arm, log, outputs, settings.simulation)
+    response = simulation.simulate(stage.arm_parameters(theta[None]))
+    if not response.feasible[0]:
+        raise RunError("the simulation diverged with these parameters", where=source)
+    return response.angle[0]

@@ -1,0 +1,1 @@
+"""Settings: one file a noun, all read through `load`."""

@@ -1,0 +1,93 @@
+"""A fit's settings: one YAML file a job, from the log's columns to the search."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from hydroid.settings.load import Settings
+from hydroid.settings.log import LogSettings
+from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.search import GaSettings, Nsga2Settings, PolishSettings
+from hydroid.settings.simulation import SimulationSettings
+
+MECHANICAL_UNITS = {
+    "gain": "N·m/%",
+    "damping": "N·m·s/rad",
+    "stiffness": "N·m/rad",
+    "friction": "N·m",
+    "mass": "kg",
+}
+
+Joint = Annotated[int, Field(ge=1)]
+
+
+class ParameterSettings(Settings):
+    """One parameter: what it is in the model, where it acts, its bounds, or the value it is held at."""
+
+    quantity: Literal["gain", "damping", "stiffness", "friction", "mass"]
+    joints: list[Joint] | None = None
+    """joints that share it; left out: all"""
+    link: str | None = None
+    """the link whose mass it is"""
+    bounds: tuple[float, float] | None = None
+    fixed: float | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "ParameterSettings":
+        if (self.quantity == "mass") != (self.link is not None):
+            raise ValueError("a mass names its link, and only a mass does")
+        if self.link is not None and self.joints is not None:
+            raise ValueError("a mass belongs to a link, not to joints")
+        if self.bounds is None and self.fixed is None:
+            raise ValueError("needs bounds: [lower, upper], or fixed: value")
+        if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
+            raise ValueError("bounds must be [lower, upper] with lower < upper")
+        lowest = min(self.bounds or (self.fixed or 0.0,))
+        if self.quantity == "mass" and min(lowest, self.fixed or lowest) <= 0:
+            raise ValueError("a mass must be above 0 kg")
+        if min(lowest, self.fixed or 0.0) < 0:
+            raise ValueError(f"a {self.quantity} cannot be negative")
+        return self
+
+    @property
+    def unit(self) -> str:
+        """The unit of the quantity."""
+        return MECHANICAL_UNITS[self.quantity]
+
+
+class SearchSettings(Settings):
+    """Which algorithm searches, from which seed, and how one estimate is taken from a Pareto set."""
+
+    algorithm: Literal["ga", "nsga2"] = "nsga2"
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    compromise: Literal["average", "utopia", "best"] = "average"
+    """average: of the best point of each segment, the article's; utopia: nearest to it; best: lowest norm"""
+    ga: GaSettings = GaSettings()
+    nsga2: Nsga2Settings = Nsga2Settings()
+
+
+class FitSettings(Settings):
+    """All that a fit needs besides its logs."""
+
+    stage: Literal["mech"] = "mech"
+    arm: str = "hydrolek"
+    """the arm's YAML: a shipped name, or a path (looked up beside this file first)"""
+    outputs: Annotated[list[Joint], Field(min_length=1)] = [2]
+    """joints whose measured angle is compared"""
+    start_pose: str = "home"
+    """the arm's pose in which joints without a measured angle stand"""
+    parameters: dict[str, ParameterSettings]
+    log: LogSettings = LogSettings()
+    simulation: SimulationSettings = SimulationSettings()
+    objective: ObjectiveSettings = ObjectiveSettings()
+    search: SearchSettings = SearchSettings()
+    polish: PolishSettings | None = PolishSettings()
+    """null: none, as in the article"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, values: Any) -> Any:
+        names = values.get("parameters") if isinstance(values, dict) else None
+        if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
+            raise ValueError("parameter names must be plain words such as K or M1")
+        return values

@@ -1,0 +1,70 @@
+"""Joints that follow their logged motion, whatever the arm does to them.
+
+A prescribed joint gets an armature so large that nothing on the arm can move it, and the torque that
+gives that armature the logged acceleration; a critically damped servo of the same scale takes up
+what integration leaves over. The arm feels the joint's true motion, inertia coupling included.
+"""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from hydroid.log import Log
+from hydroid.settings.simulation import SimulationSettings
+
+Array = NDArray[np.float64]
+
+ARMATURE = 1e6
+"""[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than 1e-6 of a radian"""
+SERVO = 10.0
+"""natural frequency of the servo [rad/s], slow against a step and fast against drift"""
+
+
+class Prescribed:
+    """The torque that makes some joints follow a log.
+
+    Args:
+        model: the stepped model; gets the armature, and springs that pull towards angle 0.
+        log: the record whose angles are followed.
+        joints: prescribed joints among the arm's, 0-based.
+        columns: their positions among the moving joints.
+        settings: low-pass of the motion, steps per sample.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        log: Log,
+        joints: NDArray[np.intp],
+        columns: NDArray[np.intp],
+        settings: SimulationSettings,
+    ) -> None:
+        model.dof_armature[columns] = ARMATURE
+        model.qpos_spring[columns] = 0.0
+        model.jnt_limited[columns] = False  # the machine's own stops are in the log
+        self.columns = columns
+        self.damping, self.stiffness = 2 * SERVO * ARMATURE, SERVO**2 * ARMATURE
+        step = log.period / settings.steps_per_sample
+        motion = smooth(log.angle[:, joints], settings.measured_cutoff_hz * log.period)
+        samples = np.arange((len(motion) - 1) * settings.steps_per_sample + 1) * step
+        fine = np.stack([np.interp(samples, log.time, angle) for angle in motion.T], axis=1)
+        velocity = np.diff(fine, axis=0, prepend=fine[:1]) / step
+        acceleration = np.diff(velocity, axis=0) / step
+        # semi-implicit Euler: the step from k to k+1 has the new velocity and the old angle
+        self.torque: Array = (
+            ARMATURE * acceleration + self.damping * velocity[1:] + self.stiffness * fine[:-1]
+        )
+
+
+def smooth(angle: Array, cutoff: float) -> Array:
+    """Low-pass angles, shape (T, K), without phase shift.
+
+    Args:
+        angle: noisy angles [rad].
+        cutoff: cut-off frequency [cycles per sample].
+    """
+    if cutoff >= 0.5 or len(angle) < 16:
+        return angle
+    sections = butter(2, 2 * cutoff, output="sos")
+    return np.asarray(sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100)))

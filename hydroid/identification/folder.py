@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import yaml
 
@@ -45,12 +46,7 @@ class RunFolder:
         """
         if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             raise RunError("exists and holds no run", where=str(self.path), cure="choose another --out")
-        spec = load_model(arm.model, arm)
-        for mesh in spec.meshes:
-            file = arm.meshes / Path(mesh.file).name
-            write_atomic(self.path / "model" / "meshes" / file.name, file.read_bytes())
-        spec.meshdir = "meshes"
-        write_atomic(self.path / "model" / "arm.xml", spec.to_xml())
+        self._write_model(load_model(arm.model, arm))
         local = arm.model_copy(update={"model": Path("model/arm.xml"), "meshes": Path("model/meshes")})
         self._write_yaml("arm.yaml", local.model_dump(mode="json"))
         self._write_yaml("config.yaml", _portable(settings))
@@ -132,7 +128,7 @@ class RunFolder:
         self._write_yaml("estimate.yaml", content)
         spec = load_model(self.path / "model" / "arm.xml", load_arm(self.path / "arm.yaml"))
         problem.stage.write_into(spec, fit.best.theta)
-        self.write("model/fitted.xml", spec.to_xml())
+        self._write_xml(spec, "fitted.xml")
 
     def status(self, word: str) -> None:
         """Record how far the run is: running, interrupted or done."""
@@ -187,6 +183,20 @@ class RunFolder:
                     where=str(self.path),
                     cure="continue it with its own settings, or choose another --out",
                 )
+
+    def _write_model(self, spec: mujoco.MjSpec) -> None:
+        """Copy the MJCF with its meshes, so that the run can be read where the original is gone."""
+        origin = Path(spec.modelfiledir) / spec.meshdir
+        for mesh in spec.meshes:
+            source = origin / mesh.file
+            mesh.file = source.name
+            self.write(f"model/meshes/{source.name}", source.read_bytes())
+        self._write_xml(spec, "arm.xml")
+
+    def _write_xml(self, spec: mujoco.MjSpec, name: str) -> None:
+        spec.modelfiledir, spec.meshdir = str((self.path / "model").resolve()), "meshes"
+        spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+        self.write(f"model/{name}", spec.to_xml())
 
     def _write_yaml(self, name: str, content: dict[str, Any]) -> None:
         self.write(name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))

@@ -109,7 +109,7 @@ class Memo:
     """Evaluates each parameter set once: identical chromosomes are not simulated again."""
 
     def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+        self.problem = problem
         self._known: dict[bytes, tuple[Array, float]] = {}
 
     @property
@@ -131,7 +131,7 @@ class Memo:
         return Evaluation(np.array([s for s, _ in known]), np.array([o for _, o in known]))
 
     def _keep(self, theta: Array) -> None:
-        result = self._problem.evaluate(theta)
+        result = self.problem.evaluate(theta)
         for row, segments, overall in zip(theta, result.segments, result.overall, strict=True):
             self._known[row.tobytes()] = (segments, float(overall))
 

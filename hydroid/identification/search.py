@@ -77,10 +77,10 @@ class Search:
                 if time.monotonic() - saved > SAVE_EVERY:
                     save(state, self._memo)
                     saved = time.monotonic()
+            return state
         finally:
             if state is not None:
                 save(state, self._memo)
-        return state
 
     def theta(self, population: Population) -> Array:
         """Return the population's parameter sets, shape (n, P)."""

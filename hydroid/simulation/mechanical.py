@@ -10,7 +10,7 @@ from hydroid.arm.locked import lock
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.population import ArmParameters, Array, Population, Response
+from hydroid.simulation.population import ArmParameters, Population, Response
 from hydroid.simulation.prescribed import Prescribed
 
 
@@ -29,7 +29,7 @@ class ArmSimulation:
         self, spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: SimulationSettings
     ) -> None:
         self._settings = settings
-        active = log.command.any(axis=0)
+        active = log.driven.copy()
         active[outputs] = True
         moving = np.flatnonzero(active | (settings.other_joints != "locked"))
         self._arm = lock(spec, arm, [arm.joint_names[j] for j in moving], log.angle[0])

@@ -4,7 +4,7 @@ Every member starts at rest in the log's first pose, in static balance with grav
 slack there, and a constant torque tau0 = g(q0), computed anew for every member, holds it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 
@@ -52,7 +52,7 @@ class Response:
 
 
 @contextmanager
-def quiet_mujoco() -> Iterator[None]:
+def quiet_mujoco() -> Generator[None]:
     """Keep MuJoCo from printing a warning for every diverged member, and from writing MUJOCO_LOG.TXT."""
     before = mujoco.MjLogConfig.get()
     silent = mujoco.MjLogConfig.get()

@@ -1,0 +1,220 @@
+"""The smallest model that moves exactly like the arm with some of its joints locked.
+
+A locked joint makes its link one rigid body with the link before it. `lock` builds the model of those
+rigid bodies, and `LockedArm.inertials` gives their mass, centre and inertia for any masses of the links, by
+Steiner's theorem; links that cannot move at all become part of the world and drop out. With every joint
+moving nothing but the fixed parts is fused, and the result is the whole arm without shapes or contacts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from hydroid.errors import ModelError
+from hydroid.settings.arm import Arm
+
+Array = NDArray[np.float64]
+
+_OPTIONS = (
+    "timestep",
+    "gravity",
+    "integrator",
+    "solver",
+    "iterations",
+    "tolerance",
+    "jacobian",
+    "enableflags",
+)
+_JOINT_FIELDS = ("range", "limited", "margin", "solref", "solimp", "stiffness", "stiffnesspoly")
+_DOF_FIELDS = ("damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp")
+
+
+@dataclass(frozen=True)
+class Inertials:
+    """What MuJoCo asks of B bodies, the world first, in n variants; fields as in mjModel's `body_...`."""
+
+    mass: Array
+    """[kg], shape (n, B)"""
+    ipos: Array
+    """centre of mass in the body's frame [m], shape (n, B, 3)"""
+    iquat: Array
+    """orientation of the principal axes in the body's frame, quaternion (w, x, y, z), shape (n, B, 4)"""
+    inertia: Array
+    """principal moments [kg·m²], shape (n, B, 3)"""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A link, or another body of the model, as a rigid part of a fused body and in its frame."""
+
+    body: int
+    """the fused body"""
+    column: int | None
+    """of its mass in `masses`; None where no setting names it"""
+    mass: float
+    """in the model [kg]"""
+    centre: Array
+    """[m], shape (3,)"""
+    inertia: Array
+    """about its centre, for 1 kg [m²], shape (3, 3)"""
+
+
+@dataclass(frozen=True)
+class LockedArm:
+    """A model with only the moving joints, and the way from link masses to its bodies."""
+
+    model: mujoco.MjModel
+    """one body and one motor (ctrl: torque [N·m]) a moving joint; contacts and auto-reset off"""
+    joints: tuple[str, ...]
+    """the moving joints in the order of qpos, qvel and ctrl"""
+    parts: tuple[_Part, ...]
+
+    def inertials(self, masses: Array) -> Inertials:
+        """Fuse the links; row k depends on masses[k] alone, to the last bit.
+
+        Args:
+            masses: of the links [kg], shape (n, L), columns as in `Arm.link_names`.
+        """
+        n, bodies = len(masses), self.model.nbody
+        weights = [np.full(n, p.mass) if p.column is None else masses[:, p.column] for p in self.parts]
+        mass = np.zeros((n, bodies))
+        ipos = np.zeros((n, bodies, 3))
+        tensor = np.zeros((n, bodies, 3, 3))
+        for part, weight in zip(self.parts, weights, strict=True):
+            mass[:, part.body] += weight
+            ipos[:, part.body] += weight[:, None] * part.centre
+        ipos[:, 1:] /= mass[:, 1:, None]
+        for part, weight in zip(self.parts, weights, strict=True):
+            away = part.centre - ipos[:, part.body]
+            tensor[:, part.body] += weight[:, None, None] * (part.inertia + _steiner(away))
+        inertia, iquat = _principal(tensor)
+        return Inertials(mass, ipos, iquat, inertia)
+
+
+def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
+    """Lock all joints but the moving ones.
+
+    Args:
+        spec: the arm's model, as `load_model` returns it.
+        arm: its settings, which name joints and links.
+        moving: names of the joints that stay, in any order.
+        pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is ignored.
+
+    Raises:
+        ModelError: nothing to move, a name that is no joint, or a body without mass.
+    """
+    joints = tuple(name for name in arm.joint_names if name in moving)
+    if not joints or len(joints) < len(set(moving)):
+        wrong = sorted(set(moving) - set(joints))
+        what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
+        raise ModelError(what, where=arm.name, cure=f"joints: {', '.join(arm.joint_names)}")
+    full = spec.compile()
+    data = mujoco.MjData(full)
+    for name, angle in zip(arm.joint_names, pose, strict=True):
+        if name not in joints:
+            data.joint(name).qpos[0] = angle
+    mujoco.mj_kinematics(full, data)
+
+    kept = [0, *(int(full.joint(name).bodyid[0]) for name in joints)]
+    carrier = _carriers(full, kept)
+    parts = _parts(full, data, arm, kept, carrier)
+    model = _skeleton(full, data, kept, carrier, joints)
+    locked = LockedArm(model, joints, parts)
+    _write(locked, np.array([full.body(name).mass[0] for name in arm.link_names]))
+    return locked
+
+
+def _carriers(full: mujoco.MjModel, kept: Sequence[int]) -> list[int]:
+    """For each body of the full model the kept body that it moves with, shape (bodies,)."""
+    carrier: list[int] = []
+    for body in range(full.nbody):
+        carrier.append(body if body in kept else carrier[full.body_parentid[body]])
+    return carrier
+
+
+def _parts(
+    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: Sequence[int], carrier: Sequence[int]
+) -> tuple[_Part, ...]:
+    """Every body that moves and has mass, seen from its carrier."""
+    column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
+    parts: list[_Part] = []
+    for body in range(full.nbody):
+        mass = float(full.body_mass[body])
+        if carrier[body] == 0 or (mass == 0 and body not in column):
+            continue
+        if mass == 0:
+            raise ModelError(f"body {full.body(body).name!r} has no mass", where=arm.name)
+        frame = data.xmat[carrier[body]].reshape(3, 3)
+        axes = frame.T @ data.ximat[body].reshape(3, 3)
+        centre = frame.T @ (data.xipos[body] - data.xpos[carrier[body]])
+        inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
+        parts.append(_Part(kept.index(carrier[body]), column.get(body), mass, centre, inertia))
+    for place, body in enumerate(kept[1:], start=1):
+        if all(part.body != place for part in parts):
+            raise ModelError(f"body {full.body(body).name!r} moves and has no mass", where=arm.name)
+    return tuple(parts)
+
+
+def _skeleton(
+    full: mujoco.MjModel,
+    data: mujoco.MjData,
+    kept: Sequence[int],
+    carrier: Sequence[int],
+    joints: Sequence[str],
+) -> mujoco.MjModel:
+    """The chain of kept bodies with the joints' properties; what it weighs is still to be written."""
+    spec = mujoco.MjSpec()
+    bodies = {0: spec.worldbody}
+    for name, body in zip(joints, kept[1:], strict=True):
+        parent = carrier[full.body_parentid[body]]
+        frame = data.xmat[parent].reshape(3, 3)
+        turn = np.empty(4)
+        mujoco.mju_mulQuat(turn, data.xquat[parent] * [1, -1, -1, -1], data.xquat[body])
+        bodies[body] = bodies[parent].add_body(
+            name=full.body(body).name,
+            pos=frame.T @ (data.xpos[body] - data.xpos[parent]),
+            quat=turn,
+            simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
+            explicitinertial=True,
+            mass=1.0,
+            inertia=[1.0, 1.0, 1.0],
+        )
+        joint = full.joint(name)
+        bodies[body].add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
+        spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name).set_to_motor()
+    model = spec.compile()
+    for option in _OPTIONS:
+        setattr(model.opt, option, getattr(full.opt, option))
+    disable = mujoco.mjtDisableBit
+    model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET
+    chosen = [full.joint(name).id for name in joints]
+    for prefix, fields in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
+        for field in fields:
+            getattr(model, prefix + field)[:] = getattr(full, prefix + field)[chosen]
+    return model
+
+
+def _write(locked: LockedArm, masses: Array) -> None:
+    """Give the model the inertials of one set of link masses [kg], shape (L,)."""
+    inertials, model = locked.inertials(masses[None]), locked.model
+    model.body_mass[:], model.body_ipos[:] = inertials.mass[0], inertials.ipos[0]
+    model.body_iquat[:], model.body_inertia[:] = inertials.iquat[0], inertials.inertia[0]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def _steiner(away: Array) -> Array:
+    """Inertia of 1 kg at `away` [m], shape (n, 3), about the origin [m²], shape (n, 3, 3)."""
+    square = np.sum(away * away, axis=-1)[:, None, None]
+    return square * np.eye(3) - away[:, :, None] * away[:, None, :]
+
+
+def _principal(tensor: Array) -> tuple[Array, Array]:
+    """Principal moments (..., 3) and the quaternion (w, x, y, z) of their right-handed axes (..., 4)."""
+    moments, axes = np.linalg.eigh(tensor)
+    axes[..., 2] *= np.sign(np.linalg.det(axes))[..., None]
+    quat = Rotation.from_matrix(axes.reshape(-1, 3, 3)).as_quat()
+    return moments, np.roll(quat, 1, axis=-1).reshape(*tensor.shape[:-2], 4)

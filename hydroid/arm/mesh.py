@@ -1,0 +1,101 @@
+"""A link's mesh -> volume, centre of mass and inertia at uniform density.
+
+A closed, outward-facing surface fixes the integrals of 1, x and x xᵀ over the volume inside it (divergence
+theorem, face by face). A surface that is open, inverted or in other units gives numbers all the same, and
+wrong ones: hence the checks.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from hydroid.errors import MeshError
+
+LARGEST_LINK = 5.0  # [m]; a link beyond this is taken for one in millimetres
+SMALLEST_VOLUME = 1e-9  # [m³]; one cubic millimetre
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """What a mesh says of a link whose mass is not known yet."""
+
+    volume: float
+    """[m³]"""
+    centre: NDArray[np.float64]
+    """centre of mass in the mesh's frame [m], shape (3,)"""
+    inertia: NDArray[np.float64]
+    """inertia tensor about the centre, for a mass of 1 kg [m²], shape (3, 3)"""
+
+
+def mass_properties(path: Path) -> MassProperties:
+    """Read a mesh and integrate over its inside.
+
+    Args:
+        path: an STL or OBJ file, in m, its origin in the link's joint.
+
+    Raises:
+        MeshError: missing, unreadable, empty, non-finite, in millimetres, open, inverted, or without volume.
+    """
+    mesh = _read(path)
+    _check(mesh, str(path))
+    inertia = np.asarray(mesh.moment_inertia, dtype=float) / mesh.mass
+    return MassProperties(
+        volume=float(mesh.volume),
+        centre=np.asarray(mesh.center_mass, dtype=float),
+        inertia=0.5 * (inertia + inertia.T),
+    )
+
+
+def _read(path: Path) -> trimesh.Trimesh:
+    where = str(path)
+    if not path.is_file():
+        raise MeshError("no such mesh", where=where, cure="put the link's STL there, or correct its name")
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False)  # processing would drop NaN faces
+    except Exception as error:  # trimesh's readers raise whatever their format's parser does
+        reason = str(error).strip().splitlines()
+        raise MeshError(
+            f"cannot be read ({reason[0] if reason else type(error).__name__})",
+            where=where,
+            cure="export it again, as binary STL",
+        ) from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise MeshError(
+            "holds no triangles", where=where, cure="export the solid, not a sketch or an assembly"
+        )
+    return mesh
+
+
+def _check(mesh: trimesh.Trimesh, where: str) -> None:
+    if not np.isfinite(mesh.vertices).all():
+        raise MeshError("has vertices that are not finite", where=where, cure="export it again")
+    mesh.merge_vertices()  # an STL names a corner anew in every face
+    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    if extent > LARGEST_LINK:
+        raise MeshError(
+            f"is {extent:.4g} m long, which looks like millimetres",
+            where=where,
+            cure="export it in metres, or scale it by 0.001",
+        )
+    if not mesh.is_watertight:
+        raise MeshError(
+            f"is not watertight: {_open_edges(mesh)} edges do not join exactly two faces",
+            where=where,
+            cure="close its holes in CAD, and export one solid",
+        )
+    if not mesh.is_winding_consistent:
+        raise MeshError(
+            "has faces that look both inward and outward", where=where, cure="make its normals consistent"
+        )
+    if mesh.volume < -SMALLEST_VOLUME:
+        raise MeshError("is inside out: its volume is negative", where=where, cure="flip its normals")
+    if mesh.volume < SMALLEST_VOLUME:
+        raise MeshError("encloses no volume", where=where, cure="give the solid a thickness, in metres")
+
+
+def _open_edges(mesh: trimesh.Trimesh) -> int:
+    _, faces_at_edge = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    return int(np.count_nonzero(faces_at_edge != 2))

@@ -1,0 +1,207 @@
+"""A serial hydraulic arm: links, joints, cylinders and named poses, from one YAML file.
+
+The units are those of a drawing (m, deg, mm, mm², cm³/rad); the rooms that compute turn them into SI.
+"""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from hydroid.assets import find_config
+from hydroid.errors import SettingsError
+from hydroid.settings.actuator import (
+    STROKE_TOLERANCE,
+    Direction,
+    LinearActuator,
+    Positive,
+    RotaryActuator,
+    Vector,
+)
+from hydroid.settings.load import Settings, load
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+
+
+class Base(Settings):
+    """What stands still and carries the first joint."""
+
+    mesh: str
+    at: Vector = (0.0, 0.0, 0.0)
+    """of the base's frame in the world [m]"""
+
+
+class Link(Settings):
+    """A moving link; the frame of its mesh sits in its joint."""
+
+    name: Name
+    mesh: str
+    mass: Positive
+    """nominal [kg]; known where no parameter is named"""
+    parameter: Name | None = None
+    """the unknown that this mass is, M1 say"""
+
+
+class FixedPart(Link):
+    """A part bolted to a link: a fixed jaw, a tool, a payload."""
+
+    carried_by: Name
+    at: Vector = (0.0, 0.0, 0.0)
+    """in the frame of the link that carries it [m]"""
+
+
+class Joint(Settings):
+    """A hinge; it moves the link of the same position in the list of links."""
+
+    name: Name
+    axis: Direction
+    """in the parent link's frame at angle 0"""
+    at: Vector
+    """in the parent link's frame [m]"""
+    range: tuple[float, float]
+    """[deg]"""
+    continuous: bool = False
+    """turns without stops; `range` is then no more than the span that a viewer offers"""
+    actuator: Annotated[LinearActuator | RotaryActuator, Field(discriminator="kind")]
+
+    @model_validator(mode="after")
+    def _possible(self) -> "Joint":
+        low, high = self.range
+        if not low < high:
+            raise ValueError(f"joint {self.name}: range must be [lower, upper] in deg with lower < upper")
+        if isinstance(self.actuator, LinearActuator):
+            _check_cylinder(self, self.actuator)
+        return self
+
+
+class Arm(Settings):
+    """A serial arm: `links[i]` hangs on `links[i - 1]` (the first on the base) by `joints[i]`."""
+
+    name: str
+    model: Path
+    """the MJCF, relative to this file"""
+    meshes: Path
+    """folder of the STL files, relative to this file"""
+    base: Base
+    links: Annotated[tuple[Link, ...], Field(min_length=1)]
+    fixed: tuple[FixedPart, ...] = ()
+    joints: tuple[Joint, ...]
+    poses: dict[Name, tuple[float, ...]]
+    """joint angles by name [deg], one a joint"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Arm":
+        if len(self.joints) != len(self.links):
+            raise ValueError(f"{len(self.links)} links need as many joints, not {len(self.joints)}")
+        for what, names in (
+            ("joint", list(self.joint_names)),
+            ("link", ["base", *self.link_names]),
+            ("mass parameter", [p.parameter for p in self.parts if p.parameter]),
+        ):
+            double = next((n for n in names if names.count(n) > 1), None)
+            if double:
+                raise ValueError(f"two {what}s are named {double}")
+        moving = [link.name for link in self.links]
+        for part in self.fixed:
+            if part.carried_by not in moving:
+                raise ValueError(
+                    f"{part.name} is carried by {part.carried_by!r}, which is none of: {', '.join(moving)}"
+                )
+        for name, pose in self.poses.items():
+            _check_pose(name, pose, self.joints)
+        return self
+
+    @property
+    def parts(self) -> tuple[Link, ...]:
+        """All that has mass: the links in order, then the fixed parts."""
+        return (*self.links, *self.fixed)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joint names, (J,), from the base outwards."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of all that has mass, (L,)."""
+        return tuple(part.name for part in self.parts)
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        """Nominal masses [kg], shape (L,)."""
+        return np.array([part.mass for part in self.parts])
+
+    @property
+    def mass_parameters(self) -> dict[str, str]:
+        """The link that each unknown mass belongs to, by parameter name."""
+        return {part.parameter: part.name for part in self.parts if part.parameter}
+
+    @property
+    def lower(self) -> NDArray[np.float64]:
+        """Lower joint stops [rad], shape (J,); -inf where there is none."""
+        return np.array([-np.inf if j.continuous else math.radians(j.range[0]) for j in self.joints])
+
+    @property
+    def upper(self) -> NDArray[np.float64]:
+        """Upper joint stops [rad], shape (J,); inf where there is none."""
+        return np.array([np.inf if j.continuous else math.radians(j.range[1]) for j in self.joints])
+
+    def pose(self, name: str) -> NDArray[np.float64]:
+        """Return a named pose [rad], shape (J,).
+
+        Raises:
+            SettingsError: no such pose, with the names there are.
+        """
+        if name not in self.poses:
+            raise SettingsError(f"{self.name} has no pose {name!r}", cure=f"one of: {', '.join(self.poses)}")
+        return np.radians(self.poses[name])
+
+
+def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
+    """Read an arm's YAML; its `model` and `meshes` become absolute.
+
+    Args:
+        name: a path, or the name of a shipped config.
+        beside: a folder in which a relative path is looked up first.
+
+    Raises:
+        SettingsError: no such file, or a setting that is not allowed.
+    """
+    path = find_config(name, beside)
+    arm = load(path, Arm)
+    folder = path.resolve().parent
+    places = {"model": (folder / arm.model).resolve(), "meshes": (folder / arm.meshes).resolve()}
+    return arm.model_copy(update=places)
+
+
+def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
+    """Refuse a triangle that folds flat within the joint's range, or a stroke that cannot span it."""
+    if joint.continuous:
+        raise ValueError(f"joint {joint.name}: a continuous joint needs a rotary actuator")
+    first, last = (angle + actuator.theta0 for angle in joint.range)
+    if first <= 0 or last >= 180:
+        raise ValueError(
+            f"joint {joint.name}: range + theta0 runs from {first:g} to {last:g} deg, "
+            "and the cylinder has no moment arm at 0 and 180"
+        )
+    if not np.cross(joint.axis, actuator.towards).any():
+        raise ValueError(f"joint {joint.name}: `towards` must not lie along the joint's axis")
+    needed = 1e3 * (actuator.length(math.radians(last)) - actuator.length(math.radians(first)))
+    if actuator.stroke < (1 - STROKE_TOLERANCE) * needed:
+        raise ValueError(
+            f"joint {joint.name}: a stroke of {actuator.stroke:g} mm is too short for the range, "
+            f"which needs {needed:.1f} mm"
+        )
+
+
+def _check_pose(name: str, pose: tuple[float, ...], joints: tuple[Joint, ...]) -> None:
+    if len(pose) != len(joints):
+        raise ValueError(f"pose {name} needs {len(joints)} angles in deg, not {len(pose)}")
+    for joint, angle in zip(joints, pose, strict=True):
+        if not joint.continuous and not joint.range[0] <= angle <= joint.range[1]:
+            raise ValueError(
+                f"pose {name}: joint {joint.name} at {angle:g} deg is outside its range {joint.range}"
+            )

@@ -1,0 +1,42 @@
+"""What several tests share: the shipped arm, and small logs made by simulation."""
+
+import numpy as np
+import pytest
+
+from hydroid.arm.model import load_model
+from hydroid.log import Log
+from hydroid.settings.arm import Arm, load_arm
+from hydroid.simulation import ArmParameters
+
+
+@pytest.fixture(scope="session")
+def arm() -> Arm:
+    return load_arm("hydrolek")
+
+
+@pytest.fixture(scope="session")
+def spec(arm: Arm):
+    return load_model(arm.model, arm)
+
+
+@pytest.fixture(scope="session")
+def study_log(arm: Arm) -> Log:
+    """Five seconds of steps on the shoulder from the study pose; the angles are the start pose throughout."""
+    return step_log(arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
+
+
+def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: int = 2) -> Log:
+    period = 0.01
+    command = np.zeros((round(len(levels) * dwell / period), len(pose)))
+    command[:, joint - 1] = np.repeat(levels, round(dwell / period))
+    time = np.arange(len(command)) * period
+    return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
+
+
+def members(arm: Arm, n: int, seed: int = 0) -> ArmParameters:
+    """Random members around the article's true values; every joint shares gain, damping and stiffness."""
+    rng = np.random.default_rng(seed)
+    joints = np.ones((1, len(arm.joint_names)))
+    shared = [rng.uniform(0.5, 2.0, (n, 1)) * value * joints for value in (0.2, 231.8, 53.4)]
+    mass = rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses
+    return ArmParameters(*shared, friction=np.zeros((n, len(arm.joint_names))), mass=mass)

@@ -1,0 +1,200 @@
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mujoco.batch import Batch
+
+from hydroid.arm.locked import lock
+from hydroid.arm.model import build_model, load_model
+from hydroid.errors import ModelError
+from hydroid.settings.arm import Arm, load_arm
+
+ARM = load_arm("hydrolek")
+SPEC = load_model(ARM.model, ARM)
+FULL = SPEC.compile()
+J, L = len(ARM.joint_names), len(ARM.link_names)
+LINKS = [FULL.body(name).id for name in ARM.link_names]
+NOMINAL = FULL.body_mass[LINKS].copy()
+
+
+def full_model(masses):
+    """The whole arm with each link's inertia scaled with its mass, contacts off."""
+    model = SPEC.compile()
+    model.body_mass[LINKS] = masses
+    model.body_inertia[LINKS] *= (masses / NOMINAL)[:, None]
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def locked_model(locked, masses):
+    model, inertials = locked.model, locked.inertials(masses[None])
+    for field in ("mass", "ipos", "iquat", "inertia"):
+        getattr(model, f"body_{field}")[:] = getattr(inertials, field)[0]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def random_state(rng):
+    span = np.where(np.isinf(ARM.upper), np.pi, ARM.upper - ARM.lower)
+    start = np.where(np.isinf(ARM.lower), -np.pi / 2, ARM.lower)
+    return start + span * rng.uniform(0.02, 0.98, J), rng.normal(size=J), 50 * rng.normal(size=J)
+
+
+def constrained(masses, q, v, tau, moving):
+    """Accelerations and bias of the moving joints of the whole arm, others held: M_ff a_f = τ_f - bias_f."""
+    model = full_model(masses)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[moving] = q, v[moving]
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((J, J))
+    mujoco.mj_fullM(model, data, inertia)
+    bias = data.qfrc_bias[moving]
+    return np.linalg.solve(inertia[np.ix_(moving, moving)], tau[moving] - bias), bias
+
+
+@settings(max_examples=40, deadline=None)
+@given(moving=st.sets(st.integers(0, J - 1), min_size=1), seed=st.integers(0, 2**32 - 1))
+def test_moves_like_the_whole_arm_with_the_other_joints_held(moving, seed):
+    rng = np.random.default_rng(seed)
+    moving = sorted(moving)
+    masses = NOMINAL * rng.uniform(0.1, 5, L)
+    q, v, tau = random_state(rng)
+    expected, bias = constrained(masses, q, v, tau, moving)
+
+    model = locked_model(lock(SPEC, ARM, [ARM.joint_names[j] for j in moving], q), masses)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = q[moving], v[moving], tau[moving]
+    mujoco.mj_forward(model, data)
+
+    scale = np.abs(bias).max() + np.abs(tau).max()
+    np.testing.assert_allclose(data.qfrc_bias, bias, rtol=1e-9, atol=1e-11 * scale)
+    np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("moving", [("shoulder",), ("shoulder", "wrist"), ARM.joint_names])
+def test_a_row_does_not_depend_on_its_neighbours_to_the_last_bit(moving):
+    locked = lock(SPEC, ARM, moving, ARM.pose("study"))
+    masses = NOMINAL * np.random.default_rng(0).uniform(0.2, 3, (37, L))
+    whole = locked.inertials(masses)
+    for rows in (slice(0, 1), slice(5, 6), slice(3, 36, 7)):
+        some = locked.inertials(np.ascontiguousarray(masses[rows]))
+        for field in ("mass", "ipos", "iquat", "inertia"):
+            assert getattr(some, field).tobytes() == getattr(whole, field)[rows].tobytes()
+
+
+def test_with_all_joints_moving_the_bodies_are_the_links():
+    locked = lock(SPEC, ARM, ARM.joint_names, np.zeros(J))
+    inertials = locked.inertials(NOMINAL[None])
+    np.testing.assert_allclose(inertials.mass[0, 1:6], NOMINAL[:5])
+    assert inertials.mass[0, 6] == pytest.approx(NOMINAL[5] + NOMINAL[7])  # the fixed jaw is part of link 6
+    assert inertials.mass[0].sum() == pytest.approx(45.0)
+    np.testing.assert_allclose(inertials.ipos[0, 1:6], FULL.body_ipos[LINKS[:5]], atol=1e-12)
+    np.testing.assert_allclose(
+        np.sort(inertials.inertia[0, 3]), np.sort(FULL.body_inertia[LINKS[2]]), rtol=1e-9
+    )
+
+
+def test_fused_inertia_satisfies_the_triangle_inequality_and_axes_are_unit():
+    locked = lock(SPEC, ARM, ["shoulder", "roll"], ARM.pose("rig"))
+    inertials = locked.inertials(NOMINAL * np.random.default_rng(1).uniform(0.01, 10, (50, L)))
+    moments = np.sort(inertials.inertia[:, 1:], axis=-1)
+    assert np.all(moments[..., 0] > 0)
+    assert np.all(moments[..., 0] + moments[..., 1] >= moments[..., 2])
+    np.testing.assert_allclose(np.linalg.norm(inertials.iquat, axis=-1), 1.0, rtol=1e-12)
+
+
+def test_links_that_cannot_move_have_no_effect():
+    locked = lock(SPEC, ARM, ["elbow"], ARM.pose("study"))
+    heavier = NOMINAL * np.where(np.isin(ARM.link_names, ["link1", "link2"]), 7.0, 1.0)
+    for field in ("mass", "ipos", "iquat", "inertia"):
+        np.testing.assert_array_equal(
+            getattr(locked.inertials(NOMINAL[None]), field), getattr(locked.inertials(heavier[None]), field)
+        )
+
+
+def test_only_what_moves_is_left():
+    locked = lock(SPEC, ARM, ["wrist", "shoulder"], ARM.pose("study"))
+    model = locked.model
+    assert locked.joints == ("shoulder", "wrist")
+    assert (
+        [model.joint(k).name for k in range(2)]
+        == [model.actuator(k).name for k in range(2)]
+        == ["shoulder", "wrist"]
+    )
+    assert (model.nbody, model.nq, model.nv, model.nu) == (3, 2, 2, 2)
+    assert model.ngeom == model.nmesh == model.nsite == model.ntendon == model.nkey == 0
+    disable = mujoco.mjtDisableBit
+    assert model.opt.disableflags == disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET
+    assert model.opt.timestep == FULL.opt.timestep
+    np.testing.assert_array_equal(model.jnt_range, FULL.jnt_range[[1, 4]])
+    assert model.jnt_limited.all()
+
+
+def test_what_a_users_model_says_of_its_joints_is_kept():
+    spec = SPEC.copy()
+    wrist = spec.joint("wrist")
+    wrist.armature, wrist.frictionloss, wrist.springref, wrist.ref = 0.3, 1.5, 20.0, 10.0
+    wrist.damping[0], wrist.stiffness[0] = 7.0, 11.0
+    whole, part = spec.compile(), lock(spec, ARM, ["wrist"], np.zeros(J)).model
+    for field in ("dof_armature", "dof_frictionloss", "dof_damping", "jnt_stiffness", "qpos_spring", "qpos0"):
+        assert getattr(part, field)[0] == getattr(whole, field)[4] != 0, field
+
+
+def test_it_steps_like_the_whole_arm_down_to_the_stop():
+    """Everything moves and falls until joints rest on their limits."""
+    model = full_model(NOMINAL)
+    model.dof_damping[:] = 20.0
+    locked = lock(SPEC, ARM, ARM.joint_names, np.zeros(J))
+    locked.model.dof_damping[:] = 20.0
+    whole, part = mujoco.MjData(model), mujoco.MjData(locked.model)
+    whole.qpos[:] = part.qpos[:] = ARM.pose("study")
+    for _ in range(300):
+        mujoco.mj_step(model, whole)
+        mujoco.mj_step(locked.model, part)
+    np.testing.assert_allclose(part.qpos, whole.qpos, atol=1e-8)
+    assert np.min(whole.qpos - ARM.lower) < 0.02
+
+
+def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
+    """Two blocks on one hinge: which axis is the longest depends on their masses."""
+    blocks = {"base": (0.1, 0.1, 0.1), "a": (0.3, 0.2, 0.1), "b": (0.1, 0.2, 0.5)}
+    for name, extents in blocks.items():
+        block = trimesh.creation.box(extents=extents)
+        (tmp_path / f"{name}.stl").write_bytes(block.export(file_type="stl"))
+    motor = {"kind": "rotary", "displacement": 5, "max_opening": 0.1}
+    arm = Arm.model_validate(
+        {
+            "name": "blocks",
+            "model": tmp_path / "blocks.xml",
+            "meshes": tmp_path,
+            "base": {"mesh": "base.stl"},
+            "links": [{"name": "a", "mesh": "a.stl", "mass": 1}],
+            "fixed": [{"name": "b", "mesh": "b.stl", "mass": 1, "carried_by": "a"}],
+            "joints": [
+                {"name": "j", "axis": [0, -1, 0], "at": [0, 0, 0], "range": [-90, 90], "actuator": motor}
+            ],
+            "poses": {},
+        }
+    )
+    locked = lock(build_model(arm), arm, ["j"], np.zeros(1))
+    masses = np.array([[1, 1], [5, 0.01], [0.01, 5], [100, 0.001]])
+    batch, inertials = Batch(locked.model, nsim=4, nthread=1), locked.inertials(masses)
+    for field in ("mass", "ipos", "iquat", "inertia"):
+        batch.expand(f"body_{field}")[:] = getattr(inertials, field)
+    batch.set_const()
+    acceleration = batch.bind("qacc")
+    batch.ctrl = np.ones((4, 1))
+    batch.forward()
+    per_mass = [(x**2 + z**2) / 12 for x, _, z in (blocks["a"], blocks["b"])]
+    np.testing.assert_allclose(acceleration[:, 0], 1 / (masses @ per_mass), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("moving", "message"), [([], "no joint is left"), (["shoulder", "knee"], "no joint is named 'knee'")]
+)
+def test_a_wrong_choice_of_joints_is_answered_with_their_names(moving, message):
+    with pytest.raises(ModelError, match=f"{message}.*azimuth, shoulder"):
+        lock(SPEC, ARM, moving, np.zeros(J))

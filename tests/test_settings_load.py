@@ -1,0 +1,104 @@
+from pathlib import Path
+
+import pytest
+
+from hydroid.assets import assets, find_config
+from hydroid.errors import SettingsError
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load, parse_override
+
+MINIMAL = """\
+parameters:
+  K: {quantity: gain, bounds: [0.1, 1.0]}
+  M1:
+    quantity: mass
+    link: link1
+    bounds: [1, 2]
+"""
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "c.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_shipped_fit_configs_are_valid():
+    for name in ("fit-mech", "article-mech"):
+        settings = load(find_config(name), FitSettings)
+        assert set(settings.parameters) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
+
+
+def test_a_dump_loads_back(tmp_path: Path):
+    import yaml
+
+    settings = load(find_config("fit-mech"), FitSettings)
+    again = load(written(tmp_path, yaml.safe_dump(settings.model_dump(mode="json"))), FitSettings)
+    assert again == settings
+
+
+def test_overrides_replace_one_setting(tmp_path: Path):
+    path = written(tmp_path, MINIMAL)
+    key, value = parse_override("search.ga.generations=7")
+    settings = load(path, FitSettings, {key: value, "parameters.K.bounds": [0.2, 0.3]})
+    assert settings.search.ga.generations == 7
+    assert settings.parameters["K"].bounds == (0.2, 0.3)
+    assert settings.parameters["M1"].link == "link1"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (MINIMAL + "sarch: {}\n", ["line 7", "unknown setting 'sarch'", "search"]),
+        (MINIMAL.replace("link1", "2"), ["line 5", "parameters.M1.link"]),
+        (MINIMAL.replace("[1, 2]", "[2, 1]"), ["line 3", "lower < upper"]),
+        (MINIMAL.replace("bounds: [1, 2]", "x: 1"), ["unknown setting 'parameters.M1.x'"]),
+        (MINIMAL.replace("gain", "gian"), ["line 2", "'gain'"]),
+        ("parameters: [1\n", ["line 2", "not YAML"]),
+        ("", ["must be a mapping"]),
+        ("- 1\n", ["must be a mapping"]),
+        ("outputs: [2]\n", ["'parameters' is missing"]),
+        (MINIMAL + "search: {seed: -1}\n", ["line 7", "search.seed"]),
+        (MINIMAL.replace("0.1,", ".nan,"), ["line 2", "finite"]),
+        (MINIMAL.replace("K:", "K-1:"), ["plain words"]),
+    ],
+)
+def test_a_fault_names_file_line_and_setting(tmp_path: Path, text: str, says: list[str]):
+    path = written(tmp_path, text)
+    with pytest.raises(SettingsError) as caught:
+        load(path, FitSettings)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "\n" not in message
+    for part in says:
+        assert part in message
+
+
+def test_a_fault_in_an_override_names_the_override(tmp_path: Path):
+    with pytest.raises(SettingsError, match=r"--set search\.ga\.population"):
+        load(written(tmp_path, MINIMAL), FitSettings, {"search.ga.population": 1})
+
+
+@pytest.mark.parametrize("text", ["novalue", "=3", "a=[1"])
+def test_a_malformed_override_is_refused(text: str):
+    with pytest.raises(SettingsError, match="--set"):
+        parse_override(text)
+
+
+def test_an_unknown_config_lists_the_shipped_ones():
+    with pytest.raises(SettingsError, match="fit-mech") as caught:
+        find_config("nonsense")
+    assert "nonsense" in str(caught.value)
+
+
+def test_yaml_cannot_run_code(tmp_path: Path):
+    target = tmp_path / "made"
+    path = written(tmp_path, f'parameters: !!python/object/apply:os.mkdir ["{target}"]\n')
+    with pytest.raises(SettingsError):
+        load(path, FitSettings)
+    assert not target.exists()
+
+
+def test_the_assets_are_where_they_should_be():
+    for folder in ("models", "meshes", "configs"):
+        assert any((assets() / folder).iterdir())

@@ -68,9 +68,9 @@ class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 
     model: mujoco.MjModel
-    """one body and one motor (ctrl: torque [N·m]) a moving joint; contacts and auto-reset off"""
+    """one body a moving joint and no actuator: torques go to qfrc_applied [N·m]; contacts and auto-reset off"""
     joints: tuple[str, ...]
-    """the moving joints in the order of qpos, qvel and ctrl"""
+    """the moving joints in the order of qpos and qvel"""
     parts: tuple[_Part, ...]
 
     def inertials(self, masses: Array) -> Inertials:
@@ -185,12 +185,15 @@ def _skeleton(
         )
         joint = full.joint(name)
         bodies[body].add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
-        spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name).set_to_motor()
     model = spec.compile()
     for option in _OPTIONS:
         setattr(model.opt, option, getattr(full.opt, option))
     disable = mujoco.mjtDisableBit
-    model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET
+    # what the skeleton has not got costs a tenth of a step to look for; a diverged member must stay diverged
+    idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
+    model.opt.disableflags = (
+        full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
+    )
     chosen = [full.joint(name).id for name in joints]
     for prefix, fields in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
         for field in fields:

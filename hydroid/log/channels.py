@@ -1,0 +1,162 @@
+"""Which column of the file is which signal, and the record of them in SI units at the file's own rate."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.log.finding import Finding
+from hydroid.log.log import Floats
+from hydroid.log.table import Cells, Table
+from hydroid.settings.log import LogSettings
+
+_LISTED = 40  # column names in a message
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column in use: value = gain · cell + offset in [s], [%] or [rad].
+
+    Attributes:
+        name: in the header.
+        kind: of signal.
+        joint: number, from 1; 0 for the time.
+        low, high: what the value may be; a continuous joint has ∓inf.
+        sign: +1, or −1 for the column of a command's negative direction.
+    """
+
+    name: str
+    kind: Literal["time", "command", "angle"]
+    joint: int = 0
+    gain: float = 1.0
+    offset: float = 0.0
+    low: float = -np.inf
+    high: float = np.inf
+    sign: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.kind} of joint {self.joint}" if self.joint else self.kind
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """The used columns of one file, R rows of C channels, time first.
+
+    Attributes:
+        table: the file.
+        channels: C of them.
+        values: [s, %, rad], shape (R, C), NaN where the file holds no number.
+        lines: line of each row [1-based], shape (R,).
+        ragged: rows whose number of cells is wrong, shape (R,).
+    """
+
+    table: Table
+    channels: tuple[Channel, ...]
+    values: Floats
+    lines: NDArray[np.int64]
+    ragged: NDArray[np.bool_]
+
+    @property
+    def time(self) -> Floats:
+        """Time [s], shape (R,)."""
+        return self.values[:, 0]
+
+    def finding(
+        self,
+        level: Literal["error", "warning", "note"],
+        what: str,
+        cure: str = "",
+        rows: Sequence[int] | NDArray[np.int64] = (),
+        channel: Channel | None = None,
+    ) -> Finding:
+        """Make a finding at the first of `rows`; further ones are counted."""
+        if len(rows) > 1:
+            last = self.lines[rows[-1]]
+            what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to line {last})"
+        line = int(self.lines[rows[0]]) if len(rows) else None
+        return Finding(level, what, self.table.source, cure, line, channel.name if channel else "")
+
+    def text(self, row: int, column: int) -> str:
+        """Return the cell of a row and a channel as it stands in the file."""
+        name = self.channels[column].name
+        return self.table.text(int(self.lines[row]), self.table.names.index(name))
+
+    def signals(self, joints: int) -> tuple[Floats, Floats]:
+        """Return command [%] and angle [rad], shapes (R, J): 0 where undriven, NaN where unmeasured."""
+        command = np.zeros((len(self.values), joints))
+        angle = np.full((len(self.values), joints), np.nan)
+        for channel, values in zip(self.channels, self.values.T, strict=True):
+            if channel.kind == "command":
+                command[:, channel.joint - 1] += channel.sign * values
+            elif channel.kind == "angle":
+                angle[:, channel.joint - 1] = values
+        return command, angle
+
+
+def map_channels(settings: LogSettings, ranges: Floats) -> list[Channel]:
+    """Return the channels that the settings ask for, time first.
+
+    Args:
+        settings: the mapping.
+        ranges: of the joints [rad], shape (J, 2), ∓inf for a continuous joint.
+    """
+    channels = [Channel(settings.time.column, "time", gain=1e-3 if settings.time.unit == "ms" else 1.0)]
+    margin = np.deg2rad(settings.angle_margin_deg)
+    for joint in range(1, len(ranges) + 1):
+        if command := settings.command_of(joint):
+            signs = zip(command.column, (1, -1), strict=False)
+            lowest = -100.0 if len(command.column) == 1 else 0.0
+            one = Channel("", "command", joint, command.scale, command.offset, lowest, 100.0)
+            channels += [replace(one, name=name, sign=sign) for name, sign in signs]
+    for joint, (low, high) in enumerate(ranges, 1):
+        if angle := settings.angle_of(joint):
+            unit = np.pi / 180 if angle.unit == "deg" else 1.0
+            gain, offset = angle.scale * unit, angle.offset * unit
+            channels.append(Channel(angle.column, "angle", joint, gain, offset, low - margin, high + margin))
+    return channels
+
+
+def missing_columns(table: Table, wanted: Sequence[Channel]) -> list[Finding]:
+    """Return what keeps the mapping from being used on this file: columns that lack or are ambiguous."""
+    findings: list[Finding] = []
+    lacking = [channel for channel in wanted if channel.name not in table.names]
+    if lacking:
+        free = sorted(set(table.names).difference(channel.name for channel in wanted))
+        names = ", ".join(f"{channel.name!r} ({channel}{_hint(channel.name, free)})" for channel in lacking)
+        have = [name for name in table.names if name]
+        more = f" and {len(have) - _LISTED} more" if len(have) > _LISTED else ""
+        cure = (
+            f"it has: {', '.join(have[:_LISTED])}{more}; set log.time, log.command, log.angle or log.joints, "
+            "where null says that a joint is not in the log"
+        )
+        what = f"has no column {names}"
+        findings.append(Finding("error", what, table.source, cure, table.header, lacking[0].name))
+    for name, count in Counter(table.names).items():
+        if count > 1 and any(channel.name == name for channel in wanted):
+            what = f"has {count} columns of this name"
+            findings.append(Finding("error", what, table.source, "rename all but one", table.header, name))
+    for name, count in Counter(channel.name for channel in wanted).items():
+        if count > 1:
+            users = " and ".join(str(channel) for channel in wanted if channel.name == name)
+            what, cure = f"one column cannot be {users}", "mend log.joints in the config"
+            findings.append(Finding("error", what, table.source, cure, table.header, name))
+    return findings
+
+
+def to_record(table: Table, channels: Sequence[Channel], cells: Cells) -> Record:
+    """Scale the cells to SI; a number too large to reckon with counts as none."""
+    gain, offset = (np.array([getattr(c, name) for c in channels]) for name in ("gain", "offset"))
+    with np.errstate(all="ignore"):
+        values = cells.values * gain + offset
+        values[~(np.abs(values) < 1e100)] = np.nan
+    return Record(table, tuple(channels), values, cells.lines, cells.ragged)
+
+
+def _hint(name: str, names: Sequence[str]) -> str:
+    folded = {other.lower(): other for other in names}
+    close = get_close_matches(name.lower(), folded, n=1, cutoff=0.75)
+    return f", did you mean {folded[close[0]]!r}?" if close else ""

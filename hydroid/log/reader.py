@@ -1,0 +1,116 @@
+"""One CSV log -> `Log`: open, map, repair, check, resample."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from hydroid.errors import LogError
+from hydroid.log.channels import Channel, Record, map_channels, missing_columns, to_record
+from hydroid.log.checks import check_record, sample_period
+from hydroid.log.delay import delay_findings
+from hydroid.log.finding import Finding
+from hydroid.log.log import Floats, Log
+from hydroid.log.repair import fill, unwrap
+from hydroid.log.resample import is_on_grid, resample
+from hydroid.log.table import open_table, read_cells
+from hydroid.settings.log import LogSettings
+
+
+def read_log(
+    path: Path,
+    settings: LogSettings,
+    ranges: Floats,
+    *,
+    outputs: Sequence[int] = (),
+    angles_required: bool = True,
+    repair: bool = False,
+) -> tuple[Log, list[Finding]]:
+    """Read a log that is to be used.
+
+    Args:
+        path: the CSV file.
+        settings: its columns, units and tolerances.
+        ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
+        outputs: joints (numbers, from 1) whose angles a fit compares.
+        angles_required: whether an angle column that the file lacks is an error, or the joint unmeasured.
+        repair: fill holes up to `settings.repair_s`.
+
+    Returns:
+        The log at `settings.period_s`, and warnings and notes.
+
+    Raises:
+        LogError: the first fault that keeps the log from being used.
+    """
+    log, findings = check_log(
+        path, settings, ranges, outputs=outputs, angles_required=angles_required, repair=repair
+    )
+    if log is None:
+        raise next(finding for finding in findings if finding.level == "error").error()
+    return log, findings
+
+
+def check_log(
+    path: Path,
+    settings: LogSettings,
+    ranges: Floats,
+    *,
+    outputs: Sequence[int] = (),
+    angles_required: bool = True,
+    repair: bool = False,
+) -> tuple[Log | None, list[Finding]]:
+    """Find everything that is wrong with a log; arguments as of `read_log`.
+
+    Returns:
+        The log, None if any finding is an error; and all findings, errors first.
+    """
+    try:
+        table = open_table(path)
+    except LogError as error:
+        return None, [Finding("error", error.what, error.where, error.cure)]
+    wanted = map_channels(settings, ranges)
+    findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
+    if not angles_required:
+        wanted = [c for c in wanted if c.kind != "angle" or c.name in table.names]
+    findings += missing_columns(table, wanted)
+    channels = [channel for channel in wanted if channel.name in table.names]
+    log = None
+    if channels and channels[0].kind == "time":
+        cells = read_cells(table, [table.names.index(channel.name) for channel in channels])
+        record, notes = unwrap(to_record(table, channels, cells))
+        if repair:
+            record, repairs = fill(record, settings.repair_s)
+            notes += repairs
+        findings += [*notes, *check_record(record, settings, outputs)]
+        if all(finding.level != "error" for finding in findings):
+            log, more = _to_log(record, settings, len(ranges))
+            findings += more
+    return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+
+
+def _mapping_faults(
+    source: str, settings: LogSettings, wanted: Sequence[Channel], joints: int, outputs: Sequence[int]
+) -> list[Finding]:
+    strangers = [f"log.joints.{joint}" for joint in settings.joints if joint > joints]
+    faults = [Finding("error", f"{name}: the arm has joints 1 to {joints}", source) for name in strangers]
+    measured = {channel.joint for channel in wanted if channel.kind == "angle"}
+    for joint in outputs:
+        if joint not in measured:
+            what = f"output joint {joint} has no angle column"
+            faults.append(Finding("error", what, source, "map it in log.joints, or choose another output"))
+    return faults
+
+
+def _to_log(record: Record, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
+    command, angle = record.signals(joints)
+    period = settings.period_s
+    time, command, angle = resample(record.time, command.clip(-100, 100), angle, period, settings.delay_s)
+    log = Log(record.table.source, time, command, angle, period)
+    findings = list[Finding]()
+    if not is_on_grid(record.time, period):
+        what = f"resampled from {sample_period(record.time):.6g} s to {period:g} s"
+        findings.append(record.finding("note", what, "commands held, angles interpolated"))
+    if not log.driven.any():
+        findings.append(record.finding("warning", "no joint is driven", "check log.command"))
+    columns = {
+        channel.joint: channel.name for channel in reversed(record.channels) if channel.kind == "command"
+    }
+    return log, findings + delay_findings(log, settings, columns.__getitem__)

@@ -1,0 +1,99 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from log_files import cells, faults, lines, read, save
+
+from hydroid.log.resample import hold
+
+holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(holes, st.lists(st.tuples(st.integers(1, 78), st.integers(1, 4)), max_size=6))
+def test_repair_restores_length_and_leaves_the_rest_alone(
+    tmp_path_factory: pytest.TempPathFactory, dropped: list[tuple[int, int]], blanked: list[tuple[int, int]]
+) -> None:
+    values = cells()
+    folder = tmp_path_factory.getbasetemp()
+    whole, _ = read(save(folder / "whole.csv", lines(values)))
+    gone = {row + k for row, run in dropped for k in range(run)}
+    holes = np.zeros(values.shape, dtype=bool)
+    holes[:, 1:] = np.isin(np.arange(len(values)), [*gone])[:, None]
+    table = lines(values)
+    for row, column in blanked:
+        table[row + 1][column] = "n/a"
+        holes[row, column] = True
+    kept = [table[0], *(row for k, row in enumerate(table[1:]) if k not in gone)]
+    log, findings = read(save(folder / "holed.csv", kept), repair=True)
+    assert len(log.time) == len(values)
+    for column in range(4):
+        mine, true = (np.concatenate([x.command, x.angle], axis=1)[:, column] for x in (log, whole))
+        there = ~holes[:, column + 1]
+        np.testing.assert_array_equal(mine[there], true[there])
+        at = np.flatnonzero(there)
+        if column < 2:
+            expected = true[at[np.searchsorted(at, np.arange(len(true)), side="right") - 1]]
+            np.testing.assert_array_equal(mine, expected)
+        else:
+            np.testing.assert_allclose(mine, np.interp(whole.time, whole.time[at], true[at]), atol=1e-12)
+    cell_count = sum(1 for row, column in set(blanked) if row not in gone)
+    said = [finding.what for finding in findings if finding.what.startswith("repaired")]
+    if gone or cell_count:
+        samples = f"{cell_count} missing cell{'s' * (cell_count != 1)} filled"
+        assert said[0].startswith(f"repaired: {samples}, {len(gone)} dropped sample")
+    else:
+        assert said == []
+
+
+def test_a_long_hole_is_not_repaired(tmp_path: Path) -> None:
+    table = lines(cells())
+    for row in table[30:41]:
+        row[3] = ""
+    (fault,) = faults(save(tmp_path / "log.csv", table), repair=True)
+    assert (fault.line, fault.column) == (31, "q1_deg")
+    table[40][3] = "10"
+    assert faults(save(tmp_path / "log.csv", table), repair=True) == []
+
+
+def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
+    table = lines(cells())
+    table[1][1] = table[-1][3] = ""
+    found = {(fault.line, fault.column) for fault in faults(save(tmp_path / "log.csv", table), repair=True)}
+    assert found == {(2, "u1_pct"), (81, "q1_deg")}
+
+
+def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
+    table = lines(cells())
+    table[20] = table[20][:2]
+    table[40][0] = ""
+    table[-1] = table[-1][:3]
+    path = save(tmp_path / "log.csv", table)
+    assert len(faults(path)) == 2
+    log, findings = read(path, repair=True)
+    assert len(log.time) == 79
+    assert "3 rows without a time" in findings[0].what
+
+
+def test_wrapped_angles_of_a_continuous_joint_are_joined(tmp_path: Path) -> None:
+    values = cells(400)
+    values[:, 4] = 300 * values[:, 0] - 100
+    true, _ = read(save(tmp_path / "true.csv", lines(values)))
+    values[:, 4] = (values[:, 4] + 180) % 360 - 180
+    log, findings = read(save(tmp_path / "wrapped.csv", lines(values)))
+    np.testing.assert_allclose(log.angle, true.angle, atol=1e-9)
+    assert [(f.level, f.column) for f in findings] == [("note", "q2_deg")]
+
+
+def test_a_jump_that_is_no_turn_is_an_error(tmp_path: Path) -> None:
+    table = lines(cells())
+    table[40][4] = "1000"
+    (fault,) = faults(save(tmp_path / "log.csv", table))
+    assert (fault.line, fault.column) == (41, "q2_deg")
+
+
+def test_hold_before_the_first_sample_is_no_command() -> None:
+    held = hold(np.array([0.0, 0.1]), np.array([[5.0], [7.0]]), np.array([-0.01, 0.0, 0.05, 0.1, 9.0]), 0.01)
+    assert held[:, 0].tolist() == [0, 5, 5, 7, 7]

@@ -1,0 +1,94 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hydroid.errors import SettingsError
+from hydroid.settings.load import load, validate
+from hydroid.settings.log import CommandColumns, LogSettings
+
+names = st.text("abcxyz_ []°", min_size=1, max_size=6)
+scales = st.floats(0.1, 10)
+command = st.fixed_dictionaries(
+    {},
+    optional={"column": names | st.lists(names, min_size=2, max_size=2), "scale": scales, "offset": scales},
+)
+angle = st.fixed_dictionaries(
+    {}, optional={"column": names, "unit": st.sampled_from(["deg", "rad"]), "scale": scales}
+)
+joint = st.none() | st.fixed_dictionaries(
+    {}, optional={"command": st.none() | command, "angle": st.none() | angle}
+)
+
+
+@given(st.dictionaries(st.integers(1, 9), joint), st.none() | scales, st.booleans())
+def test_dumped_settings_read_back_as_the_same(joints: dict, scale: float | None, unmapped: bool) -> None:
+    values: dict = {"joints": joints, "command": None if unmapped else {}}
+    if scale and not unmapped:
+        values["command"] = {"column": "c{joint}", "scale": scale}
+    settings = LogSettings.model_validate(values)
+    assert LogSettings.model_validate(settings.model_dump()) == settings
+    assert LogSettings.model_validate(settings.model_dump(mode="json")) == settings
+
+
+def test_a_joint_inherits_what_it_does_not_say() -> None:
+    settings = LogSettings.model_validate(
+        {
+            "command": {"column": ["up{joint}", "down{joint}"], "scale": 10},
+            "angle": {"unit": "rad"},
+            "joints": {2: {"command": {"offset": 1}}, 3: {"angle": {"column": "elbow"}}, 4: None},
+        }
+    )
+    assert settings.command_of(1) == CommandColumns(column=("up1", "down1"), scale=10)
+    assert settings.command_of(2) == CommandColumns(column=("up2", "down2"), scale=10, offset=1)
+    elbow = settings.angle_of(3)
+    assert elbow is not None
+    assert (elbow.column, elbow.unit) == ("elbow", "rad")
+    assert settings.command_of(4) is None
+    assert settings.angle_of(4) is None
+
+
+def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
+    settings = LogSettings.model_validate(
+        {
+            "command": None,
+            "angle": None,
+            "joints": {2: {"command": {"column": "u"}, "angle": {"column": "q"}}},
+        }
+    )
+    assert settings.command_of(2) == CommandColumns(column=("u",))
+    assert settings.command_of(1) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("command: {column: u}", "{joint}"),
+        ("angle: {column: q}", "{joint}"),
+        ("command: {column: [a, b, c]}", "two"),
+        ("command: {column: 3}", "a column's name"),
+        ("command: {scale: 0}", "must not be 0"),
+        ("angle: {unit: grad}", "'deg' or 'rad'"),
+        ("time: {unit: us}", "'s' or 'ms'"),
+        ("joints: {0: null}", "greater than or equal to 1"),
+        ("joints: {2: u2}", "joints.2"),
+        ("joints: {2: {comand: null}}", "comand"),
+        ("joints: [1, 2]", "joints"),
+        ("period_s: 0", "period_s"),
+        ("delay_s: .nan", "delay_s"),
+        ("periods: 0.01", "unknown setting 'periods'"),
+    ],
+)
+def test_a_setting_that_is_not_allowed_is_refused_by_name(text: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.yaml"
+    file.write_text(text)
+    with pytest.raises(SettingsError, match="line 1") as caught:
+        load(file, LogSettings)
+    assert said in str(caught.value)
+
+
+def test_an_override_reaches_one_joint() -> None:
+    settings = validate({"joints": {"3": {"command": None}}}, LogSettings, "--set")
+    assert settings.command_of(3) is None
+    assert settings.angle_of(3) == LogSettings().angle_of(3)

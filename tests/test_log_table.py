@@ -1,0 +1,124 @@
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from log_files import RANGES, SETTINGS, cells, faults, lines, read, save
+
+from hydroid.errors import LogError
+from hydroid.log import check_log
+
+ROWS = lines(cells())
+
+
+def text(separator: str = ",", decimal: str = ".", end: str = "\n") -> str:
+    return end.join(separator.join(row).replace(".", decimal) for row in ROWS) + end
+
+
+def with_degree_sign(data: str) -> str:
+    head, *rest = data.split("\n")
+    return "\n".join([head + ",temp °C", *(row + ",warm" if row else "" for row in rest)])
+
+
+DIALECTS: dict[str, Callable[[], bytes]] = {
+    "semicolon": lambda: text(";").encode(),
+    "tab": lambda: text("\t").encode(),
+    "decimal comma": lambda: text(";", ",").encode(),
+    "decimal comma, tab": lambda: text("\t", ",").encode(),
+    "byte order mark": lambda: text().encode("utf-8-sig"),
+    "utf-16": lambda: text("\t", ",").encode("utf-16"),
+    "latin-1": lambda: with_degree_sign(text()).encode("latin-1"),
+    "utf-8 degree": lambda: with_degree_sign(text()).encode(),
+    "windows": lambda: text(end="\r\n").encode(),
+    "old mac": lambda: text(end="\r").encode(),
+    "no last line end": lambda: text().rstrip().encode(),
+    "blank lines": lambda: ("\n\n" + text() + "\n  \n\n").encode(),
+    "comments": lambda: ("# rig\n" + text().replace("\n", "\n# note, with comma\n", 9)).encode(),
+    "sep=": lambda: ("sep=;\r\n" + text(";", ",", "\r\n")).encode(),
+    "quoted header": lambda: (",".join(f'"{n}"' for n in ROWS[0]) + "\n" + text().split("\n", 1)[1]).encode(),
+    "quoted cells": lambda: "\n".join(",".join(f'" {c} "' for c in row) for row in ROWS).encode(),
+    "spaces": lambda: "\n".join(" , ".join(row) for row in ROWS).encode(),
+    "trailing separators": lambda: text(";").replace("\n", ";;\n").encode(),
+    "trailing separators below": lambda: "\n".join(
+        [",".join(ROWS[0]), *(",".join(r) + "," for r in ROWS[1:])]
+    ).encode(),
+    "empty rows of a sheet": lambda: (text(";") + ";;;;\n;;;;\n").encode(),
+    "exponents": lambda: text().replace("\n0.01,", "\n1e-2,").encode(),
+}
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_the_same_log_in_any_dialect(dialect: str, tmp_path: Path) -> None:
+    reference, _ = read(save(tmp_path / "plain.csv", ROWS))
+    file = tmp_path / "dialect.csv"
+    file.write_bytes(DIALECTS[dialect]())
+    log, findings = read(file)
+    assert findings == []
+    np.testing.assert_array_equal(log.time, reference.time)
+    np.testing.assert_array_equal(log.command, reference.command)
+    np.testing.assert_array_equal(log.angle, reference.angle)
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "is empty"),
+        (b"\n\n# only\n", "is empty"),
+        (b"PK\x03\x04\x00\x00", "not a text file"),
+        (b"\xff\xfe\x00", "not a text file"),
+        (b"0.0,1,2,3,4\n", "line 1: has no header"),
+        (b"# time_s,u1_pct\n0.0,1\n", "line 2: has no header"),
+    ],
+)
+def test_a_file_that_is_no_log(data: bytes, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(data)
+    with pytest.raises(LogError, match=said):
+        read(file)
+
+
+def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="No such file"):
+        read(tmp_path / "none.csv")
+    with pytest.raises(LogError, match="directory"):
+        read(tmp_path)
+    with pytest.raises(LogError, match="cannot be read"):
+        read(Path("null\0byte.csv"))
+
+
+@pytest.mark.parametrize("junk", [b"1," * 25_000_000, b"x" * 50_000_000, b'"' * 50_000_000])
+def test_a_line_of_50_megabytes_is_refused_quickly(junk: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(text().encode() + junk)
+    start = time.perf_counter()
+    with pytest.raises(LogError, match=f"line {len(ROWS) + 1}: is longer than"):
+        read(file)
+    assert time.perf_counter() - start < 3
+
+
+junk = st.binary(max_size=30) | st.text(max_size=30).map(lambda s: s.encode("utf-8", "surrogatepass"))
+
+
+@settings(max_examples=150, deadline=None)
+@given(junk, st.integers(0, 400), st.integers(0, 60), st.booleans())
+def test_malformed_bytes_give_findings_and_nothing_else(
+    tmp_path_factory: pytest.TempPathFactory, junk: bytes, at: int, over: int, repair: bool
+) -> None:
+    data = "\n".join(",".join(row) for row in ROWS[:60]).encode()
+    file = tmp_path_factory.getbasetemp() / "junk.csv"
+    file.write_bytes(data[:at] + junk + data[at + over :])
+    log, findings = check_log(file, SETTINGS, RANGES, repair=repair)
+    assert (log is None) == any(finding.level == "error" for finding in findings)
+    assert all(str(file) in str(finding) and "\n" not in str(finding) for finding in findings)
+
+
+def test_the_line_of_a_fault_counts_comments_and_blank_lines(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    rows = [",".join(row) for row in ROWS]
+    rows[40] = rows[40].replace(",", ",oops", 1)
+    file.write_text("\n# one\n\n" + "\r\n".join(rows))
+    (fault,) = faults(file)
+    assert (fault.line, fault.column) == (3 + 41, "u1_pct")

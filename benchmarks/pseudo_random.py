@@ -1,0 +1,22 @@
+"""Pseudo-random commands for the studies: levels and dwells drawn at random, as in the article's figure 17."""
+
+import numpy as np
+
+from hydroid.log import Log
+
+
+def pseudo_random_log(
+    pose: np.ndarray, joints: list[int], duration: float = 75.0, period: float = 0.01, seed: int = 0
+) -> Log:
+    """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad]."""
+    rng = np.random.default_rng(seed)
+    samples = round(duration / period)
+    command = np.zeros((samples, len(pose)))
+    for joint in joints:
+        start = 0
+        while start < samples:
+            dwell = round(rng.uniform(1.0, 5.0) / period)
+            command[start : start + dwell, joint - 1] = round(rng.uniform(-100.0, 100.0), 1)
+            start += dwell
+    angle = np.tile(pose, (samples, 1))
+    return Log("pseudo-random", np.arange(samples) * period, command, angle, period)

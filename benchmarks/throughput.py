@@ -1,0 +1,122 @@
+"""What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench`).
+
+Population evaluation (70 members, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone on the
+same model and members, set up beforehand; `locked` against `passive`; the search's own share.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from pseudo_random import pseudo_random_log
+
+from hydroid.arm.locked import lock
+from hydroid.arm.model import load_model
+from hydroid.identification.problem import Memo, Problem
+from hydroid.identification.search import Search
+from hydroid.jobs import load_settings, read_parameters, simulate_log
+from hydroid.settings.arm import Arm
+
+TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
+MEMBERS, REPEATS = 70, 9
+
+
+def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm]:
+    changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
+    settings, arm = load_settings("article-mech", changes)
+    log = pseudo_random_log(arm.pose("study"), [2], duration=75.01)
+    log = simulate_log(settings, arm, log, read_parameters(TRUTH), str(TRUTH))
+    return Problem(arm, settings, [log]), arm
+
+
+def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
+    """Return MuJoCo's own rollout of the same members, written without hydroid's simulation."""
+    log, members = problem.logs[0], problem.stage.arm_parameters(theta)
+    passive = problem.settings.simulation.other_joints == "passive"
+    moving = np.arange(log.joints) if passive else np.array([1])
+    reduced = lock(load_model(arm.model, arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
+    reduced.model.qpos_spring[:] = log.angle[0, moving]
+    batch = Batch(reduced.model, nsim=len(theta))
+    inertials = reduced.inertials(members.mass)
+    for name in ("mass", "inertia", "ipos", "iquat"):
+        batch.expand(f"body_{name}")[:] = getattr(inertials, name)
+    batch.expand("dof_damping")[:] = members.damping[:, moving]
+    batch.expand("jnt_stiffness")[:] = members.stiffness[:, moving]
+    batch.set_const()
+    steps = len(log.time) - 1
+    batch.reset()
+    batch.bind("qpos")[:] = log.angle[0, moving]
+    bias = batch.bind("qfrc_bias")
+    batch.forward()
+    torque = bias[:, None] + members.gain[:, None, moving] * log.command[:-1, moving]
+    out = {"qpos": np.empty((len(theta), steps, len(moving)))}
+    applied = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
+
+    def roll() -> object:
+        batch.reset()
+        batch.bind("qpos")[:] = log.angle[0, moving]
+        started = time.perf_counter()
+        batch.rollout(steps, torque, applied, out=out)
+        return time.perf_counter() - started
+
+    return roll
+
+
+def seconds(call: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    result = call()
+    return result if isinstance(result, float) else time.perf_counter() - started
+
+
+def evaluation_against_rollout(other_joints: str, theta: np.ndarray) -> float:
+    """Print evaluation and bare rollout, in turn; return the evaluation's median time [s]."""
+    problem, arm = make_problem(other_joints)
+    roll = bare_rollout(problem, arm, theta)
+    problem.evaluate(theta), roll()
+    pairs = [(seconds(lambda: problem.evaluate(theta)), seconds(roll)) for _ in range(REPEATS)]
+    ratio = statistics.median(bare / ours for ours, bare in pairs)
+    ours, bare = (statistics.median(column) for column in zip(*pairs, strict=True))
+    print(f"| {other_joints} | {ours:.3f} | {bare:.3f} | {ratio:.3f} | {MEMBERS / ours:.0f} |")
+    return ours
+
+
+def search_share(algorithm: str) -> float:
+    """Return the share of a search's wall time [%] that is not spent in evaluating populations."""
+    problem, _ = make_problem("locked", algorithm)
+    spent = 0.0
+    evaluate = problem.evaluate
+
+    def timed(theta: np.ndarray) -> object:
+        nonlocal spent
+        started = time.perf_counter()
+        result = evaluate(theta)
+        spent += time.perf_counter() - started
+        return result
+
+    problem.evaluate = timed  # type: ignore[method-assign]
+    search = Search(problem, problem.settings.search, Memo(problem))
+    started = time.perf_counter()
+    search.run(None, lambda state, memo: None, lambda row: None)
+    wall = time.perf_counter() - started
+    return 100 * (wall - spent) / wall
+
+
+def main() -> None:
+    rng = np.random.default_rng(0)
+    problem, _ = make_problem("locked")
+    theta = problem.parameters.from_unit(rng.random((MEMBERS, int(problem.parameters.free.sum()))))
+    print(f"{MEMBERS} members, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} pairs")
+    print("| other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s |")
+    print("| --- | --- | --- | --- | --- |")
+    times = {mode: evaluation_against_rollout(mode, theta) for mode in ("passive", "locked")}
+    print(f"locked against passive: {times['passive'] / times['locked']:.2f} times the throughput")
+    for algorithm in ("ga", "nsga2"):
+        print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Objectives: from an output error to the numbers a search makes small."""

@@ -1,0 +1,1 @@
+"""Searches: from objectives to better points of the unit box. Nothing here knows what is searched for."""

@@ -1,0 +1,101 @@
+"""The words that every search shares: a population, and `start`, `ask`, `tell`.
+
+An algorithm holds settings only. The whole state of a run is its population, the state of its random
+generator and the number of the generation: store these three, and the run continues bit for bit.
+
+    genes = algorithm.start(rng)
+    population = algorithm.tell(None, Population(genes, objectives(algorithm.decode(genes))))
+    while not algorithm.reached(population):
+        genes = algorithm.ask(population, rng)
+        population = algorithm.tell(population, Population(genes, objectives(algorithm.decode(genes))))
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.search.coding import Genes
+from hydroid.search.pareto import feasible
+from hydroid.settings.search import GeneticSettings
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Members and what they scored; nothing ever writes into its arrays.
+
+    Attributes:
+        chromosomes: shape (n, length), see `coding`.
+        objectives: to be made small, shape (n, m). A member with an objective that is not finite is
+            infeasible.
+
+    Raises:
+        ValueError: the two do not belong together.
+    """
+
+    chromosomes: Genes
+    objectives: Float
+
+    def __post_init__(self) -> None:
+        if self.objectives.ndim != 2 or len(self.objectives) != len(self.chromosomes):
+            raise ValueError(
+                f"objectives of shape {self.objectives.shape} for {len(self.chromosomes)} chromosomes"
+            )
+
+    def __len__(self) -> int:
+        return len(self.chromosomes)
+
+    @property
+    def feasible(self) -> Bool:
+        """Members all of whose objectives are finite, shape (n,)."""
+        return feasible(self.objectives)
+
+    def take(self, index: NDArray[np.int64]) -> "Population":
+        """The members at `index`, in that order."""
+        return Population(self.chromosomes[index], self.objectives[index])
+
+    def join(self, other: "Population") -> "Population":
+        """These members, then the others."""
+        return Population(
+            np.concatenate((self.chromosomes, other.chromosomes)),
+            np.concatenate((self.objectives, other.objectives)),
+        )
+
+
+class Algorithm(Protocol):
+    """A search strategy: frozen, without state of its own."""
+
+    @property
+    def settings(self) -> GeneticSettings:
+        """Size, length, coding and operators."""
+        ...
+
+    @property
+    def population_size(self) -> int:
+        """Members of a population."""
+        ...
+
+    def start(self, rng: Generator) -> Genes:
+        """Chromosomes of the first population: uniform over the search space (article 4.1)."""
+        ...
+
+    def ask(self, population: Population, rng: Generator) -> Genes:
+        """Chromosomes of the offspring to be evaluated next."""
+        ...
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """The next population, from the present one (none at the start) and its evaluated offspring."""
+        ...
+
+    def decode(self, chromosomes: Genes) -> Float:
+        """Points of the unit box, shape (n, p)."""
+        ...
+
+    def reached(self, population: Population) -> bool:
+        """Whether the search has what it was asked for and may stop early."""
+        ...

@@ -1,0 +1,92 @@
+"""NSGA-II (Deb, Pratap, Agarwal, Meyarivan 2002) on the simple GA's operators, article 4.2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.search.algorithm import Population
+from hydroid.search.coding import Coding, Genes, make_coding
+from hydroid.search.operators import breed
+from hydroid.search.pareto import crowding, ranks
+from hydroid.settings.search import Nsga2Settings
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Nsga2:
+    """Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
+
+    Minimises m objectives at once: populations have objectives of shape (n, m).
+    """
+
+    settings: Nsga2Settings
+    parameters: int
+
+    @property
+    def population_size(self) -> int:
+        """Members of a population."""
+        return self.settings.population
+
+    @property
+    def coding(self) -> Coding:
+        """How members are written as chromosomes."""
+        return make_coding(self.settings.coding, self.parameters)
+
+    def start(self, rng: Generator) -> Genes:
+        """Uniform random chromosomes, shape (population_size, length)."""
+        return self.coding.random(self.population_size, rng)
+
+    def ask(self, population: Population, rng: Generator) -> Genes:
+        """Offspring of parents from the crowded tournament, shape (population_size, length)."""
+        count = self.population_size
+        parents = tournament(population.objectives, count + count % 2, rng)
+        return breed(population.chromosomes[parents], count, self.settings, self.coding, rng)
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """The best `population_size` of parents and children together, in crowded order."""
+        everyone = offspring if population is None else population.join(offspring)
+        return everyone.take(crowded_order(everyone.objectives)[: self.population_size])
+
+    def decode(self, chromosomes: Genes) -> Float:
+        """Points of the unit box, shape (n, p)."""
+        return self.coding.decode(chromosomes)
+
+    def reached(self, population: Population) -> bool:
+        """Never: a set of compromises has no one target."""
+        return False
+
+
+def crowded_order(objectives: Float) -> Int:
+    """Members from best to worst by the crowded comparison: lower rank first, then more room around them.
+
+    Args:
+        objectives: shape (n, m).
+
+    Returns:
+        Indices, shape (n,); equals keep their order.
+    """
+    rank = ranks(objectives)
+    return np.lexsort((-crowding(objectives, rank), rank))
+
+
+def tournament(objectives: Float, count: int, rng: Generator) -> Int:
+    """Winners of binary tournaments by the crowded comparison.
+
+    The contestants of each round are a random permutation of the population, so that every member
+    competes equally often. No infeasible member beats a feasible one.
+
+    Returns:
+        Indices of the parents, shape (count,).
+    """
+    rank = ranks(objectives)
+    room = crowding(objectives, rank)
+    n = len(objectives)
+    rounds = -(-2 * count // n)
+    contestants = np.concatenate([rng.permutation(n) for _ in range(rounds)])[: 2 * count]
+    a, b = contestants[0::2], contestants[1::2]
+    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
+    return np.where(a_wins, a, b)

@@ -1,0 +1,102 @@
+"""Pareto sets: dominance, ranks, crowding, utopia. All objectives are to be small.
+
+A member with an objective that is not finite is infeasible: every feasible member dominates it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+def feasible(objectives: Float) -> Bool:
+    """Members all of whose objectives (n, m) are finite, shape (n,)."""
+    return np.all(np.isfinite(objectives), axis=1)
+
+
+def dominates(values: Float) -> Bool:
+    """Whether member i (row) dominates member j (column): nowhere worse, somewhere better, shape (n, n)."""
+    n, m = values.shape
+    no_worse = np.ones((n, n), dtype=bool)
+    better = np.zeros((n, n), dtype=bool)
+    for k in range(m):
+        column = values[:, k]
+        no_worse &= column[:, None] <= column
+        better |= column[:, None] < column
+    return no_worse & better
+
+
+def ranks(objectives: Float) -> Int:
+    """Fast non-dominated sorting (Deb 2002): the front that each member belongs to.
+
+    Args:
+        objectives: shape (n, m).
+
+    Returns:
+        Shape (n,): 0 for the members that nobody dominates, 1 for those that only these dominate, ...;
+        infeasible members share the last front.
+    """
+    values = np.where(feasible(objectives)[:, None], objectives, np.inf)
+    above = dominates(values)
+    waiting = above.sum(axis=0)
+    rank = np.full(len(values), -1, dtype=np.int64)
+    front = waiting == 0
+    current = 0
+    while front.any():
+        rank[front] = current
+        waiting = waiting - above[front].sum(axis=0)
+        front = (waiting == 0) & (rank < 0)
+        current += 1
+    return rank
+
+
+def non_dominated(objectives: Float) -> Bool:
+    """The Pareto set among the members, shape (n,); empty if none is feasible."""
+    return (ranks(objectives) == 0) & feasible(objectives)
+
+
+def crowding(objectives: Float, rank: Int) -> Float:
+    """Crowding distance (Deb 2002): the room each member has to itself on its front.
+
+    Args:
+        objectives: shape (n, m).
+        rank: front of each member, shape (n,).
+
+    Returns:
+        Shape (n,): over the objectives, the sum of the gaps between a member's two neighbours in terms of
+        the front's range; inf for the ends of a front, 0 for the infeasible.
+    """
+    room = np.zeros(len(objectives))
+    usable = feasible(objectives)
+    for front in range(int(rank.max(initial=-1)) + 1):
+        members = np.flatnonzero((rank == front) & usable)
+        if len(members):
+            room[members] = _room(objectives[members])
+    return room
+
+
+def ideal(objectives: Float) -> Float:
+    """Utopia point (article, definition 1): the least of each objective over the feasible members.
+
+    Returns:
+        Shape (m,).
+
+    Raises:
+        ValueError: no member is feasible.
+    """
+    return objectives[feasible(objectives)].min(axis=0)
+
+
+def _room(front: Float) -> Float:
+    order = np.argsort(front, axis=0, kind="stable")
+    sorted_ = np.take_along_axis(front, order, axis=0)
+    span = sorted_[-1] - sorted_[0]
+    gaps = np.full(front.shape, np.inf)
+    # An objective in which all are equal has no ends and no gaps.
+    gaps[:, span == 0] = 0.0
+    gaps[1:-1] = (sorted_[2:] - sorted_[:-2]) / np.where(span == 0, 1.0, span)
+    room = np.empty_like(gaps)
+    np.put_along_axis(room, order, gaps, axis=0)
+    return room.sum(axis=1)

@@ -1,0 +1,129 @@
+import pickle
+
+import numpy as np
+import pytest
+from search_runs import advance, evaluate, same, through_files
+
+from hydroid.errors import SettingsError
+from hydroid.search.algorithm import Population
+from hydroid.search.ga import SimpleGa
+from hydroid.settings.load import validate
+from hydroid.settings.search import GaSettings
+
+
+def sphere(points):
+    return ((points - 0.3) ** 2).sum(axis=1, keepdims=True)
+
+
+def with_failures(points):
+    value = sphere(points)
+    value[points[:, 0] > 0.5] = np.nan
+    value[points[:, 1] > 0.8] = np.inf
+    return value
+
+
+@pytest.mark.parametrize("coding", ["binary", "integer"])
+@pytest.mark.parametrize("cross", ["pointwise", "uniform"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_finds_the_bottom_of_a_sphere(coding, cross, seed):
+    ga = SimpleGa(GaSettings(coding=coding, crossover=cross), 9)
+    population = advance(ga, sphere, None, np.random.default_rng(seed), 200)
+    random = sphere(np.random.default_rng(seed).random((201 * 70, 9))).min()
+    assert population.objectives.min() < random / 5  # random search with the same number of evaluations
+
+
+def test_solves_one_max():
+    ga = SimpleGa(GaSettings(target=-144.0, mutation_rate=0.03, elitism=2), 9)
+    ones = {}
+
+    def count(points):
+        return -ga.coding.encode(points).sum(axis=1, dtype=float)[:, None]
+
+    rng = np.random.default_rng(4)
+    ones["first"] = advance(ga, count, None, rng, 0).objectives.min()
+    ones["last"] = advance(ga, count, None, rng, 2000).objectives.min()
+    assert ones == {"first": pytest.approx(-92, abs=12), "last": -144}
+
+
+@pytest.mark.parametrize("elitism", [1, 3])
+def test_the_elite_is_kept_and_not_evaluated_again(elitism):
+    ga = SimpleGa(GaSettings(population=11, elitism=elitism), 3)
+    rng = np.random.default_rng(0)
+    population = advance(ga, with_failures, None, rng, 0)
+    for _ in range(30):
+        chromosomes = ga.ask(population, rng)
+        assert len(chromosomes) == 11 - elitism
+        successor = ga.tell(population, evaluate(ga, chromosomes, with_failures))
+        assert len(successor) == 11
+        best = np.sort(population.objectives[:, 0])[:elitism]  # numpy sorts nan last
+        assert np.array_equal(successor.objectives[:elitism, 0], best, equal_nan=True)
+        population = successor
+
+
+def test_without_elitism_all_is_new():
+    ga = SimpleGa(GaSettings(population=10, elitism=0), 3)
+    rng = np.random.default_rng(0)
+    population = advance(ga, sphere, None, rng, 0)
+    offspring = evaluate(ga, ga.ask(population, rng), sphere)
+    assert same(ga.tell(population, offspring), offspring)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_infeasible_members_have_no_children(bad):
+    ga = SimpleGa(GaSettings(crossover_rate=0, mutation_rate=0), 2)
+    rng = np.random.default_rng(0)
+    chromosomes = ga.start(rng)
+    objectives = sphere(ga.decode(chromosomes))
+    objectives[::2] = bad
+    children = ga.ask(Population(chromosomes, objectives), rng)
+    feasible = {row.tobytes() for row in chromosomes[1::2]}
+    assert all(child.tobytes() in feasible for child in children)
+    offspring = Population(children, np.ones((len(children), 1)))
+    assert np.isfinite(ga.tell(Population(chromosomes, objectives), offspring).objectives).all()
+
+
+def test_survives_a_population_without_a_feasible_member():
+    ga = SimpleGa(GaSettings(), 3)
+    population = advance(ga, lambda x: np.full((len(x), 1), np.nan), None, np.random.default_rng(0), 3)
+    assert len(population) == 70
+    assert not population.feasible.any()
+
+
+@pytest.mark.parametrize("coding", ["binary", "integer"])
+def test_a_resumed_run_is_the_same_bit_for_bit(tmp_path, coding):
+    ga = SimpleGa(GaSettings(coding=coding), 5)
+    whole = advance(ga, with_failures, None, np.random.default_rng(7), 12)
+    rng = np.random.default_rng(7)
+    half = advance(ga, with_failures, None, rng, 5)
+    half, rng = through_files(tmp_path, half, rng)
+    resumed = advance(pickle.loads(pickle.dumps(ga)), with_failures, half, rng, 7)
+    assert same(resumed, whole)
+    assert not same(advance(ga, with_failures, None, np.random.default_rng(8), 12), whole)
+
+
+def test_stops_at_the_target():
+    ga = SimpleGa(GaSettings(target=0.05), 2)
+    population = advance(ga, sphere, None, np.random.default_rng(0), 500)
+    assert ga.reached(population)
+    assert not SimpleGa(GaSettings(target=1e-30), 2).reached(population)
+    assert not SimpleGa(GaSettings(), 2).reached(population)
+
+
+def test_more_than_one_objective_is_a_mistake():
+    ga = SimpleGa(GaSettings(), 2)
+    with pytest.raises(ValueError, match="one objective, not 2"):
+        ga.ask(Population(ga.start(np.random.default_rng(0)), np.ones((70, 2))), np.random.default_rng(0))
+
+
+def test_objectives_that_do_not_belong_to_the_chromosomes_are_a_mistake():
+    with pytest.raises(ValueError, match="for 3 chromosomes"):
+        Population(np.zeros((3, 4)), np.zeros((2, 1)))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"population": 1}, {"crossover_rate": 1.1}, {"mutation_rate": -0.1}, {"points": 0}, {"elitism": 70}],
+)
+def test_settings_out_of_range_are_refused(values):
+    with pytest.raises(SettingsError, match=next(iter(values))):
+        validate(values, GaSettings, "fit.yaml")

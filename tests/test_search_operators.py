@@ -1,0 +1,120 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hydroid.search.coding import make_coding
+from hydroid.search.operators import breed, crossover, mutate, pointwise_swaps, roulette, uniform_swaps
+from hydroid.settings.search import GaSettings
+
+INF, NAN = np.inf, np.nan
+
+
+def frequencies(objective, draws=50_000):
+    index = roulette(np.array(objective, dtype=float), draws, np.random.default_rng(11))
+    return np.bincount(index, minlength=len(objective))
+
+
+def test_members_are_drawn_in_proportion_to_their_fitness():
+    objective = [1.0, 2.0, 4.0, 4.5, 5.0, INF]
+    fitness = np.array([4.0, 3.0, 1.0, 0.5, 0.0, 0.0])
+    counts = frequencies(objective)
+    assert counts[4:].sum() == 0
+    expected = fitness[:4] / fitness.sum() * counts.sum()
+    assert ((counts[:4] - expected) ** 2 / expected).sum() < 16.3  # chi-square, 3 degrees, p = 0.001
+
+
+@pytest.mark.parametrize(
+    ("objective", "equally"),
+    [
+        ([3, 3, 3, 3], [0, 1, 2, 3]),
+        ([INF, NAN, -INF], [0, 1, 2]),
+        ([INF, 7, NAN], [1]),
+        ([2, INF, 2], [0, 2]),
+    ],
+)
+def test_the_likely_are_equally_likely_where_fitness_cannot_tell(objective, equally):
+    counts = frequencies(objective)
+    assert np.flatnonzero(counts).tolist() == equally
+    expected = counts.sum() / len(equally)
+    assert ((counts[equally] - expected) ** 2 / expected).sum() < 16.3
+
+
+@given(
+    objective=st.lists(
+        st.one_of(st.floats(0, 1e300), st.sampled_from([INF, NAN, -INF])), min_size=1, max_size=12
+    ),
+    seed=st.integers(0, 2**32),
+)
+def test_no_infeasible_parent_while_a_feasible_one_exists(objective, seed):
+    values = np.array(objective)
+    drawn = roulette(values, 20, np.random.default_rng(seed))
+    assert np.isfinite(values[drawn]).all() or not np.isfinite(values).any()
+
+
+@given(
+    pairs=st.integers(1, 6), length=st.integers(1, 40), points=st.integers(1, 50), seed=st.integers(0, 999)
+)
+def test_n_point_crossover_makes_n_cuts(pairs, length, points, seed):
+    swaps = pointwise_swaps(pairs, length, points, np.random.default_rng(seed))
+    cuts = np.count_nonzero(swaps[:, 1:] != swaps[:, :-1], axis=1)
+    assert (cuts == min(points, length - 1)).all()
+    assert not swaps[:, 0].any()
+
+
+def test_cuts_are_placed_uniformly():
+    swaps = pointwise_swaps(30_000, 11, 1, np.random.default_rng(2))
+    counts = np.bincount(swaps.argmax(axis=1), minlength=11)[1:]
+    expected = 3000
+    assert ((counts - expected) ** 2 / expected).sum() < 27.9  # 9 degrees, p = 0.001
+
+
+def test_uniform_crossover_swaps_half():
+    share = uniform_swaps(1000, 144, np.random.default_rng(0)).mean(axis=0)
+    assert np.abs(share - 0.5).max() < 5 * np.sqrt(0.25 / 1000)
+
+
+@pytest.mark.parametrize("kind", ["binary", "integer"])
+@pytest.mark.parametrize("cross", ["pointwise", "uniform"])
+@given(rate=st.floats(0, 1), seed=st.integers(0, 2**32))
+def test_crossover_only_exchanges_the_genes_of_a_pair(kind, cross, rate, seed):
+    rng = np.random.default_rng(seed)
+    parents = make_coding(kind, 4).random(10, rng)
+    parents.flags.writeable = False
+    children = crossover(parents, GaSettings(crossover=cross, crossover_rate=rate), rng)
+    assert children.dtype == parents.dtype
+    pair = np.sort(parents.reshape(5, 2, -1), axis=1)
+    assert (np.sort(children.reshape(5, 2, -1), axis=1) == pair).all()
+
+
+def test_the_crossover_rate_is_the_share_of_pairs_that_cross():
+    coding = make_coding("integer", 200)
+    rng = np.random.default_rng(0)
+    parents = coding.random(4000, rng)
+    children = crossover(parents, GaSettings(crossover="uniform", crossover_rate=0.8), rng)
+    crossed = (children != parents).any(axis=1).reshape(-1, 2)
+    assert (crossed[:, 0] == crossed[:, 1]).all()
+    assert abs(crossed.mean() - 0.8) < 5 * np.sqrt(0.16 / 2000)
+    assert (crossover(parents, GaSettings(crossover_rate=0), rng) == parents).all()
+
+
+@pytest.mark.parametrize("kind", ["binary", "integer"])
+def test_the_mutation_rate_is_per_element(kind):
+    coding = make_coding(kind, 9)
+    rng = np.random.default_rng(0)
+    parents = coding.random(5000, rng)
+    parents.flags.writeable = False
+    children = mutate(parents, 0.2, coding, rng)
+    assert children.dtype == parents.dtype
+    genes = (children != parents).reshape(-1, coding.width).sum(axis=1)
+    assert genes.max() == 1
+    assert abs((genes > 0).mean() - 0.2) < 5 * np.sqrt(0.16 / genes.size)
+    assert (mutate(parents, 0.0, coding, rng) == parents).all()
+
+
+@pytest.mark.parametrize("count", [7, 8])
+def test_breeding_without_operators_is_cloning(count):
+    coding = make_coding("binary", 3)
+    parents = coding.random(8, np.random.default_rng(0))
+    settings = GaSettings(crossover_rate=0, mutation_rate=0)
+    assert (breed(parents, count, settings, coding, np.random.default_rng(0)) == parents[:count]).all()

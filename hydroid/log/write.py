@@ -1,12 +1,13 @@
 """`Log` -> CSV, in the columns and units from which the same settings read it back."""
 
 import csv
-import os
+import io
 from pathlib import Path
 
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.files import write_atomic
 from hydroid.log.channels import Channel, map_channels
 from hydroid.log.log import Floats, Log
 from hydroid.log.resample import hold
@@ -22,21 +23,17 @@ def write_log(path: Path, log: Log, settings: LogSettings) -> None:
 
     Raises:
         LogError: the settings map no column for a joint that is driven, or a column for an angle that was not
-            measured; or the file cannot be written.
+            measured.
+        RunError: the file cannot be written.
     """
     channels = map_channels(settings, np.full((log.joints, 2), np.inf))
     _check(path, log, channels)
     command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
     columns = [_cells(channel, log, command) for channel in channels]
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("w", encoding="utf-8", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerow([channel.name for channel in channels])
-            np.savetxt(file, np.stack(columns, axis=1), fmt=DIGITS, delimiter=",")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise LogError(f"cannot be written ({error.strerror})", where=str(path)) from None
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow([channel.name for channel in channels])
+    np.savetxt(text, np.stack(columns, axis=1), fmt=DIGITS, delimiter=",")
+    write_atomic(path, text.getvalue())
 
 
 def _check(path: Path, log: Log, channels: list[Channel]) -> None:

@@ -2,9 +2,9 @@
 
     python benchmarks/article_mech.py [--seeds 10] [--algorithms ga nsga2]
 
-The shoulder moves under pseudo-random commands in the study pose, the other joints are passive, all share D and S.
-Printed for every seed: the summed relative error of the search's estimate, as it comes, over all nine parameters
-(the article's number) and over the eight other than M1, which has no effect; then the same after the polish.
+The shoulder moves under pseudo-random commands in the study pose, the other joints are passive, all share D
+and S. Printed for every seed: the summed relative error of the search's estimate, as it comes, over all nine
+parameters (the number of the article) and over the eight other than M1, which has no effect; then polished.
 """
 
 import argparse
@@ -63,11 +63,8 @@ def main() -> None:
             assert result.polish is not None
             simulated = int(result.history[-1, 2]) + result.polish.evaluations
             none = ", ".join(names[result.without_effect])
-            print(
-                f"| {seed} | {searched.sum():.2f} | {searched[eight].sum():.2f} | {polished[eight].sum():.2g} "
-                f"| {none} | {simulated} | {seconds:.0f} |",
-                flush=True,
-            )
+            sums = f"{searched.sum():.2f} | {searched[eight].sum():.2f} | {polished[eight].sum():.2g}"
+            print(f"| {seed} | {sums} | {none} | {simulated} | {seconds:.0f} |", flush=True)
             rows.append(searched)
             worst = max(worst, float(polished[eight].sum()))
         print(f"worst after the polish: {worst:.2g}; median relative errors of the search's estimate:")

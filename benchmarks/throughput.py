@@ -1,12 +1,13 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench`).
 
-Population evaluation (70 members, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone on the
-same model and members, set up beforehand; `locked` against `passive`; the search's own share.
+A population (70 members, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
+on the same model and members, set up beforehand; `locked` against `passive`; the search's own share.
 """
 
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -72,16 +73,25 @@ def seconds(call: Callable[[], object]) -> float:
     return result if isinstance(result, float) else time.perf_counter() - started
 
 
-def evaluation_against_rollout(other_joints: str, theta: np.ndarray) -> float:
-    """Print evaluation and bare rollout, in turn; return the evaluation's median time [s]."""
-    problem, arm = make_problem(other_joints)
-    roll = bare_rollout(problem, arm, theta)
-    problem.evaluate(theta), roll()
-    pairs = [(seconds(lambda: problem.evaluate(theta)), seconds(roll)) for _ in range(REPEATS)]
-    ratio = statistics.median(bare / ours for ours, bare in pairs)
-    ours, bare = (statistics.median(column) for column in zip(*pairs, strict=True))
-    print(f"| {other_joints} | {ours:.3f} | {bare:.3f} | {ratio:.3f} | {MEMBERS / ours:.0f} |")
-    return ours
+def measure(theta: np.ndarray) -> None:
+    """Print evaluation against bare rollout, and locked against passive, each pair in turn."""
+    calls: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {}
+    for mode in ("passive", "locked"):
+        problem, arm = make_problem(mode)
+        calls[mode] = (partial(problem.evaluate, theta), bare_rollout(problem, arm, theta))
+    for pair in calls.values():  # warm up
+        _ = [call() for call in pair]
+    rounds = [
+        {mode: [seconds(call) for call in pair] for mode, pair in calls.items()} for _ in range(REPEATS)
+    ]
+    print("| other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s |")
+    print("| --- | --- | --- | --- | --- |")
+    for mode in calls:
+        ours, bare = (statistics.median(r[mode][k] for r in rounds) for k in (0, 1))
+        ratio = statistics.median(r[mode][1] / r[mode][0] for r in rounds)
+        print(f"| {mode} | {ours:.3f} | {bare:.3f} | {ratio:.3f} | {MEMBERS / ours:.0f} |")
+    gain = statistics.median(r["passive"][0] / r["locked"][0] for r in rounds)
+    print(f"locked against passive: {gain:.2f} times the throughput")
 
 
 def search_share(algorithm: str) -> float:
@@ -109,11 +119,8 @@ def main() -> None:
     rng = np.random.default_rng(0)
     problem, _ = make_problem("locked")
     theta = problem.parameters.from_unit(rng.random((MEMBERS, int(problem.parameters.free.sum()))))
-    print(f"{MEMBERS} members, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} pairs")
-    print("| other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s |")
-    print("| --- | --- | --- | --- | --- |")
-    times = {mode: evaluation_against_rollout(mode, theta) for mode in ("passive", "locked")}
-    print(f"locked against passive: {times['passive'] / times['locked']:.2f} times the throughput")
+    print(f"{MEMBERS} members, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} rounds")
+    measure(theta)
     for algorithm in ("ga", "nsga2"):
         print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
 

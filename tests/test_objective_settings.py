@@ -11,7 +11,7 @@ def read(**values):
 
 def test_the_defaults_are_the_articles():
     settings = read()
-    assert (settings.norm, settings.relative, settings.segments.turning_points) == ("inf", False, 8)
+    assert (settings.norm, settings.relative, settings.segments.equal) == ("inf", False, 8)
 
 
 @pytest.mark.parametrize("value", [1, 2, "inf", float("inf")])

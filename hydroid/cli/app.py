@@ -11,6 +11,9 @@ import typer
 
 from hydroid.cli import check, fit_mech, model, simulate, validate
 
+STOPPED = 130
+"""exit status of what Ctrl-C or a signal ended, as shells have it"""
+
 app = typer.Typer(
     name="hydroid",
     help="Find the physical parameters of a hydraulic manipulator from logs of commands and joint angles.",
@@ -58,12 +61,15 @@ def main() -> None:
     except HydroidError as error:
         code = _fail(str(error))
     except KeyboardInterrupt:
-        code = _stopped()
+        code = STOPPED
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
         code = 0
     except Exception as error:
         code = _usage(error)
+    if code == STOPPED:
+        message = "stopped; what was computed is kept, and the same command with --resume goes on"
+        typer.echo(f"hydroid: {message}", err=True)
     sys.exit(code or 0)
 
 
@@ -76,19 +82,10 @@ def _fail(message: str) -> int:
     return 2
 
 
-def _stopped() -> int:
-    typer.echo(
-        "hydroid: stopped; what was computed is kept, the same command with --resume goes on", err=True
-    )
-    return 130
-
-
 def _usage(error: Exception) -> int:
     """Show click's own errors (a missing argument, an unknown option) its way; let defects through."""
     show = getattr(error, "show", None)
     if show is None:
-        if type(error).__name__ == "Abort":
-            return _stopped()
         raise error
     show()
     return int(getattr(error, "exit_code", 2))

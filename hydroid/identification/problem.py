@@ -93,9 +93,10 @@ class Problem:
     def effects(self, theta: Array, step: float = 1e-4) -> Array:
         """Return how far each parameter moves the response: rms [rad] per 1 % of its value, shape (P,).
 
-        A fixed parameter counts too; NaN where the changed set diverges.
+        A value near 0 counts as a thousandth of the width of its bounds. NaN where the changed set diverges.
         """
-        moved = theta + np.diag(step * theta)
+        width = self.parameters.upper - self.parameters.lower
+        moved = theta + np.diag(step * np.maximum(np.abs(theta), 1e-3 * width))
         change = self.residuals(np.vstack([theta, moved]))
         rms = np.sqrt(np.mean((change[1:] - change[0]) ** 2, axis=1))
         return rms * 0.01 / step

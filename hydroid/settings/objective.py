@@ -47,4 +47,4 @@ class ObjectiveSettings(Settings):
     """p of the norm: 1, 2 or inf (the article's choice, table 5)."""
     relative: bool = False
     """Divide by the norm of the measured output of the same segment, equation (19)."""
-    segments: SegmentSettings = SegmentSettings(turning_points=8)
+    segments: SegmentSettings = SegmentSettings(equal=8)

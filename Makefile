@@ -19,6 +19,7 @@ test: setup
 	$(BIN)/pytest
 
 demo: setup  ## both algorithms on one log of the virtual rig, and the other log to judge them by
+	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."
 	rm -rf runs/demo
 	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm ga --out runs/demo/ga
 	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm nsga2 --out runs/demo/nsga2

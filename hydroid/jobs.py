@@ -115,7 +115,7 @@ def fit_logs(
 
 @dataclass(frozen=True)
 class Validation:
-    """One fit's response to one log: simulated outputs [rad], shape (T, K), and indices by joint (1-based)."""
+    """One fit's response to one log: outputs [rad], shape (T, K), and error indices by joint (1-based)."""
 
     fit: str
     log: Log

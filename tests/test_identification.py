@@ -69,7 +69,9 @@ def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path
     evaluation = problem.evaluate(theta)
     assert evaluation.overall[0] == 0
     assert (evaluation.overall[1:] > 0).all()
-    np.testing.assert_allclose(evaluation.segments.max(axis=1), evaluation.overall)  # p = inf: the worst segment
+    np.testing.assert_allclose(
+        evaluation.segments.max(axis=1), evaluation.overall
+    )  # p = inf: the worst segment
     chunked, *_ = load_settings("article-mech", SMALL | {"simulation.chunk_mib": 1})
     again = Problem(arm, chunked, [log]).evaluate(theta)
     np.testing.assert_array_equal(again.segments, evaluation.segments)
@@ -204,7 +206,10 @@ def test_the_fitted_model_answers_commands_in_percent(tmp_path):
     [
         ({"parameters.M1.link": "link9"}, "link9"),
         ({"parameters.K.joints": [8]}, "joints 1 to 7"),
-        ({"parameters.X": {"quantity": "gain", "joints": [2], "bounds": [0, 1]}}, "K and X both set the gain"),
+        (
+            {"parameters.X": {"quantity": "gain", "joints": [2], "bounds": [0, 1]}},
+            "K and X both set the gain",
+        ),
     ],
 )
 def test_parameters_that_do_not_fit_the_arm_are_refused(change, says):

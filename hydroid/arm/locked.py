@@ -68,7 +68,7 @@ class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 
     model: mujoco.MjModel
-    """one body a moving joint and no actuator: torques go to qfrc_applied [N·m]; contacts and auto-reset off"""
+    """one body a moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
     joints: tuple[str, ...]
     """the moving joints in the order of qpos and qvel"""
     parts: tuple[_Part, ...]
@@ -191,9 +191,7 @@ def _skeleton(
     disable = mujoco.mjtDisableBit
     # what the skeleton has not got costs a tenth of a step to look for; a diverged member must stay diverged
     idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
-    model.opt.disableflags = (
-        full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
-    )
+    model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
     chosen = [full.joint(name).id for name in joints]
     for prefix, fields in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
         for field in fields:

@@ -47,10 +47,7 @@ def run_fits(
             problem, fit = fit_logs(seeded, arm, logs, folder, progress, warn, resume=resume, repair=repair)
         results.append((seed, problem, fit))
         warn = _silent  # the logs are the same for every seed
-    if runs > 1:
-        table = write_runs(out, results)
-    else:
-        table = parameter_table(results[0][1], results[0][2])
+    table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])
     if json:
         found = [summary(problem, fit) | {"seed": seed} for seed, problem, fit in results]
         typer.echo(jsonlib.dumps({"out": str(out), "runs": found}))

@@ -19,7 +19,7 @@ def validate(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare fits with logs they were not fitted on: error indices as the article's table 9, and overlay plots."""
+    """Compare fits with logs they were not fitted on: error indices (article, table 9) and overlay plots."""
     from hydroid.jobs import validate_fits
     from hydroid.report.write import write_validation
 

@@ -78,7 +78,7 @@ class Problem:
         return Evaluation(segments, overall)
 
     def residuals(self, theta: Array) -> Array:
-        """Output errors epsilon = y - y_hat of (17) [rad], shape (n, R): channel after channel; NaN if diverged."""
+        """Output errors y - y_hat of (17) [rad], shape (n, R): channel after channel; NaN where diverged."""
         parts = [
             measured - simulated.transpose(0, 2, 1)
             for measured, simulated in zip(self._measured, self.responses(theta), strict=True)

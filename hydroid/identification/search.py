@@ -15,11 +15,11 @@ from hydroid.search.nsga2 import Nsga2
 from hydroid.settings.fit import SearchSettings
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
-"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or (19)
-over the whole record."""
+"""Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
+(19) over the whole record."""
 
 SAVE_EVERY = 5.0
-"""seconds between checkpoints: a lost one costs no more than that, and writing it is noise beside the search"""
+"""seconds between checkpoints: a lost one costs no more, and writing it is noise beside the search"""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class MechanicalStage:
         return ArmParameters(**values)
 
     def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
-        """Set the arm's MJCF to theta, shape (P,): masses with their inertias, dampers, springs, friction, gain.
+        """Set the arm's MJCF to theta, shape (P,): masses with inertias, dampers, springs, friction, gain.
 
         The motor of a joint then takes the command in %. Springs are slack at their `springref`, which a
         simulation sets to its start pose.

@@ -72,7 +72,7 @@ class FitSettings(Settings):
     stage: Literal["mech"] = "mech"
     arm: str = "hydrolek"
     """the arm's YAML: a shipped name, or a path (looked up beside this file first)"""
-    outputs: Annotated[list[Joint], Field(min_length=1)] = [2]
+    outputs: Annotated[tuple[Joint, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
     start_pose: str = "home"
     """the arm's pose in which joints without a measured angle stand"""

@@ -23,4 +23,4 @@ class SimulationSettings(Settings):
     chunk_mib: Annotated[int, Field(ge=1, le=512)] = 128
     """memory for one chunk of a population [MiB]"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
-    """low-pass of a prescribed motion [Hz]: its second derivative is a torque, and potentiometers are noisy"""
+    """low-pass of a prescribed motion [Hz]: its second derivative is a torque, and sensors are noisy"""

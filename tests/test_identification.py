@@ -153,7 +153,7 @@ def test_a_folder_of_another_run_is_refused_by_name(tmp_path):
     folder = RunFolder(tmp_path / "run")
     run(folder, settings, arm, log, path, Watcher())
     assert folder.settings()[0].parameters == settings.parameters
-    changed = settings.model_copy(update={"outputs": [3]})
+    changed = settings.model_copy(update={"outputs": (3,)})
     with pytest.raises(RunError, match="outputs"):
         folder.check(changed, [path])
     threads = settings.simulation.model_copy(update={"threads": 1})

@@ -38,20 +38,19 @@ def fit_page(
     """
     responses = [name for name in figures if name.startswith("response")]
     left_out = len(channels(problem)) - len(responses)
-    more = (
-        f" {left_out} further responses are not drawn; the table lists their errors." if left_out > 0 else ""
-    )
+    rest = "response is" if left_out == 1 else "responses are"
+    more = f" {left_out} further {rest} not drawn; the table lists all errors." if left_out > 0 else ""
     sections = (
         Section("What was fitted", facts=_facts(arm, identity, problem)),
         Section("The answer", tables=(tables["parameters"],), pictures=_pictures(figures, "estimates")),
         Section(
             "How well it fits",
-            "Judge a fit on a log that it has not seen as well: hydroid validate does that." + more,
+            "Judge a fit also on a log that it has not seen: the command hydroid validate does that." + more,
             tables=(tables["errors"],),
             pictures=tuple(Picture(figures[name], _RESPONSE) for name in responses),
         ),
         Section("How the search went", facts=_effort(fit), pictures=_pictures(figures, "learning")),
-        Section("The Pareto set", facts=(), pictures=_pictures(figures, "pareto")),
+        Section("The Pareto set", pictures=_pictures(figures, "pareto")),
         Section("What to beware of", points=cautions(problem, fit)),
     )
     versions = {

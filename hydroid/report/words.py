@@ -113,7 +113,7 @@ def _search_cautions(problem: Problem, fit: Fit) -> list[str]:
         )
     if fit.polish is not None:
         if not fit.polish.ending.converged:
-            said.append(f"The polish did not converge: {fit.polish.ending.value}.")
+            said.append(f"The polish ended early: {fit.polish.ending.value}.")
         if fit.best.overall > fit.searched.overall:
             minimised = _NORMS[problem.settings.objective.norm]
             said.append(

@@ -28,7 +28,7 @@ from hydroid.report.words import estimate_label, flags
 
 _BAR = 0.36
 _ROW = 0.44  # [in]
-_TEXT_AT = 1.24
+_TEXT_AT = 1.36
 
 
 @styled
@@ -77,8 +77,9 @@ def runs(
     rows = parameters.parameters
     drawing = figure(1.9 + _ROW * len(rows) + 0.25 * len(results))
     upper, lower = drawing.subplots(2, 1, height_ratios=(len(rows), 0.8 + 0.6 * len(results)))
-    count = max(map(len, results.values()), default=0)
-    _frame(upper, rows, f"Spread over {count} runs with different seeds")
+    *_, (final, final_runs) = results.items()
+    _frame(upper, rows, f"Spread over {len(final_runs)} runs with different seeds")
+    upper.text(_TEXT_AT, -0.7, final, fontsize=9, fontweight="bold", va="center")
     looks = dict(zip(results, ((SEARCH, "o"), (POLISHED, "D"), *OTHER_LOOKS), strict=False))
     for row, parameter in enumerate(rows):
         bounded = _bar(upper, row, parameter, dull=parameter.fixed is not None)
@@ -89,8 +90,7 @@ def runs(
                 _dots(upper, at, row + _lane(k, len(results)), *looks[name])
         if bounded:
             _true(upper, row, parameter, truth)
-        last = np.array([r.theta[row] for r in list(results.values())[-1]]) if results else np.empty(0)
-        _text(upper, row, *_median_and_range(parameter, last))
+        _text(upper, row, *_median_and_range(parameter, np.array([r.theta[row] for r in final_runs])))
     for k, (name, found) in enumerate(results.items()):
         _dots(lower, finite(np.degrees([r.rms for r in found])), float(k), *looks[name])
         upper.plot([], [], looks[name][1], color=looks[name][0], markeredgecolor="white", label=name)
@@ -103,7 +103,7 @@ def runs(
 def _frame(axes: Axes, parameters: Sequence[Parameter], title: str) -> None:
     """One row a parameter, from the top, with room for text at the right."""
     axes.set_title(title, x=0.0)
-    axes.set_xlim(-0.22, 1.95)
+    axes.set_xlim(-0.36, 2.15)
     axes.set_ylim(len(parameters) - 0.4, -0.9)
     axes.set_yticks(range(len(parameters)), [p.name for p in parameters])
     axes.tick_params(length=0, axis="both")
@@ -117,8 +117,8 @@ def _bar(axes: Axes, row: int, parameter: Parameter, *, dull: bool) -> bool:
     if not parameter.lower < parameter.upper:
         return False
     axes.barh(row, 1.0, height=_BAR, color="#F0F0F0" if dull else "#DCE9F3", zorder=1)
-    for x, bound, side in ((-0.035, parameter.lower, "right"), (1.035, parameter.upper, "left")):
-        axes.text(x, row, plain(bound), ha=side, va="center", fontsize=8, color="#555555")
+    for x, bound, side in ((-0.055, parameter.lower, "right"), (1.055, parameter.upper, "left")):
+        axes.text(x, row, plain(float(f"{bound:.4g}")), ha=side, va="center", fontsize=8, color="#555555")
     return True
 
 
@@ -165,8 +165,6 @@ def _lane(k: int, count: int) -> float:
 def _median_and_range(parameter: Parameter, values: Array) -> tuple[str, str]:
     if parameter.fixed is not None:
         return f"{number(parameter.fixed)} {parameter.unit}", "held fixed"
-    if not values.size:
-        return "", ""
     low, high = number(float(values.min())), number(float(values.max()))
     return f"median {number(float(np.median(values)))} {parameter.unit}", f"{low} to {high}"
 

@@ -36,7 +36,7 @@ def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm
 
 def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same members, written without hydroid's simulation."""
-    log, members = problem.logs[0], problem.stage.arm_parameters(theta)
+    log, members = problem.logs[0], problem.stage.members(theta).arm
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm.model, arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])

@@ -3,6 +3,7 @@
 The command line is a thin cover of these; a script or a notebook calls them directly.
 """
 
+import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,18 +14,22 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
+from hydroid.files import write_atomic
 from hydroid.identification.fit import Fit, Watcher, fit
 from hydroid.identification.folder import RunFolder
-from hydroid.identification.problem import Problem
-from hydroid.identification.stage import MechanicalStage
+from hydroid.identification.problem import Problem, make_simulation
+from hydroid.identification.stage import Stage
 from hydroid.identification.validation import ErrorIndices, error_indices
 from hydroid.log import Finding, Log, check_log, read_log, write_log
 from hydroid.parameters import Array
 from hydroid.report.write import write_report
 from hydroid.settings.arm import Arm, load_arm
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 from hydroid.settings.load import load, read_yaml
-from hydroid.simulation import ArmSimulation
+from hydroid.simulation import HydraulicSimulation
+
+TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool", "mm"), ("force", "N"))
+"""columns of a trace, a joint"""
 
 Warn = Callable[[Finding], None]
 
@@ -113,6 +118,24 @@ def fit_logs(
     return problem, result
 
 
+def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
+    """Return settings that hold stage 1's parameters at its estimate, for stage 2.
+
+    Args:
+        path: a run folder of stage 1, or a YAML file of values by name.
+        settings: stage 2's; names that it does not have, such as the gain, are left out.
+
+    Raises:
+        RunError, SettingsError: no values there, or one that stage 2 needs is missing.
+    """
+    values = RunFolder(path).estimate() if path.is_dir() else read_parameters(path)
+    wanted = [name for name, p in settings.parameters.items() if p.quantity in MECHANICAL_UNITS]
+    missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
+    if missing:
+        raise SettingsError(f"has no value for {', '.join(missing)}", where=str(path))
+    return {f"parameters.{name}.fixed": values[name] for name in wanted if name in values}
+
+
 @dataclass(frozen=True)
 class Validation:
     """One fit's response to one log: outputs [rad], shape (T, K), and error indices by joint (1-based)."""
@@ -184,6 +207,7 @@ def simulate_file(
     pose: str | None = None,
     noise_deg: float = 0.0,
     seed: int = 0,
+    trace: Path | None = None,
 ) -> None:
     """Simulate a CSV of commands and write a log.
 
@@ -198,7 +222,13 @@ def simulate_file(
         pose: a pose of the arm to start from.
         noise_deg: standard deviation of Gaussian noise on every angle [deg].
         seed: of the noise.
+        trace: a CSV of pressures, flows, spool and force of every actuator to write (stage 2).
+
+    Raises:
+        SettingsError: a trace is asked of stage 1.
     """
+    if trace is not None and settings.stage != "hyd":
+        raise SettingsError("stage mech has no pressures to trace", where=source, cure="set stage: hyd")
     ranges = np.stack([arm.lower, arm.upper], axis=1)
     log, findings = read_log(commands, settings.log, ranges, angles_required=False)
     for finding in findings:
@@ -209,6 +239,32 @@ def simulate_file(
     result = simulate_log(settings, arm, log, values, source)
     noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
     write_log(out, replace(result, angle=result.angle + noise), settings.log)
+    if trace is not None:
+        write_atomic(trace, _trace(settings, arm, log, values, source))
+
+
+def _trace(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str) -> str:
+    """CSV of what the driven joints' actuators do, in bar, L/min, mm and N (N·m of a rotary one)."""
+    stage = Stage(arm, settings)
+    theta = stage.parameters.vector(values, source)
+    outputs = [int(j) for j in np.flatnonzero(log.driven)]
+    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings)
+    assert isinstance(simulation, HydraulicSimulation)
+    seen = simulation.trace(stage.members(theta[None]))
+    names, columns = ["time_s"], [log.time]
+    for k, joint in enumerate(seen.joints):
+        names += [f"{what}{joint}_{unit}" for what, unit in TRACED]
+        columns += [
+            *(seen.pressure[:, k].T / 1e5),
+            *(seen.flow[:, k].T * 6e4),
+            seen.spool[:, k] * 1e3,
+            seen.force[:, k],
+        ]
+    text = io.StringIO()
+    np.savetxt(
+        text, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=",".join(names), comments=""
+    )
+    return text.getvalue()
 
 
 def respond(
@@ -220,11 +276,11 @@ def respond(
         SettingsError: a parameter that is missing or unknown.
         RunError: the simulation diverged.
     """
-    stage = MechanicalStage(arm, settings)
+    stage = Stage(arm, settings)
     theta = stage.parameters.vector(values, source)
     outputs = [j - 1 for j in joints]
-    simulation = ArmSimulation(load_model(arm.model, arm), arm, log, outputs, settings.simulation)
-    response = simulation.simulate(stage.arm_parameters(theta[None]))
+    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings)
+    response = simulation.simulate(stage.members(theta[None]))
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=source)
     return response.angle[0]

@@ -10,7 +10,7 @@ from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.identification.fit import fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Memo, Problem
-from hydroid.identification.stage import MechanicalStage
+from hydroid.identification.stage import Stage
 from hydroid.identification.validation import error_indices
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.log import write_log
@@ -215,14 +215,14 @@ def test_the_fitted_model_answers_commands_in_percent(tmp_path):
 def test_parameters_that_do_not_fit_the_arm_are_refused(change, says):
     settings, arm = load_settings("article-mech", change)
     with pytest.raises(SettingsError, match=says):
-        MechanicalStage(arm, settings)
+        Stage(arm, settings)
 
 
 def test_all_parameters_fixed_is_refused():
     changes = {f"parameters.{name}.fixed": value for name, value in TRUTH.items()}
     settings, arm = load_settings("article-mech", changes)
     with pytest.raises(HydroidError, match="free"):
-        MechanicalStage(arm, settings)
+        Stage(arm, settings)
 
 
 def test_a_fixed_parameter_stays_and_the_others_move(tmp_path):
@@ -239,8 +239,8 @@ def test_shared_and_own_parameters_of_joints():
         "parameters.K3": {"quantity": "gain", "joints": [3], "bounds": [0.1, 1.0]},
     }
     settings, arm = load_settings("article-mech", own)
-    stage = MechanicalStage(arm, settings)
-    values = stage.arm_parameters(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None])
+    stage = Stage(arm, settings)
+    values = stage.members(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None]).arm
     np.testing.assert_array_equal(values.gain[0], [0, 0.2, 0.7, 0, 0, 0, 0])
     assert values.mass[0].sum() == pytest.approx(45.0)
 

@@ -16,6 +16,7 @@ LAYERS = [
     {"identification"},
     {"report"},
     {"jobs"},
+    {"viewer"},
     {"cli"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(LAYERS) for room in rooms}

@@ -8,13 +8,22 @@ from conftest import members, step_log
 from scipy.integrate import solve_ivp
 
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation import ArmParameters, ArmSimulation
+from hydroid.simulation import ArmParameters, MechanicalSimulation, Members
+from hydroid.simulation.record import Record
 
 SHOULDER = [1]
 
 
-def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> ArmSimulation:
-    return ArmSimulation(spec, arm, log, list(outputs), SimulationSettings(**settings))
+class Simulation(MechanicalSimulation):
+    """With the arm's parameters alone."""
+
+    def simulate(self, parameters: ArmParameters):
+        return super().simulate(Members(parameters))
+
+
+def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
+    chosen = SimulationSettings(**settings)
+    return Simulation(Record(spec, arm, log, list(outputs), chosen), chosen)
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
@@ -127,8 +136,8 @@ def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other
 
 def test_memory_for_a_chunk_is_bounded(spec, arm, study_log):
     small = simulation(spec, arm, study_log, other_joints="passive", chunk_mib=1)
-    assert small.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
-    assert simulation(spec, arm, study_log, other_joints="passive").chunk > small.chunk
+    assert small.record.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
+    assert simulation(spec, arm, study_log, other_joints="passive").record.chunk > small.record.chunk
 
 
 def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, study_log, capfd, tmp_path, monkeypatch):

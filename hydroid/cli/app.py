@@ -9,7 +9,7 @@ from types import FrameType
 
 import typer
 
-from hydroid.cli import check, fit_mech, model, simulate, validate
+from hydroid.cli import check, fit, model, simulate, validate
 
 STOPPED = 130
 """exit status of what Ctrl-C or a signal ended, as shells have it"""
@@ -22,7 +22,8 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: importing rich would triple the time it takes
     pretty_exceptions_enable=False,
 )
-app.command("fit-mech")(fit_mech.fit_mech)
+app.command("fit-mech")(fit.fit_mech)
+app.command("fit-hyd")(fit.fit_hyd)
 app.command("validate")(validate.validate)
 app.command("simulate")(simulate.simulate)
 app.command("check")(check.check)

@@ -13,11 +13,11 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.identification.fit import Fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Problem
-from hydroid.jobs import Warn, fit_logs, load_settings
+from hydroid.jobs import Warn, fit_logs, load_settings, mechanical_values
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 
 
 def run_fits(
@@ -37,7 +37,7 @@ def run_fits(
     settings, arm = load_settings(config, changes)
     if not logs:
         logs, settings, arm = _continued(out, changes, resume, runs)
-    out = out or Path("runs") / f"{logs[0].stem}-{settings.search.algorithm}"
+    out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.algorithm}"
     results: list[tuple[int, Problem, Fit]] = []
     for seed in range(settings.search.seed, settings.search.seed + runs):
         search = settings.search.model_copy(update={"seed": seed})
@@ -54,6 +54,18 @@ def run_fits(
     elif not quiet:
         table.show()
         typer.echo(f"{out / ('tables' if runs > 1 else 'report.html')}")
+
+
+def with_mechanical(mech: Path | None, config: str, changes: dict[str, Any]) -> dict[str, Any]:
+    """Add what holds stage 1's parameters at its estimate; `--set` still has the last word."""
+    settings, _ = load_settings(config, changes)
+    if mech is not None:
+        return mechanical_values(mech, settings) | changes
+    open_ = [n for n, p in settings.parameters.items() if p.quantity in MECHANICAL_UNITS and p.fixed is None]
+    if open_:
+        cure = "give --mech RUN, or fix them in the config"
+        raise SettingsError(f"stage 2 needs stage 1's {', '.join(open_)}", cure=cure)
+    return changes
 
 
 def summary(problem: Problem, fit: Fit) -> dict[str, Any]:

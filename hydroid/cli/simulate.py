@@ -26,6 +26,10 @@ def simulate(
         float, typer.Option(min=0, max=90, help="Gaussian noise added to the angles.")
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    trace: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Write pressures, flows, spool and force too (stage hyd)."),
+    ] = None,
     setting: Set = None,
     quiet: Quiet = False,
 ) -> None:
@@ -37,7 +41,17 @@ def simulate(
     settings, arm = load_settings(chosen, overrides(setting))
     values = read_parameters(params)
     simulate_file(
-        settings, arm, commands, values, str(params), out, warn, pose=pose, noise_deg=noise_deg, seed=seed
+        settings,
+        arm,
+        commands,
+        values,
+        str(params),
+        out,
+        warn,
+        pose=pose,
+        noise_deg=noise_deg,
+        seed=seed,
+        trace=trace,
     )
     if not quiet:
         typer.echo(str(out))

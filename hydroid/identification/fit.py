@@ -39,8 +39,8 @@ class Fit:
     """What a fit found.
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
-    objectives. history: shape (G, len(HISTORY)). effects: rms change of the response [rad] per 1 % of each
-    parameter, shape (P,).
+    objectives. polish: the last one. history: shape (G, len(HISTORY)). effects: rms change of the response
+    [rad] per 1 % of each parameter, shape (P,).
     """
 
     estimates: dict[str, Estimate]
@@ -115,6 +115,12 @@ def fit(
         theta_polished = problem.parameters.from_unit(polished.point[None])
         estimates |= _estimates(problem, {"polished": theta_polished[0]})
         final = "polished"
+        if settings.refine:
+            freed = problem.freed()
+            polished = _polish(freed, estimates[final], watch)
+            theta_refined = freed.parameters.from_unit(polished.point[None])
+            estimates |= _estimates(freed, {"refined": theta_refined[0]})
+            final = "refined"
     return Fit(
         estimates,
         final,

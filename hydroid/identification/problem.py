@@ -7,18 +7,20 @@ cluster may stand; the search knows only its arrays.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.arm.model import load_model
-from hydroid.identification.stage import MechanicalStage
+from hydroid.identification.stage import Stage
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
 from hydroid.objective.segments import segment_bounds, segment_objectives
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import ArmSimulation
+from hydroid.simulation import HydraulicSimulation, MechanicalSimulation
+from hydroid.simulation.record import Record
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,13 @@ class Problem:
     """
 
     def __init__(self, arm: Arm, settings: FitSettings, logs: Sequence[Log]) -> None:
+        self._arm = arm
         spec = load_model(arm.model, arm)
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
-        self.stage = MechanicalStage(arm, settings)
+        self.stage = Stage(arm, settings)
         self.parameters = self.stage.parameters
-        self._simulations = [ArmSimulation(spec, arm, log, outputs, settings.simulation) for log in logs]
+        self._simulations = [make_simulation(spec, arm, log, outputs, settings) for log in logs]
         self._measured = [log.angle[:, outputs].T for log in logs]  # (K, T) a log
         # one channel a log and output, one after the other: errors of several logs are one long row
         channels = [
@@ -65,6 +68,15 @@ class Problem:
                 for (log, angle), start in zip(channels, starts[:-1], strict=True)
             ]
         )
+
+    def freed(self) -> "Problem":
+        """Return the same problem with every parameter free that has bounds, those held fixed included."""
+        free = {
+            name: p if p.bounds is None else p.model_copy(update={"fixed": None})
+            for name, p in self.settings.parameters.items()
+        }
+        settings = self.settings.model_copy(update={"parameters": free})
+        return Problem(self._arm, settings, self.logs)
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
@@ -87,7 +99,7 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Array]:
         """Simulated outputs [rad], one array of shape (n, T, K) a log."""
-        members = self.stage.arm_parameters(theta)
+        members = self.stage.members(theta)
         return [simulation.simulate(members).angle for simulation in self._simulations]
 
     def effects(self, theta: Array, step: float = 1e-4) -> Array:
@@ -102,8 +114,18 @@ class Problem:
         return rms * 0.01 / step
 
     def _chunks(self, n: int) -> Iterator[slice]:
-        size = min(simulation.chunk for simulation in self._simulations)
+        size = min(simulation.record.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
+
+
+def make_simulation(
+    spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: FitSettings
+) -> MechanicalSimulation | HydraulicSimulation:
+    """Return what simulates one log in the settings' stage; outputs are 0-based joints."""
+    record = Record(spec, arm, log, outputs, settings.simulation)
+    if settings.stage == "mech":
+        return MechanicalSimulation(record, settings.simulation)
+    return HydraulicSimulation(record, arm, settings.hydraulics, settings.simulation)
 
 
 class Memo:

@@ -1,4 +1,4 @@
-"""Stage 1 of the article: which parameters are free, and where each enters the arm (section 3, (15))."""
+"""The two stages of the article: which parameters are free, and where each enters (section 3, (15), (16))."""
 
 from dataclasses import fields
 
@@ -6,16 +6,20 @@ import mujoco
 import numpy as np
 
 from hydroid.errors import SettingsError
+from hydroid.hydraulics.parameters import nominal_parameters
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings, ParameterSettings
-from hydroid.simulation import ArmParameters
+from hydroid.settings.hydraulics import HYDRAULIC_UNITS
+from hydroid.simulation import ArmParameters, Members
 
 
-class MechanicalStage:
-    """Gain, dampers, springs, dry friction and link masses; the hydraulics stand as the gain.
+class Stage:
+    """Spreads a parameter vector over joints, links and actuators.
 
-    What no parameter names is 0, a mass that no parameter names its nominal one.
+    Of the arm: gain, dampers, springs, dry friction, link masses. What no parameter names is 0, a mass that
+    none names its nominal one. Of the actuators (stage hyd): any quantity; what none names is as the settings
+    and the arm's file have it.
 
     Args:
         arm: the arm's settings.
@@ -26,21 +30,27 @@ class MechanicalStage:
     """
 
     def __init__(self, arm: Arm, settings: FitSettings) -> None:
-        self._arm = arm
+        self._arm, self._hydraulics = arm, settings.hydraulics if settings.stage == "hyd" else None
         self._slots = {name: _slots(arm, name, p) for name, p in settings.parameters.items()}
         self._quantities = {name: p.quantity for name, p in settings.parameters.items()}
         self._refuse_overlap()
         self.parameters = ParameterSet(tuple(_parameter(name, p) for name, p in settings.parameters.items()))
 
-    def arm_parameters(self, theta: Array) -> ArmParameters:
-        """Spread theta, shape (n, P), over joints and links."""
-        n = len(theta)
-        joints = len(self._arm.joint_names)
-        values = {f.name: np.zeros((n, joints)) for f in fields(ArmParameters)}
-        values["mass"] = np.tile(self._arm.masses, (n, 1))
+    def members(self, theta: Array) -> Members:
+        """Spread theta, shape (n, P), over joints, links and actuators."""
+        arm = {f.name: np.zeros((len(theta), len(self._arm.joint_names))) for f in fields(ArmParameters)}
+        arm["mass"] = np.tile(self._arm.masses, (len(theta), 1))
+        actuators = None
+        if self._hydraulics is not None:
+            joints = range(len(self._arm.joint_names))
+            actuators = nominal_parameters(self._arm, self._hydraulics, joints, len(theta))
         for column, (name, slots) in enumerate(self._slots.items()):
-            values[self._quantities[name]][:, slots] = theta[:, column, None]
-        return ArmParameters(**values)
+            quantity = self._quantities[name]
+            if quantity in arm:
+                arm[quantity][:, slots] = theta[:, column, None]
+            elif actuators is not None:
+                getattr(actuators, quantity)[:, slots] = theta[:, column, None] * HYDRAULIC_UNITS[quantity][1]
+        return Members(ArmParameters(**arm), actuators)
 
     def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
         """Set the arm's MJCF to theta, shape (P,): masses with inertias, dampers, springs, friction, gain.
@@ -48,7 +58,7 @@ class MechanicalStage:
         The motor of a joint then takes the command in %. Springs are slack at their `springref`, which a
         simulation sets to its start pose.
         """
-        values = self.arm_parameters(theta[None])
+        values = self.members(theta[None]).arm
         for name, mass, nominal in zip(self._arm.link_names, values.mass[0], self._arm.masses, strict=True):
             body = spec.body(name)
             body.fullinertia = np.asarray(body.fullinertia) * (
@@ -59,7 +69,8 @@ class MechanicalStage:
             joint, motor = spec.joint(name), spec.actuator(name)
             joint.damping[0], joint.stiffness[0] = values.damping[0, j], values.stiffness[0, j]
             joint.frictionloss = values.friction[0, j]
-            motor.gear[0] = values.gain[0, j]
+            if self._hydraulics is None:
+                motor.gear[0] = values.gain[0, j]
 
     def _refuse_overlap(self) -> None:
         taken: dict[tuple[str, int], str] = {}

@@ -25,6 +25,7 @@ _ESTIMATES = {
     "utopia": "closest to the best of every segment at once",
     "best": "lowest error over the whole record",
     "polished": "least squares from the best of the others",
+    "refined": "least squares over both stages' parameters from there",
 }
 
 
@@ -59,7 +60,8 @@ def flags(problem: Problem, fit: Fit) -> tuple[str, ...]:
 
 def _flag(problem: Problem, fit: Fit, i: int) -> str:
     parameter, value = problem.parameters.parameters[i], fit.best.theta[i]
-    if parameter.fixed is not None:
+    freed = fit.final == "refined" and parameter.lower < parameter.upper
+    if parameter.fixed is not None and not freed:
         return "held fixed"
     margin = AT_BOUND * (parameter.upper - parameter.lower)
     found: list[str] = []
@@ -126,5 +128,5 @@ def _search_cautions(problem: Problem, fit: Fit) -> list[str]:
 
 def summary(fit: Fit) -> str:
     """How well the final estimate does, in a sentence."""
-    name = "polished estimate" if fit.final == "polished" else "search's estimate"
+    name = f"{fit.final} estimate" if fit.final in ("polished", "refined") else "search's estimate"
     return f"The {name} leaves an rms error of {number(math.degrees(fit.best.rms))} deg on the fitted logs."

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
 from hydroid.settings.load import Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.objective import ObjectiveSettings
@@ -21,10 +22,15 @@ MECHANICAL_UNITS = {
 Joint = Annotated[int, Field(ge=1)]
 
 
+UNITS = MECHANICAL_UNITS | {name: unit for name, (unit, _) in HYDRAULIC_UNITS.items()}
+"""Quantities that a parameter can be, with their units."""
+
+
 class ParameterSettings(Settings):
     """One parameter: what it is in the model, where it acts, its bounds, or the value it is held at."""
 
-    quantity: Literal["gain", "damping", "stiffness", "friction", "mass"]
+    quantity: str
+    """gain, damping, stiffness, friction or mass; in stage 2 any quantity of the hydraulics"""
     joints: list[Joint] | None = None
     """joints that share it; left out: all"""
     link: str | None = None
@@ -34,6 +40,8 @@ class ParameterSettings(Settings):
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
+        if self.quantity not in UNITS:
+            raise ValueError(f"no quantity {self.quantity!r}; there are {', '.join(UNITS)}")
         if (self.quantity == "mass") != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
         if self.link is not None and self.joints is not None:
@@ -52,7 +60,7 @@ class ParameterSettings(Settings):
     @property
     def unit(self) -> str:
         """The unit of the quantity."""
-        return MECHANICAL_UNITS[self.quantity]
+        return UNITS[self.quantity]
 
 
 class SearchSettings(Settings):
@@ -69,7 +77,8 @@ class SearchSettings(Settings):
 class FitSettings(Settings):
     """All that a fit needs besides its logs."""
 
-    stage: Literal["mech"] = "mech"
+    stage: Literal["mech", "hyd"] = "mech"
+    """mech: the hydraulics are a gain; hyd: the whole chain from command to torque"""
     arm: str = "hydrolek"
     """the arm's YAML: a shipped name, or a path (looked up beside this file first)"""
     outputs: Annotated[tuple[Joint, ...], Field(min_length=1)] = (2,)
@@ -77,12 +86,15 @@ class FitSettings(Settings):
     start_pose: str = "home"
     """the arm's pose in which joints without a measured angle stand"""
     parameters: dict[str, ParameterSettings]
+    hydraulics: HydraulicSettings = HydraulicSettings()
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()
     search: SearchSettings = SearchSettings()
     polish: PolishSettings | None = PolishSettings()
     """null: none, as in the article"""
+    refine: bool = False
+    """then polish all parameters that have bounds together, those held fixed included"""
 
     @model_validator(mode="before")
     @classmethod
@@ -91,3 +103,13 @@ class FitSettings(Settings):
         if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
             raise ValueError("parameter names must be plain words such as K or M1")
         return values
+
+    @model_validator(mode="after")
+    def _of_the_stage(self) -> "FitSettings":
+        for name, parameter in self.parameters.items():
+            hydraulic = parameter.quantity in HYDRAULIC_UNITS
+            if self.stage == "mech" and hydraulic:
+                raise ValueError(f"{name}: stage mech has no {parameter.quantity}; set stage: hyd")
+            if self.stage == "hyd" and parameter.quantity == "gain":
+                raise ValueError(f"{name}: stage hyd has no gain; the hydraulics take its place")
+        return self

@@ -1,8 +1,8 @@
 """The hydraulics of an arm, from command to chamber pressure, in the units of a drawing or data sheet.
 
 The ten numbers that the article calls true stand here and in the arm's file (areas). All others are ours:
-plausible sizes, not measurements of a HydroLek. Each holds for every actuator of the arm; a parameter of a fit sets or
-frees it joint by joint.
+plausible sizes, not measurements of a HydroLek. Each holds for every actuator of the arm; a parameter of a
+fit sets or frees it joint by joint.
 """
 
 from typing import Annotated
@@ -55,7 +55,7 @@ HYDRAULIC_UNITS: dict[str, tuple[str, float]] = {
 
 
 class HydraulicSettings(Settings):
-    """All numbers of the actuator chain but the areas and valve openings, which the arm's file has joint by joint."""
+    """All numbers of the actuator chain but areas and openings, which the arm's file has joint by joint."""
 
     onset_a: float = 1.4
     """A of equation (2) [V], article"""
@@ -125,5 +125,5 @@ class HydraulicSettings(Settings):
     """transport delay of the command [s]"""
     start_pressure: Positive = 50.0
     """level of the rod side's pressure at the start, which static balance leaves open [bar]"""
-    substeps: Annotated[int, Field(ge=1, le=100)] = 5
+    substeps: Annotated[int, Field(ge=1, le=100)] = 3
     """sub-steps of valves and oil in one MuJoCo step"""

@@ -1,6 +1,7 @@
 """Populations of arms in, angles out: the only room that steps MuJoCo."""
 
-from hydroid.simulation.mechanical import ArmSimulation
-from hydroid.simulation.population import ArmParameters, Response
+from hydroid.simulation.hydraulic import HydraulicSimulation
+from hydroid.simulation.mechanical import MechanicalSimulation
+from hydroid.simulation.population import ArmParameters, Members, Response
 
-__all__ = ["ArmParameters", "ArmSimulation", "Response"]
+__all__ = ["ArmParameters", "HydraulicSimulation", "MechanicalSimulation", "Members", "Response"]

@@ -4,7 +4,7 @@ Every member starts at rest in the log's first pose, in static balance with grav
 slack there, and a constant torque tau0 = g(q0), computed anew for every member, holds it.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 
@@ -14,6 +14,7 @@ from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
+from hydroid.hydraulics.parameters import ActuatorParameters
 from hydroid.simulation.prescribed import Prescribed
 
 Array = NDArray[np.float64]
@@ -36,8 +37,22 @@ class ArmParameters:
     def __len__(self) -> int:
         return len(self.mass)
 
-    def __getitem__(self, rows: slice) -> "ArmParameters":
+    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "ArmParameters":
         return ArmParameters(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class Members:
+    """A population: its arms, and in stage 2 their actuators, (n, J) for all joints of the arm."""
+
+    arm: ArmParameters
+    actuators: ActuatorParameters | None = None
+
+    def __len__(self) -> int:
+        return len(self.arm)
+
+    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Members":
+        return Members(self.arm[rows], None if self.actuators is None else self.actuators[rows])
 
 
 @dataclass(frozen=True)
@@ -49,6 +64,12 @@ class Response:
 
     angle: Array
     feasible: NDArray[np.bool_]
+
+
+def in_chunks(simulate: Callable[[Members], Response], members: Members, size: int) -> Response:
+    """Simulate members `size` at a time: memory for the steps does not grow with their number."""
+    parts = [simulate(members[i : i + size]) for i in range(0, len(members), size)]
+    return Response(np.concatenate([p.angle for p in parts]), np.concatenate([p.feasible for p in parts]))
 
 
 @contextmanager
@@ -72,25 +93,26 @@ class Population:
         arm: the arm with the joints that do not move left out.
         size: members of one call.
         threads: threads that step them; 0 is one a core. Results do not depend on it.
+        prescribed: joints that follow a log; they keep no damper and spring of their own.
+
+    Attributes, live arrays over the members:
+        position [rad], velocity [rad/s], applied torque [N·m], damping [N·m·s/rad], armature [kg·m²]:
+            shape (size, V).
+        mass_matrix: MuJoCo's sparse M of the last call, shape (size, nC).
     """
 
-    def __init__(self, arm: LockedArm, size: int, threads: int) -> None:
-        self.arm, self.size = arm, size
-        self._prescribed: Prescribed | None = None
+    def __init__(self, arm: LockedArm, size: int, threads: int, prescribed: Prescribed | None = None) -> None:
+        self.arm, self.size, self._prescribed = arm, size, prescribed
         self._batch = Batch(arm.model, nsim=size, nthread=threads)
-        expand = self._batch.expand
+        expand, bind = self._batch.expand, self._batch.bind
+        self._failed = np.zeros(size, dtype=bool)
         self._mass, self._inertia = expand("body_mass"), expand("body_inertia")
         self._centre, self._axes = expand("body_ipos"), expand("body_iquat")
-        self._damping, self._stiffness = expand("dof_damping"), expand("jnt_stiffness")
-        self._friction = expand("dof_frictionloss")
-        self._applied = self._batch.bind("qfrc_applied")
-        self._position = self._batch.bind("qpos")
+        self._stiffness, self._friction = expand("jnt_stiffness"), expand("dof_frictionloss")
+        self.damping, self.armature = expand("dof_damping"), expand("dof_armature")
         # bound before the first call: a derived field bound between calls reads zero
-        self._bias = self._batch.bind("qfrc_bias")
-
-    def follow(self, prescribed: Prescribed) -> None:
-        """Let some joints follow a log; they keep no damper and spring of their own."""
-        self._prescribed = prescribed
+        self._bias, self.mass_matrix = bind("qfrc_bias"), bind("M")
+        self.position, self.velocity, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
 
     def start(self, parameters: ArmParameters, joints: NDArray[np.intp], pose: Array) -> Array:
         """Put the members into `pose` at rest and return what holds them there.
@@ -108,41 +130,52 @@ class Population:
         inertials = self.arm.inertials(parameters.mass)
         self._mass[:n], self._inertia[:n] = inertials.mass, inertials.inertia
         self._centre[:n], self._axes[:n] = inertials.ipos, inertials.iquat
-        self._damping[:n] = parameters.damping[:, joints]
+        self.damping[:n] = parameters.damping[:, joints]
         self._stiffness[:n] = parameters.stiffness[:, joints]
         self._friction[:n] = parameters.friction[:, joints]
         if self._prescribed is not None:
             columns = self._prescribed.columns
-            self._damping[:n, columns] = self._prescribed.damping
+            self.damping[:n, columns] = self._prescribed.damping
             self._stiffness[:n, columns] = self._prescribed.stiffness
             self._friction[:n, columns] = 0.0
         with quiet_mujoco():
             self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
             self._batch.set_const(ids)
-            self._position[:n] = pose
-            self._applied[:n] = 0.0
+            self.position[:n] = pose
+            self.applied[:n] = 0.0
             self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        self._batch.warning[:n] = 0
+        self._batch.warning[:n], self._failed[:n] = 0, False
         return self._bias[:n].copy()
 
+    def step(self) -> None:
+        """Step every member once, as it stands; call it within `quiet_mujoco`."""
+        try:
+            self._batch.step()
+        except SimulationError as error:
+            self._failed[error.ids] = True
+
+    @property
+    def healthy(self) -> NDArray[np.bool_]:
+        """Members that are finite and drew no warning of MuJoCo's since their start, shape (size,)."""
+        finite = np.isfinite(self.position).all(axis=1) & np.isfinite(self.velocity).all(axis=1)
+        return finite & ~self._failed & ~self._batch.warning[:, :, 1].any(axis=1)
+
     def roll(self, torque: Array, out: Array) -> NDArray[np.bool_]:
-        """Step the members under the given joint torques.
+        """Step members from their start under the given joint torques.
 
         Args:
             torque: applied at each step [N·m], shape (n, steps, V), C-contiguous.
             out: receives the angles after each step [rad], shape (n, steps, V).
 
         Returns:
-            Which members stayed finite and without a warning of MuJoCo's, shape (n,).
+            Which members stayed healthy, shape (n,).
         """
         n, steps, _ = torque.shape
         spec = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
-        failed = np.zeros(n, dtype=bool)
         with quiet_mujoco():
             try:
                 self._batch.rollout(steps, torque, spec, ("qpos",), np.arange(n), {"qpos": out})
             except SimulationError as error:
-                failed[error.ids] = True
+                self._failed[error.ids] = True
         # a member whose warnings rose stopped there; what it recorded after that is no simulation
-        failed |= self._batch.warning[:n, :, 1].any(axis=1)
-        return ~failed & np.isfinite(out[:, -1]).all(axis=-1)
+        return self.healthy[:n] & np.isfinite(out[:, -1]).all(axis=-1)

@@ -82,7 +82,7 @@ def runs(
     upper.text(_TEXT_AT, -0.7, final, fontsize=9, fontweight="bold", va="center")
     looks = dict(zip(results, ((SEARCH, "o"), (POLISHED, "D"), *OTHER_LOOKS), strict=False))
     for row, parameter in enumerate(rows):
-        bounded = _bar(upper, row, parameter, dull=parameter.fixed is not None)
+        bounded = _bar(upper, row, parameter, dull=parameter.lower == parameter.upper)
         for k, (name, found) in enumerate(results.items()):
             values = np.array([r.theta[row] for r in found])
             if bounded:
@@ -163,7 +163,7 @@ def _lane(k: int, count: int) -> float:
 
 
 def _median_and_range(parameter: Parameter, values: Array) -> tuple[str, str]:
-    if parameter.fixed is not None:
+    if parameter.fixed is not None and not np.ptp(values):
         return f"{number(parameter.fixed)} {parameter.unit}", "held fixed"
     low, high = number(float(values.min())), number(float(values.max()))
     return f"median {number(float(np.median(values)))} {parameter.unit}", f"{low} to {high}"

@@ -1,0 +1,76 @@
+"""How exact and how stable the hydraulics are over the whole search space (takes minutes).
+
+1. One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25
+   to 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
+2. The seven-joint arm, all joints driven at once, every actuator with its own random set: 1,000 members.
+
+    python benchmarks/hydraulic_accuracy.py [SETS] [MEMBERS]
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from hydraulic_arm import DrivenArm, scatter
+from hydraulic_reference import draw, parameters, pulses, reference, simulate
+
+from hydroid.hydraulics.parameters import nominal_parameters
+from hydroid.settings.arm import load_arm
+from hydroid.settings.hydraulics import HydraulicSettings
+
+STEPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (2, 4), (4, 4)]
+
+
+def accuracy(sets: int) -> None:
+    rng = np.random.default_rng(1)
+    command = pulses(rng, 3000)
+    members = parameters(HydraulicSettings(), **draw(rng, sets))
+    began = time.perf_counter()
+    exact, pressure = zip(*(reference(members[i : i + 1], command) for i in range(sets)), strict=True)
+    took = time.perf_counter() - began
+    angle, bar = np.degrees(exact), 1e-5 * np.array(pressure)
+    print(
+        f"{sets} sets, 30 s, joint from {angle.min():.0f} to {angle.max():.0f} deg; Radau took {took:.0f} s"
+    )
+    print("MuJoCo steps | sub-steps | median rms | worst rms | median max | worst max [deg] | p rms [bar]")
+    for steps, substeps in STEPS:
+        seen: list = []
+        out = simulate(members, command, HydraulicSettings(substeps=substeps), steps, seen)
+        error = np.degrees(out) - angle
+        rms, worst = np.sqrt((error**2).mean(axis=1)), abs(error).max(axis=1)
+        p = 1e-5 * np.stack([o.pressure[:, 0] for o, _ in seen], axis=1)
+        p_rms = np.median(np.sqrt(((p - bar[:, 1:]) ** 2).mean(axis=(1, 2))))
+        row = np.median(rms), rms.max(), np.median(worst), worst.max(), p_rms
+        print(f"{steps:12d} | {substeps:9d} | " + " | ".join(f"{value:10.4f}" for value in row))
+
+
+def stability(members: int) -> None:
+    arm, settings, rng = load_arm("hydrolek"), HydraulicSettings(), np.random.default_rng(2)
+    joints = list(range(7))
+    command = np.stack([pulses(rng, 3000) for _ in joints], axis=1)
+    command[-200:] = 0.0
+    failed, fastest, last = 0, np.zeros(7), np.zeros(7)
+    for first in range(0, members, 100):
+        count = min(100, members - first)
+        driven = DrivenArm(
+            arm,
+            scatter(nominal_parameters(arm, settings, joints, count), rng),
+            joints,
+            settings,
+            threads=2,
+        )
+        speed = abs(np.diff(driven.run(command), axis=1)) / 0.01
+        failed += int((driven.failed | ~np.isfinite(speed).all(axis=(1, 2))).sum())
+        fastest = np.maximum(fastest, np.nanmax(speed, axis=(0, 1)))
+        last = np.maximum(last, np.nanmax(speed[:, -50:], axis=(0, 1)))
+    print(f"{members} members, seven joints driven, 30 s: {failed} failed")
+    print(f"fastest [rad/s] {fastest.round(2)}, after 1.5 s of rest {last.round(3)}")
+
+
+if __name__ == "__main__":
+    accuracy(int(sys.argv[1]) if len(sys.argv) > 1 else 24)
+    stability(int(sys.argv[2]) if len(sys.argv) > 2 else 1000)

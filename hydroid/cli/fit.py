@@ -1,0 +1,125 @@
+"""`hydroid fit-mech` and `hydroid fit-hyd`: the two stages of a fit."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from hydroid.cli.options import Config, Json, Quiet, Repair, Set, overrides, warn
+
+Logs = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="LOG.csv...", help="Logs to fit together; with --resume, the run's own if left out."
+    ),
+]
+Algorithm = Annotated[str | None, typer.Option(help="ga (simple) or nsga2 (multi-objective).")]
+Seed = Annotated[int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")]
+Runs = Annotated[int, typer.Option(min=1, max=10_000, help="Repeat over this many seeds, from --seed on.")]
+Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run in --out, or begin it.")]
+Polish = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
+Workers = Annotated[int | None, typer.Option(min=0, max=1024, help="Threads; 0: one a core.")]
+
+
+def fit_mech(
+    logs: Logs = None,
+    config: Config = "fit-mech",
+    algorithm: Algorithm = None,
+    seed: Seed = None,
+    runs: Runs = 1,
+    out: Out = None,
+    resume: Resume = False,
+    polish: Polish = None,
+    workers: Workers = None,
+    setting: Set = None,
+    repair: Repair = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate gain, damping, stiffness and link masses from logs (stage 1).
+
+    Writes a run folder: parameter tables, figures, report.html, estimate.yaml, the fitted MJCF, history,
+    checkpoint. Tell what the estimate is worth with `hydroid validate` on a log it was not fitted on.
+    """
+    changes = _changes(setting, algorithm, seed, workers, polish)
+    from hydroid.cli.running import run_fits
+
+    run_fits(
+        logs or [],
+        config,
+        changes,
+        out,
+        runs,
+        resume=resume,
+        repair=repair,
+        json=json,
+        quiet=quiet,
+        warn=warn,
+    )
+
+
+def fit_hyd(
+    logs: Logs = None,
+    mech: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN|YAML", help="Stage 1: its run folder, or a YAML of its values."),
+    ] = None,
+    config: Config = "fit-hyd",
+    algorithm: Algorithm = None,
+    seed: Seed = None,
+    runs: Runs = 1,
+    out: Out = None,
+    resume: Resume = False,
+    polish: Polish = None,
+    refine: Annotated[bool | None, typer.Option(help="Then polish both stages' parameters together.")] = None,
+    workers: Workers = None,
+    setting: Set = None,
+    repair: Repair = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate the hydraulic actuator with the arm fixed at stage 1's estimate (stage 2).
+
+    Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as
+    fit-mech does.
+    """
+    changes = _changes(setting, algorithm, seed, workers, polish)
+    if refine is not None:
+        changes["refine"] = refine
+    from hydroid.cli.running import run_fits, with_mechanical
+
+    if logs:
+        changes = with_mechanical(mech, config, changes)
+    run_fits(
+        logs or [],
+        config,
+        changes,
+        out,
+        runs,
+        resume=resume,
+        repair=repair,
+        json=json,
+        quiet=quiet,
+        warn=warn,
+    )
+
+
+def _changes(
+    setting: list[str] | None,
+    algorithm: str | None,
+    seed: int | None,
+    workers: int | None,
+    polish: bool | None,
+) -> dict[str, Any]:
+    """The settings that flags replace."""
+    changes = overrides(setting)
+    flags: dict[str, Any] = {
+        "search.algorithm": algorithm,
+        "search.seed": seed,
+        "simulation.threads": workers,
+    }
+    changes |= {key: value for key, value in flags.items() if value is not None}
+    if polish is False:
+        changes["polish"] = None
+    return changes

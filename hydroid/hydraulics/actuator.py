@@ -1,0 +1,229 @@
+"""The actuator plugin: the whole chain of every joint of a population, stepped beside MuJoCo.
+
+    state = actuator.start(angle, torque)
+    repeat: torque, armature = actuator.advance(state, command, angle, velocity, mass)
+            MuJoCo takes one step with qfrc_applied = torque and dof_armature = armature (plus the arm's own)
+            angle = actuator.close(state, velocity, mass), and MuJoCo's qpos becomes this angle
+
+J is the number of moving joints, n that of members. `mass` is MuJoCo's sparse mass matrix `M` as bound by
+`mujoco.batch`, (n, nC), as its last call left it; `entries`, (J, J), says where M[i, j] stands in such a row.
+All joints that move belong in, also those without hydraulics (kind NONE): their inertia couples. Viscous
+damping is the plugin's: MuJoCo's dof_damping must be 0, and its dof_armature the arm's own before `start`.
+How it works and why it is stable: `hydroid.hydraulics.kernel`.
+"""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hydroid.hydraulics import kernel
+from hydroid.hydraulics.balance import holding_pressures
+from hydroid.hydraulics.cylinder import oil_pressure, triangle, volume
+from hydroid.hydraulics.parameters import LINEAR, NONE, ActuatorParameters, Array, Linkages
+from hydroid.hydraulics.records import COEFFICIENTS, JOINT, WORK, coefficients
+from hydroid.hydraulics.solenoid import resting_stroke
+from hydroid.settings.hydraulics import HydraulicSettings
+
+
+@dataclass
+class ActuatorState:
+    """Plungers, oil and recent commands of a population; `advance` and `close` change it in place."""
+
+    joints: NDArray[np.void]
+    """shape (n, J), of JOINT"""
+    commands: Array
+    """ring of recent commands [%], shape (H, J)"""
+    steps: int = 0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What can be measured on an actuator; flows are means over the last step. Joints without one have zeros.
+
+    pressure [Pa], shape (n, J, 2): chambers A and B. flow [m³/s], shape (n, J, 2): into A and out of B.
+    spool [m], shape (n, J). force [N], shape (n, J): A_A p_A − A_B p_B; of a rotary actuator a torque [N·m].
+    """
+
+    pressure: Array
+    flow: Array
+    spool: Array
+    force: Array
+
+
+class Actuator:
+    """All actuators of a population on one model.
+
+    Args:
+        parameters: of n members; the coil of an infeasible one has no force, its spool never moves.
+        linkages: of the J joints.
+        damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
+        period: MuJoCo's step [s].
+        settings: sub-steps, plunger dynamics, start level.
+        entries: where M[i, j] stands in a row of `mass`, shape (J, J); by default rows are whole matrices.
+    """
+
+    def __init__(
+        self,
+        parameters: ActuatorParameters,
+        linkages: Linkages,
+        damping: ArrayLike,
+        period: float,
+        settings: HydraulicSettings,
+        entries: NDArray[np.intp] | None = None,
+    ) -> None:
+        shape = parameters.area_a.shape
+        self.shape, self.period, self._substeps = shape, period, settings.substeps
+        self._level = 1e5 * settings.start_pressure
+        self._damping = np.array(np.broadcast_to(damping, shape), float)
+        joints = shape[1]
+        self._entries = np.arange(joints**2).reshape(joints, joints) if entries is None else entries
+        self._coefficients = coefficients(parameters, linkages, settings)
+        self._work = np.zeros(joints, WORK)
+        self._history = 2 + int(np.ceil(parameters.delay.max() / period))
+
+    def start(self, angle: Array, torque: Array) -> ActuatorState:
+        """Return the state at rest in static balance, with the plungers' coils at I_min.
+
+        Args:
+            angle: [rad], shape (n, J).
+            torque: what the actuators must hold, g(q) [N·m], shape (n, J).
+        """
+        c = self._coefficients
+        pressure_a, pressure_b = holding_pressures(
+            torque / self._arm(angle),
+            c["area_a"],
+            c["area_b"],
+            c["supply_pressure"],
+            c["tank_pressure"],
+            self._level,
+        )
+        fill_a, fill_b = self._fills(angle)
+        z = np.zeros(self.shape, JOINT)
+        z["oil_a"] = pressure_a + c["bulk_modulus"] * fill_a
+        z["oil_b"] = pressure_b + c["bulk_modulus"] * fill_b
+        rest = resting_stroke(c["coil"] * c["current_min"] ** 2, c["gap"], c["plunger_stiffness"])
+        z["stroke_a"] = z["stroke_b"] = rest
+        z["hold"], z["external"] = torque, -torque
+        return ActuatorState(z, np.zeros((self._history, self.shape[1])))
+
+    def advance(
+        self, state: ActuatorState, command: ArrayLike, angle: Array, velocity: Array, mass: Array
+    ) -> tuple[Array, Array]:
+        """Look ahead over one step.
+
+        Args:
+            state: at the start of the step.
+            command: held during the step [%], shape (J,).
+            angle: [rad], shape (n, J).
+            velocity: [rad/s], shape (n, J).
+            mass: MuJoCo's `M` [kg·m²], shape (n, nC), with the armature of the step before.
+
+        Returns:
+            Torque [N·m], damping included, and armature [kg·m²] for MuJoCo's step, shape (n, J) each.
+        """
+        state.steps += 1
+        newest = state.steps % self._history
+        state.commands[newest] = command
+        torque, armature = np.empty(self.shape), np.empty(self.shape)
+        kernel.advance(
+            self._coefficients,
+            state.joints,
+            self._work,
+            state.commands,
+            newest,
+            np.ascontiguousarray(angle),
+            np.ascontiguousarray(velocity),
+            np.ascontiguousarray(mass),
+            self._entries,
+            self._damping,
+            self.period,
+            self._substeps,
+            torque,
+            armature,
+        )
+        return torque, armature
+
+    def close(self, state: ActuatorState, velocity: Array, mass: Array) -> Array:
+        """Take over what MuJoCo's step made of the look-ahead.
+
+        Args:
+            state: after `advance`.
+            velocity: MuJoCo's new velocity [rad/s], shape (n, J).
+            mass: MuJoCo's `M` [kg·m²], shape (n, nC), now that of the step.
+
+        Returns:
+            The new angle [rad], shape (n, J).
+        """
+        angle = np.empty(self.shape)
+        velocity, mass = np.ascontiguousarray(velocity), np.ascontiguousarray(mass)
+        kernel.close(state.joints, velocity, mass, self._entries, self.period, angle)
+        return angle
+
+    def observe(self, state: ActuatorState, angle: Array) -> Observation:
+        """Return pressures, flows, spool and force at `angle` [rad], shape (n, J)."""
+        c, z = self._coefficients, state.joints
+        driven = c["kind"] != NONE
+        fills = self._fills(angle)
+        pressure = [
+            np.where(driven, oil_pressure(oil, fill, c["bulk_modulus"], c["vapour_pressure"]), 0.0)
+            for oil, fill in zip((z["oil_a"], z["oil_b"]), fills, strict=True)
+        ]
+        force = c["area_a"] * pressure[0] - c["area_b"] * pressure[1]
+        flow = np.stack([z["flow_a"], -z["flow_b"]], axis=-1)
+        return Observation(np.stack(pressure, axis=-1), flow, z["stroke_a"] - z["stroke_b"], force)
+
+    def _arm(self, angle: Array) -> Array:
+        """Moment arm [m]; 1 for a rotary actuator."""
+        return np.where(self._coefficients["kind"] == LINEAR, self._triangle(angle)[1], 1.0)
+
+    def _fills(self, angle: Array) -> tuple[Array, Array]:
+        """Fill of chambers A and B, as `hydroid.hydraulics.cylinder` defines it."""
+        c = self._coefficients
+        travel = self._triangle(angle)[0]
+        linear = [
+            np.log(volume(x, c[area], c["dead_volume"]) / c["dead_volume"])
+            for x, area in ((travel, "area_a"), (c["stroke"] - travel, "area_b"))
+        ]
+        rotary = angle * c["area_a"] / c["dead_volume"], -angle * c["area_b"] / c["dead_volume"]
+        chosen = [np.where(c["kind"] == LINEAR, x, y) for x, y in zip(linear, rotary, strict=True)]
+        return chosen[0], chosen[1]
+
+    def _triangle(self, angle: Array) -> tuple[Array, Array, Array]:
+        c = self._coefficients
+        linear = c["kind"] == LINEAR
+        # joints without a triangle get a harmless one
+        a, b = np.where(linear, c["a"], 2.0), np.where(linear, c["b"], 1.0)
+        return triangle(angle, a, b, c["theta0"], c["shortest"])
+
+
+def compile_kernels(announce: Callable[[], object]) -> None:
+    """Make the compiled loops ready; call `announce` if that is more than reading them from numba's cache."""
+    timer = threading.Timer(1.0, announce)
+    timer.start()
+    try:
+        one = np.ones((1, 1))
+        record, joint = np.ones((1, 1), COEFFICIENTS), np.zeros((1, 1), JOINT)
+        entry = np.zeros((1, 1), dtype=np.intp)
+        work = np.zeros(1, WORK)
+        kernel.advance(
+            record,
+            joint,
+            work,
+            np.zeros((3, 1)),
+            0,
+            one,
+            one,
+            one,
+            entry,
+            one,
+            0.01,
+            1,
+            one * 0,
+            one * 0,
+        )
+        kernel.close(joint, one, one, entry, 0.01, one * 0)
+    finally:
+        timer.cancel()

@@ -1,0 +1,77 @@
+"""Cylinder or rotary actuator (article 2.2, equation (9)) and the oil in its two chambers.
+
+    ṗ_A = β/V_A (Q_A − A_A ẋ),   ṗ_B = β/V_B (A_B ẋ − Q_B),   F_R = A_A p_A − A_B p_B − F_c
+
+with V = dead volume + area × travel. A rotary actuator has D_m for both areas, the joint's angle for its
+travel, and chambers of constant volume. The block that the article used has stiff oil; a large β is that
+limit.
+
+What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y = p ± β D_m q/V_0). It
+changes by valve flow alone, ẏ = β Q / V, whatever the joint does, so that shut chambers conserve their oil to
+the last digit and pressures come back with the angle. Where oil alone does not fill the chamber, the
+pressure rests at vapour pressure and y remembers the missing volume: no oil is made or lost.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from hydroid.hydraulics.elementwise import compilable, select
+
+SLIDING = 1e-3
+"""speed [m/s, or rad/s] above which dry friction is nearly full; ours"""
+SMALLEST = 0.1
+"""part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
+
+
+@compilable
+def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any) -> Any:
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq, the geometry of `hydroid.arm.linkage`.
+
+    Args:
+        angle: of the joint [rad].
+        a: distance of one pivot from the joint's axis [m].
+        b: distance of the other [m].
+        theta0: angle between the pivots at joint angle 0 [rad].
+        shortest: the cylinder's length with the rod fully in [m].
+    """
+    theta = angle + theta0
+    cosine = a * b * np.cos(theta)
+    length = np.sqrt(a * a + b * b - 2.0 * cosine)
+    arm = a * b * np.sin(theta) / length
+    return length - shortest, arm, (cosine - arm * arm) / length
+
+
+@compilable
+def volume(travel: Any, area: Any, dead: Any) -> Any:
+    """Volume of a chamber [m³] that opens with `travel` [m] at `area` [m²]."""
+    return np.maximum(dead + area * travel, SMALLEST * dead)
+
+
+@compilable
+def oil_pressure(oil: Any, fill: Any, bulk: Any, vapour: Any) -> Any:
+    """Pressure [Pa] of oil y [Pa] in a chamber of fill ln(V/V_0) or ± D_m q/V_0: at least vapour pressure."""
+    return np.maximum(oil - bulk * fill, vapour)
+
+
+@compilable
+def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
+    """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while moving further in.
+
+    F_c opposes the motion at both ends; the article's sign at the lower one would push the rod out of the
+    barrel.
+
+    Args:
+        travel: x [m].
+        speed: ẋ [m/s].
+        stroke: S [m].
+        penetration: K_p [N·s/m²].
+    """
+    beyond = select(speed > 0.0, travel - stroke, select(speed < 0.0, -travel, 0.0))
+    return penetration * np.maximum(beyond, 0.0)
+
+
+@compilable
+def friction_damping(speed: Any, friction: Any) -> Any:
+    """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
+    return friction / np.sqrt(speed * speed + SLIDING * SLIDING)

@@ -1,0 +1,55 @@
+"""Functions written once for numpy arrays and for the scalars of a compiled loop.
+
+A component's law is a plain Python function of floats or of arrays that broadcast (population axis
+first). Marked `compilable`, the very same function is compiled into the kernel. `select` and `power` exist
+because a compiled loop should not compute the branch that it drops.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numba.extending import overload, register_jitable
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def compilable(function: F) -> F:
+    """Let compiled code call `function`; for Python it stays what it is."""
+    return register_jitable(function)
+
+
+def select(condition: Any, yes: Any, no: Any) -> Any:
+    """Return `yes` where `condition` holds, else `no`."""
+    return np.where(condition, yes, no)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """Return base^exponent."""
+    return base**exponent
+
+
+@compilable
+def implicit_share(speed: Any) -> Any:
+    """Weight of the new state in a linearised step, from rate times step (dimensionless).
+
+    One half, the second-order trapezoidal rule, while the step resolves the rate; towards one, backward
+    Euler, where it does not, which is the least weight that keeps a decay free of overshoot.
+    """
+    return 1.0 - 1.0 / np.maximum(speed, 2.0)
+
+
+@overload(select)
+def _compiled_select(condition: Any, yes: Any, no: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(condition: Any, yes: Any, no: Any) -> Any:
+        return yes if condition else no
+
+    return scalar
+
+
+@overload(power)
+def _compiled_power(base: Any, exponent: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(base: Any, exponent: Any) -> Any:
+        return base if exponent == 1.0 else base**exponent
+
+    return scalar

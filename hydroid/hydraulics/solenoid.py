@@ -1,0 +1,109 @@
+"""Solenoid and plunger (article 2.2, equation (5)), one for each side of the spool.
+
+The article parametrises its force by two points (x1, F1), (x2, F2) of the curve at rated current i0. Read as
+
+    F = k i² / (x + δ)²,   r = √(F1/F2),   δ = (x2 − r x1) / (r − 1),   k i0² = F1 (x1 + δ)²,
+
+the force falls with stroke, and the plunger m ẍ + λ ẋ + K x = F has exactly one equilibrium x > 0. (The
+article prints a minus sign, calls λ the stiffness and K the damping, and gives three constants where
+two act.) Such a curve exists if F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)². Rated current, mass, λ and K
+are ours.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from hydroid.hydraulics.elementwise import compilable, implicit_share, select
+
+
+def curve_exists(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any) -> Any:
+    """Whether a force-stroke curve runs through (stroke_1, force_1) and (stroke_2, force_2), elementwise."""
+    rising = (force_1 > force_2) & (force_2 > 0) & (stroke_2 > stroke_1) & (stroke_1 > 0)
+    return rising & (force_1 * stroke_1**2 < force_2 * stroke_2**2)
+
+
+def force_curve(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any, rated_current: Any) -> Any:
+    """Return the curve's constants k [N·m²/A²] and δ [m].
+
+    Args:
+        force_1: at stroke_1 and rated current [N].
+        force_2: at stroke_2 and rated current [N].
+        stroke_1: [m].
+        stroke_2: [m].
+        rated_current: i0 [A].
+
+    Returns:
+        k and δ; where no curve exists, a coil without force: k = 0, δ = stroke_2.
+    """
+    exists = curve_exists(force_1, force_2, stroke_1, stroke_2)
+    ratio = np.sqrt(np.where(exists, force_1 / np.where(exists, force_2, 1.0), 4.0))
+    gap = np.where(exists, (stroke_2 - ratio * stroke_1) / (ratio - 1.0), stroke_2)
+    return np.where(exists, force_1 * (stroke_1 + gap) ** 2 / rated_current**2, 0.0), gap
+
+
+@compilable
+def coil_force(drive: Any, stroke: Any, gap: Any) -> Any:
+    """Force on the plunger [N], equation (5), from drive k i² [N·m²], stroke [m] and gap δ [m]."""
+    reach = stroke + gap
+    return drive / (reach * reach)
+
+
+@compilable
+def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
+    """Stroke [m] where spring and coil balance: K x (x + δ)² = k i².
+
+    Newton's method from ∛(k i²/K), which lies beyond the only root of a convex function, so that every
+    iterate does too; seven reach machine precision from any δ > 0.
+    """
+    pull = drive / stiffness
+    stroke = np.cbrt(pull)
+    for _ in range(7):
+        reach = stroke + gap
+        slope = reach * (reach + 2.0 * stroke) + 1e-300  # no drive, no gap: 0 / tiny rather than 0 / 0
+        stroke = stroke - (stroke * reach * reach - pull) / slope
+    return np.maximum(stroke, 0.0)
+
+
+@compilable
+def plunger_share(mass: Any, damping: Any, stiffness: Any, step: Any) -> Any:
+    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff."""
+    return implicit_share(step * np.maximum(damping / mass, np.sqrt(3.0 * stiffness / mass)))
+
+
+@compilable
+def plunger_step(
+    stroke: Any,
+    speed: Any,
+    drive: Any,
+    gap: Any,
+    mass: Any,
+    damping: Any,
+    stiffness: Any,
+    step: Any,
+    share: Any,
+) -> Any:
+    """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step.
+
+    Args:
+        stroke: [m].
+        speed: [m/s].
+        drive: k i² during the step [N·m²].
+        gap: δ [m].
+        mass: m [kg].
+        damping: λ [N·s/m].
+        stiffness: K [N/m].
+        step: [s].
+        share: weight of the new state, from `plunger_share`.
+
+    Returns:
+        Stroke [m] and speed [m/s] after the step; a plunger that reaches its seat at x = 0 stops there.
+    """
+    force = coil_force(drive, stroke, gap)
+    slope = stiffness + 2.0 * force / (stroke + gap)
+    drag = damping + share * step * slope
+    gain = step * (force - stiffness * stroke - drag * speed) / (mass + share * step * drag)
+    after = stroke + step * (speed + share * gain)
+    speed = speed + gain
+    seated = after <= 0.0
+    return select(seated, 0.0, after), select(seated, np.maximum(speed, 0.0), speed)

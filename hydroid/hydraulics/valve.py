@@ -1,0 +1,96 @@
+"""Four-way spool valve (article 2.2, equations (6) to (8)).
+
+For x > 0 oil runs from the pump to chamber A and from B to the tank, for x < 0 from the pump to B and from A
+to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp|/ρ) has an infinite slope at Δp =
+0, so below the transition pressure p_cr it becomes a straight line:
+
+    Q = C_q A √(2/ρ) Δp / (Δp² + p_cr²)^(1/4).
+
+The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own
+A_max and overlap, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
+to this actuator.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from hydroid.hydraulics.elementwise import compilable, power, select
+
+
+@compilable
+def spool(stroke_a: Any, stroke_b: Any) -> Any:
+    """Spool displacement x [m], equation (6), from the plungers' strokes [m]."""
+    return stroke_a - stroke_b
+
+
+@compilable
+def opening(
+    spool: Any, largest_a: Any, largest_b: Any, width: Any, overlap_a: Any, overlap_b: Any, exponent: Any
+) -> Any:
+    """Opening A(x) of both metering edges [m²], without leakage.
+
+    Args:
+        spool: x [m]; x > 0 opens towards A.
+        largest_a: A_max for x > 0 [m²].
+        largest_b: A_max for x < 0 [m²].
+        width: w, the slot in the sleeve [m].
+        overlap_a: how far x must go before the edges open, x > 0 [m].
+        overlap_b: the same for x < 0 [m].
+        exponent: of the opening in the stroke; 1 is a straight line.
+    """
+    towards_a = spool > 0.0
+    bare = np.abs(spool) - select(towards_a, overlap_a, overlap_b)
+    share = np.minimum(np.maximum(bare, 0.0) / width, 1.0)
+    return select(towards_a, largest_a, largest_b) * power(share, exponent)
+
+
+def conductance(flow_coefficient: Any, density: Any) -> Any:
+    """C_q √(2/ρ) [m/(s √Pa)]: flow per opening and root of the pressure drop."""
+    return flow_coefficient * np.sqrt(2.0 / density)
+
+
+@compilable
+def root(drop: Any, transition: Any) -> Any:
+    """Regularised sgn(Δp) √|Δp| [√Pa] and its derivative [1/√Pa] at a pressure drop [Pa]."""
+    square = drop * drop
+    scale = square + transition * transition
+    inverse = 1.0 / np.sqrt(np.sqrt(scale))
+    return drop * inverse, (1.0 - 0.5 * square * (inverse * inverse) ** 2) * inverse
+
+
+@compilable
+def port_flow(
+    pressure: Any,
+    pump_area: Any,
+    tank_area: Any,
+    supply: Any,
+    tank: Any,
+    conductance: Any,
+    transition: Any,
+    limit: Any,
+) -> Any:
+    """Flow into a chamber through its two edges, (7) and (8).
+
+    Args:
+        pressure: in the chamber [Pa].
+        pump_area: opening towards the pump [m²].
+        tank_area: opening towards the tank [m²].
+        supply: p_S [Pa].
+        tank: p_T [Pa].
+        conductance: C_q √(2/ρ) [m/(s √Pa)].
+        transition: p_cr [Pa].
+        limit: most that the pump gives [m³/s].
+
+    Returns:
+        Q [m³/s] and -dQ/dp [m³/(s Pa)], which is never negative.
+    """
+    into, into_slope = root(supply - pressure, transition)
+    out, out_slope = root(pressure - tank, transition)
+    pumped = conductance * pump_area * into
+    pumped_slope = conductance * pump_area * into_slope
+    spent = pumped >= limit
+    pumped = select(spent, limit, pumped)
+    pumped_slope = select(spent, 0.0, pumped_slope)
+    drained = conductance * tank_area
+    return pumped - drained * out, pumped_slope + drained * out_slope

@@ -1,0 +1,281 @@
+"""The laws of the whole actuator, on one joint under MuJoCo."""
+
+from math import cos, radians
+
+import numpy as np
+import pytest
+from hydraulic_reference import (
+    CENTRE,
+    DAMPING,
+    GRAVITY,
+    LINKAGE,
+    MASS,
+    START,
+    STIFFNESS,
+    STROKE,
+    TILT,
+    parameters,
+    pulses,
+    simulate,
+)
+
+from hydroid.hydraulics.actuator import Actuator, Observation, compile_kernels
+from hydroid.hydraulics.cylinder import triangle
+from hydroid.hydraulics.parameters import ROTARY, Linkages
+from hydroid.hydraulics.solenoid import force_curve
+from hydroid.settings.hydraulics import HydraulicSettings
+
+SETTINGS = HydraulicSettings()
+TIGHT = HydraulicSettings(leakage=0.0)
+DAY = np.zeros(6000)  # 60 s of rest
+
+Seen = list[tuple[Observation, np.ndarray]]
+
+
+def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Travel and moment arm at angles of any shape."""
+    return triangle(angle, LINKAGE.a[0], LINKAGE.b[0], LINKAGE.theta0[0], LINKAGE.shortest[0])[:2]
+
+
+def weight(angle: float) -> float:
+    """Torque of gravity and spring on the pendulum [N·m]."""
+    return MASS * GRAVITY * CENTRE * cos(angle + TILT) + STIFFNESS * (angle - START)
+
+
+def test_shut_valves_hold_the_arm_for_a_minute():
+    seen: Seen = []
+    angle = simulate(parameters(TIGHT), DAY, TIGHT, observe=seen)
+    assert abs(angle - START).max() < 1e-9
+    first, last = seen[0][0].pressure, seen[-1][0].pressure
+    np.testing.assert_allclose(last, first, atol=10.0)
+
+
+def test_a_kick_dies_out_where_it_started():
+    """No drift: shut chambers keep their oil through motion, so the joint comes back to its angle."""
+    command = np.zeros(1500)
+    p = parameters(TIGHT)
+    rest = simulate(p, command, TIGHT)
+    start = START + radians(2.0)
+    # held at another angle by pressures for START's weight: swings, then settles where oil balances
+    seen: Seen = []
+    moved = simulate(p, command, TIGHT, start=start, observe=seen)
+    assert abs(np.diff(rest[0, -200:])).max() < 1e-12
+    assert abs(np.diff(moved[0, -200:])).max() < 1e-9
+    assert abs(seen[-1][1]).max() < 1e-7
+
+
+def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
+    """Pressures come back to the last digits with the angle, and are never below vapour pressure between."""
+    p, period = parameters(TIGHT), 0.01
+    actuator = Actuator(p, LINKAGE, DAMPING, period, TIGHT)
+    angle, mass = np.full((1, 1), START), np.full((1, 1), 23.6)
+    state = actuator.start(angle, np.full((1, 1), 250.0))
+    before = actuator.observe(state, angle)
+    oil = state.joints["oil_a"].copy(), state.joints["oil_b"].copy()
+    lowest = np.inf
+    velocity = np.zeros((1, 1))
+    for k in range(200):
+        actuator.advance(state, [0.0], angle, velocity, mass)
+        velocity = np.full((1, 1), 0.5 * np.sin(2 * np.pi * (k + 1) / 200))
+        angle = actuator.close(state, velocity, mass)
+        lowest = min(lowest, actuator.observe(state, angle).pressure.min())
+    assert lowest == 0.0  # it did cavitate
+    assert state.joints["oil_a"] == oil[0]
+    assert state.joints["oil_b"] == oil[1]
+    after = actuator.observe(state, np.full((1, 1), START))
+    np.testing.assert_allclose(after.pressure, before.pressure, rtol=1e-12)
+
+
+def test_oil_volume_is_conserved_under_flow():
+    """What flows in is swept volume plus compression: mass ρ V with ρ ~ exp(p/β) grows by ρ Q."""
+    command = pulses(np.random.default_rng(4), 400)
+    seen: Seen = []
+    fine = HydraulicSettings(substeps=20)
+    angle = simulate(parameters(fine), command, fine, observe=seen)[0]
+    beta = 8e8
+    for chamber, sign in ((0, 1.0), (1, -1.0)):
+        travel = cylinder(angle)[0]
+        volume = 30e-6 + (1e-3 * travel if chamber == 0 else 0.75e-3 * (STROKE - travel))
+        pressure = np.array([o.pressure[0, 0, chamber] for o, _ in seen])
+        flow = sign * np.array([o.flow[0, 0, chamber] for o, _ in seen])
+        density = np.exp(pressure / beta)
+        gained = density[-1] * volume[-1] - density[0] * volume[1]
+        came = 0.01 * (density * flow)[1:].sum()
+        assert abs(flow).sum() * 0.01 > 10e-6
+        assert came == pytest.approx(gained, abs=3e-8)
+
+
+@pytest.mark.parametrize("command", [70.0, -70.0])
+def test_terminal_speed_is_flow_over_area(command: float):
+    seen: Seen = []
+    angle = simulate(parameters(SETTINGS), np.full(60, command), SETTINGS, observe=seen)[0]
+    measured, velocity = seen[-1]
+    rod_speed = cylinder(angle[-1])[1] * velocity[0, 0]
+    chambers = measured.flow[0, 0] / np.array([1e-3, 0.75e-3])
+    np.testing.assert_allclose(chambers, rod_speed, rtol=0.02)
+    # and the flow is that of equations (7), (8) at the pressures seen
+    opening = 0.4e-6 * abs(measured.spool[0, 0]) / 2e-3
+    pa, pb = measured.pressure[0, 0]
+    drops = (150e5 - pa, pb - 5e5) if command > 0 else (pa - 5e5, 150e5 - pb)
+    wanted = np.sign(command) * 0.7 * opening * np.sqrt(2 * np.array(drops) / 860)
+    np.testing.assert_allclose(measured.flow[0, 0], wanted, rtol=0.01)
+
+
+def test_stiff_oil_is_the_incompressible_limit():
+    """With β a thousandfold the joint starts at once, with the speed of its flow, without ringing."""
+    seen: Seen = []
+    p = parameters(SETTINGS, bulk_modulus=8e6)
+    angle = simulate(p, np.full(100, 60.0), SETTINGS, observe=seen)[0]
+    speed = np.array([v[0, 0] for _, v in seen])
+    flow = np.array([o.flow[0, 0, 0] for o, _ in seen])
+    rod_speed = cylinder(angle)[1][1:] * speed
+    np.testing.assert_allclose(rod_speed[5:], flow[5:] / 1e-3, rtol=0.01)
+    assert (np.diff(speed[10:]) > 0).all()  # the moment arm shrinks, the joint speeds up, nothing rings
+
+
+def test_nothing_moves_in_the_dead_zone():
+    p = parameters(TIGHT, overlap_a=1.0, overlap_b=1.0)
+    still = simulate(p, np.full(300, 30.0), TIGHT)
+    assert abs(still - START).max() < 1e-9
+    moving = simulate(p, np.full(300, 90.0), TIGHT)
+    assert moving[0, -1] > START + 0.01
+
+
+def test_speed_saturates_with_the_amplifier():
+    p = parameters(SETTINGS, full_a=20.0)  # (10 V - 1.4 V) of 18.6 V is reached at 46 %
+    runs = [simulate(p, np.full(100, u), SETTINGS) for u in (40.0, 50.0, 100.0)]
+    np.testing.assert_array_equal(runs[1], runs[2])
+    assert runs[0][0, -1] < runs[1][0, -1]
+
+
+def test_a_flow_limit_caps_speed():
+    seen: Seen = []
+    p = parameters(SETTINGS, flow_limit=0.6)
+    simulate(p, np.full(80, 100.0), SETTINGS, observe=seen)
+    flow = np.array([o.flow[0, 0, 0] for o, _ in seen])
+    assert flow.max() <= 0.6e-3 / 60 * (1 + 1e-9)
+    assert flow[-1] == pytest.approx(0.6e-3 / 60, rel=0.02)
+
+
+def test_the_end_stop_obeys_equation_9_and_does_not_chatter():
+    seen: Seen = []
+    angle = simulate(parameters(SETTINGS), np.full(400, -100.0), SETTINGS, observe=seen)[0]
+    travel, arm = cylinder(angle)
+    touched = int(np.argmax(travel[1:] < 0))
+    assert 0 < touched < 300
+    assert (travel[1 + touched :] < 0).all()
+    assert travel.min() > -5e-3
+    speed = np.array([v[0, 0] for _, v in seen])
+    assert (speed[touched + 5 :] < 0).all()
+    for k in (touched + 20, -1):
+        stop = 1e10 * travel[k + (k >= 0)] * arm[k + (k >= 0)] * speed[k]
+        rest = (weight(angle[k + (k >= 0)]) + DAMPING * speed[k]) / arm[k + (k >= 0)]
+        assert stop == pytest.approx(rest - seen[k][0].force[0, 0], rel=0.02)
+        assert stop > 5e3
+
+
+def test_rest_after_motion_is_rest():
+    """No chatter: once the valve is shut and the arm has rung out, nothing moves but by leakage."""
+    command = np.r_[np.full(100, 80.0), np.full(50, -60.0), np.zeros(850)]
+    speed = np.diff(simulate(parameters(TIGHT), command, TIGHT)[0, -100:]) / 0.01
+    assert abs(speed).max() < 1e-6
+
+
+def test_force_and_stroke_act_through_two_numbers_only():
+    """First two null directions: other points of the same force-stroke curve give the same motion."""
+    coil, gap = force_curve(8.0, 0.7, 0.8, 12.0, 0.9)
+    other = [coil * 0.81 / (x + gap) ** 2 for x in (1.7, 9.0)]
+    command = pulses(np.random.default_rng(5), 300)
+    both = parameters(
+        SETTINGS,
+        force_1=np.array([8.0, other[0]]),
+        force_2=np.array([0.7, other[1]]),
+        stroke_1=np.array([0.8, 1.7]),
+        stroke_2=np.array([12.0, 9.0]),
+    )
+    angle = simulate(both, command, SETTINGS)
+    np.testing.assert_allclose(angle[1], angle[0], atol=1e-11)
+    assert np.ptp(angle[0]) > 0.05
+
+
+def test_currents_trade_with_forces():
+    """Third null direction: both currents times s and both forces over s² give the same motion."""
+    s = np.array([1.0, 1.3])
+    command = pulses(np.random.default_rng(6), 300)
+    both = parameters(
+        SETTINGS, current_max=0.9 * s, current_min=0.3 * s, force_1=8 / s**2, force_2=0.7 / s**2
+    )
+    angle = simulate(both, command, SETTINGS)
+    np.testing.assert_allclose(angle[1], angle[0], atol=1e-11)
+
+
+def test_delay_shifts_the_response():
+    fine = HydraulicSettings(leakage=0.0, substeps=10)
+    command = pulses(np.random.default_rng(7), 300)
+    p = parameters(fine, delay=np.array([0.0, 0.05, 0.0499999, 0.0525]))
+    prompt, late, near, between = simulate(p, command, fine)
+    np.testing.assert_allclose(late[5:], prompt[:-5], atol=1e-9)
+    assert np.ptp(prompt) > 0.05
+    assert abs(near - late).max() < 1e-5  # continuous through a whole number of samples
+    # part of a sample: against steps of 2.5 ms, of which the delay is a whole number
+    exact = simulate(p[3:], command, fine, steps=4)[0]
+    assert abs(between - exact).max() < 0.1 * abs(late - exact).max()
+
+
+def test_dry_friction_takes_its_share_of_the_force():
+    seen: Seen = []
+    p = parameters(SETTINGS, dry_friction=2000.0)
+    angle = simulate(p, np.full(80, 70.0), SETTINGS, observe=seen)[0]
+    measured, velocity = seen[-1]
+    arm = cylinder(angle[-1])[1]
+    needed = (weight(angle[-1]) + DAMPING * velocity[0, 0]) / arm
+    assert measured.force[0, 0] - needed == pytest.approx(2000.0, rel=0.05)
+
+
+def test_quasi_static_plungers_are_the_limit_of_light_ones():
+    command = pulses(np.random.default_rng(8), 300)
+    fine = HydraulicSettings(substeps=20)
+    quick = HydraulicSettings(substeps=20, plunger_dynamics=False)
+    still = simulate(parameters(quick), command, quick)
+    light = simulate(parameters(fine, plunger_mass=1e-5, plunger_damping=0.05), command, fine)
+    heavy = simulate(parameters(fine), command, fine)
+    assert abs(light - still).max() < 0.1 * abs(heavy - still).max()
+
+
+def test_an_infeasible_member_stands_still_and_harms_nobody():
+    p = parameters(TIGHT, stroke_1=np.array([0.8, 13.0, 0.8]))
+    command = pulses(np.random.default_rng(9), 200)
+    angle = simulate(p, command, TIGHT)
+    assert p.feasible.tolist() == [True, False, True]
+    assert abs(angle[1] - START).max() < 1e-9
+    np.testing.assert_array_equal(angle[0], angle[2])
+    np.testing.assert_array_equal(simulate(p[[0]], command, TIGHT)[0], angle[0])
+
+
+def test_a_rotary_actuator_turns_by_flow_over_displacement():
+    linkage = Linkages(np.array([ROTARY]), *np.zeros((5, 1)))
+    p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0)
+    actuator = Actuator(p, linkage, 5.0, 0.01, TIGHT)
+    angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05
+    state = actuator.start(angle, np.zeros((1, 1)))
+    mass = np.full((1, 1), inertia)
+    begun = actuator.observe(state, angle).pressure[0, 0, 0]
+    flowed = 0.0
+    for k in range(200):
+        torque, armature = actuator.advance(state, [60.0 if k < 100 else 0.0], angle, velocity, mass)
+        mass = inertia + armature
+        velocity = velocity + 0.01 * torque / mass  # MuJoCo's step for a lone wheel
+        angle = actuator.close(state, velocity, mass)
+        flowed += 0.01 * actuator.observe(state, angle).flow[0, 0, 0]
+    assert angle[0, 0] > 1.0
+    pressed = actuator.observe(state, angle).pressure[0, 0, 0] - begun
+    # swept volume plus compression of a chamber of constant volume, to the last digits
+    assert flowed == pytest.approx(10e-6 * angle[0, 0] + 50e-6 * pressed / 8e8, rel=1e-9)
+    assert abs(velocity[0, 0]) < 1e-6
+
+
+def test_compiling_is_announced_only_when_it_happens():
+    compile_kernels(lambda: None)
+    said: list[str] = []
+    compile_kernels(lambda: said.append("compiling"))
+    assert not said

@@ -1,0 +1,207 @@
+"""The laws of the components, each used alone on plain arrays."""
+
+import numpy as np
+import pytest
+
+from hydroid.hydraulics.amplifier import coil_current
+from hydroid.hydraulics.balance import holding_pressures
+from hydroid.hydraulics.calibration import side_voltage
+from hydroid.hydraulics.cylinder import friction_damping, oil_pressure, stop_damping, triangle, volume
+from hydroid.hydraulics.parameters import Linkages, nominal_parameters
+from hydroid.hydraulics.solenoid import (
+    coil_force,
+    curve_exists,
+    force_curve,
+    plunger_share,
+    plunger_step,
+    resting_stroke,
+)
+from hydroid.hydraulics.valve import conductance, opening, port_flow, root
+from hydroid.settings.arm import Arm
+from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
+
+ARTICLE = (8.0, 0.7, 0.8e-3, 12e-3, 0.9)
+
+
+def test_voltage_jumps_to_the_onset_and_reaches_full_scale():
+    command = np.array([-100.0, -1e-9, 0.0, 1e-9, 50.0, 100.0])
+    np.testing.assert_allclose(side_voltage(command, 1.4, 10.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
+    np.testing.assert_allclose(side_voltage(-command, 1.2, 10.0), [10, 1.2, 0, 0, 0, 0], atol=1e-9)
+
+
+def test_components_broadcast_over_a_population():
+    onset = np.array([[1.4], [0.7]])
+    assert side_voltage(np.linspace(-100, 100, 11), onset, 10.0).shape == (2, 11)
+
+
+def test_current_is_a_line_between_its_limits():
+    voltage = np.array([-1.0, 0.0, 5.0, 10.0, 12.0])
+    np.testing.assert_allclose(coil_current(voltage, 0.9, 0.3), [0.3, 0.3, 0.6, 0.9, 0.9])
+
+
+def test_force_curve_runs_through_both_points():
+    coil, gap = force_curve(*ARTICLE)
+    np.testing.assert_allclose(coil_force(coil * 0.9**2, np.array([0.8e-3, 12e-3]), gap), [8.0, 0.7])
+    assert gap == pytest.approx(3.90e-3, abs=5e-6)
+    assert coil * 0.9**2 == pytest.approx(177e-6, abs=5e-7)
+
+
+@pytest.mark.parametrize("broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)])
+def test_impossible_curves_are_marked_and_have_no_force(broken: tuple[float, ...]):
+    assert not curve_exists(*broken)
+    coil, gap = force_curve(*broken, 0.9)
+    assert coil == 0.0
+    assert gap > 0.0
+
+
+def test_plunger_rests_where_spring_and_coil_balance():
+    rng = np.random.default_rng(0)
+    drive, gap = 10 ** rng.uniform(-9, -3, 500), 10 ** rng.uniform(-6, -2, 500)
+    stroke = resting_stroke(drive, gap, 2000.0)
+    np.testing.assert_allclose(coil_force(drive, stroke, gap), 2000.0 * stroke, rtol=1e-9)
+    assert resting_stroke(0.0, 1e-3, 2000.0) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("mass", [0.05, 1e-4])
+def test_plunger_settles_at_rest_without_ringing_on(mass: float):
+    coil, gap = force_curve(*ARTICLE)
+    rest = resting_stroke(coil * 0.36, gap, 2000.0)
+    stroke, speed = np.array(0.0), np.array(0.0)
+    share = plunger_share(mass, 20.0, 2000.0, 2.5e-3)
+    for _ in range(80):
+        stroke, speed = plunger_step(stroke, speed, coil * 0.36, gap, mass, 20.0, 2000.0, 2.5e-3, share)
+    assert stroke == pytest.approx(rest, rel=1e-6)
+    assert speed == pytest.approx(0.0, abs=1e-8)
+
+
+def test_plunger_converges_at_second_order():
+    coil, gap = force_curve(*ARTICLE)
+
+    def end(steps: int) -> float:
+        stroke, speed, step = 5e-4, 0.0, 0.01 / steps
+        share = plunger_share(0.05, 20.0, 2000.0, step)
+        for _ in range(steps):
+            stroke, speed = plunger_step(stroke, speed, coil * 0.81, gap, 0.05, 20.0, 2000.0, step, share)
+        return float(stroke)
+
+    exact = end(4000)
+    assert abs(end(10) - exact) / abs(end(20) - exact) == pytest.approx(4.0, rel=0.2)
+
+
+def test_plunger_does_not_pass_its_seat():
+    share = plunger_share(0.05, 20.0, 2000.0, 1e-3)
+    stroke, speed = plunger_step(1e-4, -1.0, 0.0, 1e-3, 0.05, 20.0, 2000.0, 1e-3, share)
+    assert stroke == 0.0
+    assert speed >= 0.0
+
+
+def test_opening_has_overlap_slope_and_ceiling_a_side():
+    spool = np.array([-3e-3, -1e-3, -0.1e-3, 0.0, 0.3e-3, 1.5e-3, 3e-3])
+    area = opening(spool, 4e-7, 2e-7, 2e-3, 0.5e-3, 0.2e-3, 1.0)
+    np.testing.assert_allclose(area, [2e-7, 0.8e-7, 0, 0, 0, 2e-7, 4e-7], atol=1e-20)
+    squared = opening(spool, 4e-7, 4e-7, 2e-3, 0.5e-3, 0.5e-3, 2.0)
+    np.testing.assert_allclose(squared[5], 1e-7)
+
+
+def test_flow_law_is_the_orifice_law_away_from_zero_and_smooth_through_it():
+    drop = np.array([-1e6, 1e6, 1e5])
+    value, slope = root(drop, 0.2e5)
+    np.testing.assert_allclose(value, np.sign(drop) * np.sqrt(abs(drop)), rtol=1e-2)
+    ahead, _ = root(drop + 1.0, 0.2e5)
+    behind, _ = root(drop - 1.0, 0.2e5)
+    np.testing.assert_allclose(slope, (ahead - behind) / 2.0, rtol=1e-5)
+    assert root(0.0, 0.2e5)[0] == 0.0
+
+
+def test_port_flow_against_equation_7_and_its_limit():
+    gain = conductance(0.7, 860.0)
+    flow, slope = port_flow(50e5, 0.4e-6, 0.0, 150e5, 5e5, gain, 0.2e5, np.inf)
+    assert flow == pytest.approx(0.7 * 0.4e-6 * np.sqrt(2 * 100e5 / 860), rel=1e-5)
+    assert slope > 0
+    limited, slope = port_flow(50e5, 0.4e-6, 0.0, 150e5, 5e5, gain, 0.2e5, 1e-5)
+    assert limited == 1e-5
+    assert slope == 0.0
+
+
+def test_triangle_is_a_derivative_chain():
+    q, h = np.linspace(-0.5, 1.5, 50), 1e-5
+    x, r, slope = triangle(q, 0.3, 0.08, np.radians(70), 0.2442)
+    ahead, behind = (
+        triangle(q + h, 0.3, 0.08, np.radians(70), 0.2442),
+        triangle(q - h, 0.3, 0.08, np.radians(70), 0.2442),
+    )
+    np.testing.assert_allclose(r, (ahead[0] - behind[0]) / (2 * h), rtol=1e-7)
+    np.testing.assert_allclose(slope, (ahead[1] - behind[1]) / (2 * h), atol=1e-7)
+    assert x.shape == q.shape
+
+
+def test_linkages_agree_with_the_arm_room(arm: Arm):
+    from hydroid.arm.linkage import Cylinder, linkage
+
+    linkages = Linkages.of(arm, range(7), range(7))
+    for j, joint in enumerate(arm.joints):
+        other = linkage(joint)
+        if not isinstance(other, Cylinder):
+            continue
+        q = np.radians(np.linspace(*joint.range, 9))
+        x, r, _ = triangle(q, linkages.a[j], linkages.b[j], linkages.theta0[j], linkages.shortest[j])
+        np.testing.assert_allclose(x, other.travel(q), atol=1e-12)
+        np.testing.assert_allclose(r, other.moment_arm(q), rtol=1e-12)
+
+
+def test_oil_gives_the_pressure_of_equation_9():
+    # shut chamber: ṗ = -β/V dV/dt; pressure from stored oil must follow
+    bulk, area, dead = 8e8, 1e-3, 30e-6
+    x = np.linspace(0.05, 0.0501, 3)
+    fill = np.log(volume(x, area, dead) / dead)
+    p = oil_pressure(50e5 + bulk * fill[1], fill, bulk, 0.0)
+    slope = (p[2] - p[0]) / (x[2] - x[0])
+    assert slope == pytest.approx(-bulk * area / volume(x[1], area, dead), rel=1e-5)
+    assert oil_pressure(0.0, 1.0, bulk, 2e3) == 2e3
+
+
+def test_stops_oppose_motion_into_them_only():
+    travel, speed = np.array([-1e-3, -1e-3, 0.05, 0.136, 0.136]), np.array([-0.1, 0.1, 1.0, 0.1, -0.1])
+    damping = stop_damping(travel, speed, 0.135, 1e10)
+    np.testing.assert_allclose(damping, [1e7, 0, 0, 1e7, 0], rtol=1e-9)
+
+
+def test_friction_force_saturates_at_its_value():
+    speed = np.array([1e-6, 0.01, 1.0])
+    np.testing.assert_allclose(friction_damping(speed, 200.0) * speed, [0.2, 199.0, 200.0], rtol=1e-2)
+
+
+def test_holding_pressures_balance_and_stay_between_tank_and_supply_where_they_can():
+    rng = np.random.default_rng(0)
+    force = rng.uniform(-2e4, 2e4, 2000)
+    a, b = rng.uniform(2e-4, 2.5e-3, 2000), rng.uniform(2e-4, 2e-3, 2000)
+    pa, pb = holding_pressures(force, a, b, 150e5, 5e5, 50e5)
+    np.testing.assert_allclose(a * pa - b * pb, force, atol=1e-6)
+    possible = (force <= a * 150e5 - b * 5e5) & (force >= a * 5e5 - b * 150e5)
+    inside = (pa > 5e5 - 1) & (pa < 150e5 + 1) & (pb > 5e5 - 1) & (pb < 150e5 + 1)
+    assert (inside == possible).all()
+    assert 0.1 < possible.mean() < 0.95
+    kept = possible & (pb == 50e5)
+    assert kept.any()
+    assert min(pa.min(), pb.min()) > 5e5 - 1
+
+
+def test_nominal_parameters_are_the_settings_in_si(arm: Arm):
+    p = nominal_parameters(arm, HydraulicSettings(), range(7), 3)
+    assert p.area_a.shape == (3, 7)
+    np.testing.assert_allclose(p.area_a[0, 1], 1000e-6)
+    np.testing.assert_allclose(p.area_b[0, 3], 10e-6)
+    np.testing.assert_allclose(p.dead_volume[0, [1, 3]], [30e-6, 50e-6])
+    assert np.isinf(p.flow_limit).all()
+    assert set(HYDRAULIC_UNITS) == set(vars(p))
+    assert p.feasible.all()
+
+
+def test_replaced_values_come_in_drawing_units_and_infeasible_members_are_marked(arm: Arm):
+    p = nominal_parameters(arm, HydraulicSettings(), range(7), 2)
+    q = p.with_values({"stroke_1": np.array([[0.8], [13.0]]), "supply_pressure": 200.0})
+    np.testing.assert_allclose(q.supply_pressure, 200e5)
+    np.testing.assert_allclose(q.stroke_1[:, 0], [0.8e-3, 13e-3])
+    assert q.feasible.tolist() == [True, False]
+    np.testing.assert_allclose(p.supply_pressure, 150e5)
+    assert len(q[1:]) == 1

@@ -50,7 +50,7 @@ def main() -> None:
         if arguments.unpinned:
             changes |= {f"parameters.{name}.fixed": None for name in PINS}
         settings, arm = load_settings("article-hyd", changes)
-        log = pseudo_random_log(arm.pose("study"), [2])
+        log = pseudo_random_log(arm.pose("study"), [2], reach=100.0)
         problem = Problem(arm, settings, [simulate_log(settings, arm, log, TRUTH, "truth")])
         started = time.perf_counter()
         found = fit(problem, lambda state, memo: None, Silent())

@@ -1,7 +1,8 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench`).
 
 A population (70 members, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
-on the same model and members, set up beforehand; `locked` against `passive`; the search's own share.
+on the same model and members, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
+search's own share of the wall time.
 """
 
 import statistics
@@ -94,6 +95,29 @@ def measure(theta: np.ndarray) -> None:
     print(f"locked against passive: {gain:.2f} times the throughput")
 
 
+def hydraulic_cost() -> None:
+    """Print stage 2's evaluation against stage 1's on the same seven-joint model, in turn."""
+    mechanical, _ = make_problem("passive")
+    problems = {"mechanical": mechanical}
+    for what, joints in (("the shoulder's hydraulics", [2]), ("all seven joints'", list(range(1, 8)))):
+        settings, arm = load_settings("article-hyd", {"simulation.other_joints": "passive"})
+        log = pseudo_random_log(arm.pose("study"), joints, duration=75.01)
+        problems[what] = Problem(arm, settings, [log])
+    rng = np.random.default_rng(0)
+    calls = {
+        what: partial(p.evaluate, p.parameters.from_unit(rng.random((MEMBERS, int(p.parameters.free.sum())))))
+        for what, p in problems.items()
+    }
+    _ = [call() for call in calls.values()]  # compile and warm up
+    rounds = [{what: seconds(call) for what, call in calls.items()} for _ in range(REPEATS)]
+    print("| evaluation of the seven-joint model | seconds | ratio |")
+    print("| --- | --- | --- |")
+    for what in calls:
+        took = statistics.median(r[what] for r in rounds)
+        ratio = statistics.median(r[what] / r["mechanical"] for r in rounds)
+        print(f"| {what} | {took:.3f} | {ratio:.2f} |")
+
+
 def search_share(algorithm: str) -> float:
     """Return the share of a search's wall time [%] that is not spent in evaluating populations."""
     problem, _ = make_problem("locked", algorithm)
@@ -121,6 +145,7 @@ def main() -> None:
     theta = problem.parameters.from_unit(rng.random((MEMBERS, int(problem.parameters.free.sum()))))
     print(f"{MEMBERS} members, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} rounds")
     measure(theta)
+    hydraulic_cost()
     for algorithm in ("ga", "nsga2"):
         print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
 

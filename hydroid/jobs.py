@@ -225,8 +225,10 @@ def simulate_file(
         trace: a CSV of pressures, flows, spool and force of every actuator to write (stage 2).
 
     Raises:
-        SettingsError: a trace is asked of stage 1.
+        SettingsError: a trace is asked of stage 1, or the commands would be overwritten.
     """
+    if out.resolve() == commands.resolve():
+        raise SettingsError("would overwrite the commands", where=f"--out {out}", cure="name another file")
     if trace is not None and settings.stage != "hyd":
         raise SettingsError("stage mech has no pressures to trace", where=source, cure="set stage: hyd")
     ranges = np.stack([arm.lower, arm.upper], axis=1)

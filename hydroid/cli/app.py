@@ -9,7 +9,7 @@ from types import FrameType
 
 import typer
 
-from hydroid.cli import check, fit, model, simulate, validate
+from hydroid.cli import check, fit, model, plot_actuator, simulate, validate, view
 
 STOPPED = 130
 """exit status of what Ctrl-C or a signal ended, as shells have it"""
@@ -27,6 +27,8 @@ app.command("fit-hyd")(fit.fit_hyd)
 app.command("validate")(validate.validate)
 app.command("simulate")(simulate.simulate)
 app.command("check")(check.check)
+app.command("plot-actuator")(plot_actuator.plot_actuator)
+app.command("view")(view.view)
 app.command("build-model")(model.build_model)
 
 

@@ -9,6 +9,18 @@ Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG.csv...", help="Logs: commands [%] and joint angles.")
 ]
 Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped one.")]
+ActuatorConfig = Annotated[
+    str | None, typer.Option("--config", help="Settings [default: those beside the parameters, or fit-hyd].")
+]
+Params = Annotated[
+    Path | None,
+    typer.Option(
+        "--params",
+        "--fit",
+        metavar="P",
+        help="Run folder of fit-hyd, its estimate.yaml, or values by name [default: nominal values].",
+    ),
+]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace one setting, such as search.ga.generations=80."),

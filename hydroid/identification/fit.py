@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.identification.search import Checkpoint, Search, SearchState
+from hydroid.identification.sensitivity import Sensitivity, sensitivity
 from hydroid.parameters import Array
 from hydroid.search import compromise
 from hydroid.search.least_squares import Polish, polish
 from hydroid.search.pareto import non_dominated
-
-NO_EFFECT = 1e-8
-"""a parameter that moves the response less than this times the strongest one's has no effect on it"""
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,8 @@ class Fit:
     """What a fit found.
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
-    objectives. polish: the last one. history: shape (G, len(HISTORY)). effects: rms change of the response
-    [rad] per 1 % of each parameter, shape (P,).
+    objectives. polish: the last one. history: shape (G, len(HISTORY)). sensitivity: what moves the
+    response at the final estimate.
     """
 
     estimates: dict[str, Estimate]
@@ -48,7 +46,7 @@ class Fit:
     front: tuple[Array, Evaluation]
     history: Array
     polish: Polish | None
-    effects: Array
+    sensitivity: Sensitivity
 
     @property
     def best(self) -> Estimate:
@@ -61,9 +59,14 @@ class Fit:
         return next(iter(self.estimates.values()))
 
     @property
+    def effects(self) -> Array:
+        """Rms change of the response per 1 % of each parameter [rad], shape (P,)."""
+        return self.sensitivity.effects
+
+    @property
     def without_effect(self) -> NDArray[np.bool_]:
         """Parameters that the outputs do not feel at all, shape (P,)."""
-        return self.effects <= NO_EFFECT * np.nanmax(self.effects, initial=0.0)
+        return self.sensitivity.without_effect
 
 
 class Watcher(Protocol):
@@ -106,9 +109,9 @@ def fit(
     if settings.search.algorithm == "ga":
         found = {"best": compromise.best(theta, evaluation.overall)}
     else:
-        found = _from_front(theta, evaluation, settings.search.compromise)
+        found = _from_front(theta, evaluation, memo, settings.search.compromise)
     estimates = _estimates(problem, found)
-    final, polished = next(iter(estimates)), None
+    final, polished, last = next(iter(estimates)), None, problem
     if settings.polish is not None:
         start = min(estimates.values(), key=lambda e: e.rms if np.isfinite(e.rms) else np.inf)
         polished = _polish(problem, start, watch)
@@ -116,10 +119,10 @@ def fit(
         estimates |= _estimates(problem, {"polished": theta_polished[0]})
         final = "polished"
         if settings.refine:
-            freed = problem.freed()
-            polished = _polish(freed, estimates[final], watch)
-            theta_refined = freed.parameters.from_unit(polished.point[None])
-            estimates |= _estimates(freed, {"refined": theta_refined[0]})
+            last = problem.freed()
+            polished = _polish(last, estimates[final], watch)
+            theta_refined = last.parameters.from_unit(polished.point[None])
+            estimates |= _estimates(last, {"refined": theta_refined[0]})
             final = "refined"
     return Fit(
         estimates,
@@ -127,7 +130,7 @@ def fit(
         _front(theta, evaluation, memo),
         state.history,
         polished,
-        problem.effects(estimates[final].theta),
+        sensitivity(last, estimates[final].theta),
     )
 
 
@@ -148,12 +151,15 @@ def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]
     }
 
 
-def _from_front(theta: Array, evaluation: Evaluation, first: str) -> dict[str, Array]:
-    """The three ways to one estimate, the one that the settings ask for first."""
+def _from_front(theta: Array, evaluation: Evaluation, memo: Memo, first: str) -> dict[str, Array]:
+    """The three ways to one estimate, the one that the settings ask for first.
+
+    The best over the whole record may have left the population: it is taken from all that was simulated.
+    """
     found = {
         "average": compromise.average(theta, evaluation.segments),
         "utopia": compromise.utopia(theta, evaluation.segments),
-        "best": compromise.best(theta, evaluation.overall),
+        "best": memo.best,
     }
     return {first: found[first]} | found
 

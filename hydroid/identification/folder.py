@@ -81,7 +81,9 @@ class RunFolder:
         except (OSError, ValueError) as error:
             cure = "name a folder that `hydroid fit-mech --out` has made"
             raise RunError(
-                f"no run can be read ({type(error).__name__})", where=str(file), cure=cure
+                f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})",
+                where=str(file),
+                cure=cure,
             ) from None
         if not isinstance(content, dict):
             raise RunError("is not a run's description", where=str(file))

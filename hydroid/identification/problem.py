@@ -52,6 +52,7 @@ class Problem:
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self.stage = Stage(arm, settings)
+        self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
         self._simulations = [make_simulation(spec, arm, log, outputs, settings) for log in logs]
         self._measured = [log.angle[:, outputs].T for log in logs]  # (K, T) a log
@@ -102,17 +103,6 @@ class Problem:
         members = self.stage.members(theta)
         return [simulation.simulate(members).angle for simulation in self._simulations]
 
-    def effects(self, theta: Array, step: float = 1e-4) -> Array:
-        """Return how far each parameter moves the response: rms [rad] per 1 % of its value, shape (P,).
-
-        A value near 0 counts as a thousandth of the width of its bounds. NaN where the changed set diverges.
-        """
-        width = self.parameters.upper - self.parameters.lower
-        moved = theta + np.diag(step * np.maximum(np.abs(theta), 1e-3 * width))
-        change = self.residuals(np.vstack([theta, moved]))
-        rms = np.sqrt(np.mean((change[1:] - change[0]) ** 2, axis=1))
-        return rms * 0.01 / step
-
     def _chunks(self, n: int) -> Iterator[slice]:
         size = min(simulation.record.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
@@ -144,6 +134,11 @@ class Memo:
     def infeasible(self) -> int:
         """Sets whose simulation diverged."""
         return sum(not np.isfinite(overall) for _, overall in self._known.values())
+
+    @property
+    def best(self) -> Array:
+        """The set with the lowest objective over the whole record, shape (P,)."""
+        return np.frombuffer(min(self._known, key=lambda key: self._known[key][1]))
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Evaluate theta, shape (n, P), simulating what is new in it."""

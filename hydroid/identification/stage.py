@@ -1,9 +1,11 @@
 """The two stages of the article: which parameters are free, and where each enters (section 3, (15), (16))."""
 
+from collections.abc import Sequence
 from dataclasses import fields
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.parameters import nominal_parameters
@@ -51,6 +53,29 @@ class Stage:
             elif actuators is not None:
                 getattr(actuators, quantity)[:, slots] = theta[:, column, None] * HYDRAULIC_UNITS[quantity][1]
         return Members(ArmParameters(**arm), actuators)
+
+    def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
+        """Refuse commands that nothing turns into torque: in stage 1 every active joint needs gain and damping.
+
+        Args:
+            driven: joints that a log drives, shape (J,).
+            outputs: joints that are compared, 0-based.
+
+        Raises:
+            SettingsError: a joint without one.
+        """
+        if self._hydraulics is not None:
+            return
+        for quantity in ("gain", "damping"):
+            served = {
+                slot for n, slots in self._slots.items() if self._quantities[n] == quantity for slot in slots
+            }
+            for joint in sorted({*np.flatnonzero(driven).tolist(), *outputs} - served):
+                raise SettingsError(
+                    f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
+                    where="parameters",
+                    cure="add one, or leave the joint's command out with log.joints",
+                )
 
     def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
         """Set the arm's MJCF to theta, shape (P,): masses with inertias, dampers, springs, friction, gain.

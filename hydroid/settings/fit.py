@@ -1,5 +1,6 @@
 """A fit's settings: one YAML file a job, from the log's columns to the search."""
 
+import difflib
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -41,7 +42,8 @@ class ParameterSettings(Settings):
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
         if self.quantity not in UNITS:
-            raise ValueError(f"no quantity {self.quantity!r}; there are {', '.join(UNITS)}")
+            near = difflib.get_close_matches(self.quantity, UNITS, n=3, cutoff=0.4) or list(MECHANICAL_UNITS)
+            raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
         if (self.quantity == "mass") != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
         if self.link is not None and self.joints is not None:
@@ -106,6 +108,8 @@ class FitSettings(Settings):
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
+        if len(set(self.outputs)) < len(self.outputs):
+            raise ValueError("outputs: a joint stands there twice")
         for name, parameter in self.parameters.items():
             hydraulic = parameter.quantity in HYDRAULIC_UNITS
             if self.stage == "mech" and hydraulic:

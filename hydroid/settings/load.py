@@ -25,7 +25,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
         The mapping, and lines [1-based] by key path.
 
     Raises:
-        SettingsError: unreadable, not UTF-8, not YAML, or not a mapping.
+        SettingsError: unreadable, not UTF-8, not YAML, not a mapping, or a key that stands there twice.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -42,7 +42,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
     if not isinstance(values, dict):
         raise SettingsError("must be a mapping of settings", where=str(path), cure="write `key: value` lines")
     lines: dict[tuple[str, ...], int] = {}
-    _collect_lines(node, (), lines)
+    _collect_lines(node, (), lines, str(path))
     return values, lines
 
 
@@ -134,15 +134,19 @@ def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> str:
     return ", ".join(kind.model_fields)
 
 
-def _collect_lines(node: Any, path: tuple[str, ...], lines: dict[tuple[str, ...], int]) -> None:
+def _collect_lines(node: Any, path: tuple[str, ...], lines: dict[tuple[str, ...], int], source: str) -> None:
     lines[path] = node.start_mark.line + 1
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
-            _collect_lines(value, (*path, str(key.value)), lines)
-            lines[(*path, str(key.value))] = key.start_mark.line + 1
+            here = (*path, str(key.value))
+            if here in lines:
+                where = f"{source}, line {key.start_mark.line + 1}"
+                raise SettingsError(f"{'.'.join(here)} stands there twice", where=where)
+            _collect_lines(value, here, lines, source)
+            lines[here] = key.start_mark.line + 1
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
-            _collect_lines(value, (*path, str(index)), lines)
+            _collect_lines(value, (*path, str(index)), lines, source)
 
 
 def _line(loc: tuple[str, ...], lines: dict[tuple[str, ...], int]) -> str:
@@ -154,4 +158,4 @@ def _line(loc: tuple[str, ...], lines: dict[tuple[str, ...], int]) -> str:
 
 
 def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or type(error).__name__
+    return getattr(error, "strerror", None) or "it is not UTF-8 text"

@@ -1,0 +1,25 @@
+"""`hydroid plot-actuator`: what the parameters of an actuator mean, as curves."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hydroid.cli.options import ActuatorConfig, Params, Quiet, Set, overrides
+
+
+def plot_actuator(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figures.")],
+    params: Params = None,
+    config: ActuatorConfig = None,
+    joint: Annotated[int, typer.Option(help="Joint, 1 = azimuth, 2 = shoulder ...")] = 2,
+    setting: Set = None,
+    quiet: Quiet = False,
+) -> None:
+    """Draw an actuator's calibration, current, force, spool, opening, flow and torque (PNG and SVG)."""
+    from hydroid.viewer.choice import choose
+    from hydroid.viewer.show import plot_actuator
+
+    files = plot_actuator(choose(config, params, overrides(setting)), joint, out)
+    if not quiet:
+        typer.echo(str(files[0]))

@@ -1,0 +1,62 @@
+"""One actuator of a parameter set, ready to be drawn, and its figures as files."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from hydroid.arm.linkage import Cylinder, Rotary, linkage
+from hydroid.errors import SettingsError
+from hydroid.files import write_atomic
+from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.hydraulics.solenoid import curve_exists
+from hydroid.settings.arm import Arm
+from hydroid.simulation import Members
+
+
+@dataclass(frozen=True)
+class ActuatorCard:
+    """One joint's actuator: its parameters in SI as scalars, its linkage, the joint's range [deg]."""
+
+    title: str
+    parameters: ActuatorParameters
+    linkage: Cylinder | Rotary
+    range: tuple[float, float]
+
+
+def actuator_card(arm: Arm, member: Members, joint: int, source: str) -> ActuatorCard:
+    """Take one actuator, joint 1-based, out of a parameter set with hydraulics.
+
+    Raises:
+        SettingsError: no such joint, or no force-stroke curve runs through its two points.
+    """
+    if not 1 <= joint <= len(arm.joints):
+        raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
+    assert member.actuators is not None
+    all_joints = member.actuators
+    p = ActuatorParameters(**{f.name: getattr(all_joints, f.name)[0, joint - 1] for f in fields(all_joints)})
+    if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
+        raise SettingsError(
+            f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
+            f"and {p.force_2:g} N at {1e3 * p.stroke_2:g} mm",
+            where=source,
+            cure="it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
+        )
+    settings = arm.joints[joint - 1]
+    return ActuatorCard(f"Joint {joint}, {settings.name}", p, linkage(settings), settings.range)
+
+
+def write_actuator(out: Path, card: ActuatorCard) -> list[Path]:
+    """Write all curves as one figure and each as its own, PNG and SVG; return the files.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    from hydroid.report.plots import png, svg
+    from hydroid.report.plots.actuator import PANELS, overview, single
+
+    figures = {"actuator": overview(card)} | {name: single(card, name) for name in PANELS}
+    written: list[Path] = []
+    for name, figure in figures.items():
+        for ending, content in (("png", png(figure)), ("svg", svg(figure))):
+            written.append(out / f"{name}.{ending}")
+            write_atomic(written[-1], content)
+    return written

@@ -1,0 +1,202 @@
+"""The curves of one actuator, from the command to the joint: what its parameters mean at rest."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hydroid.arm.linkage import Rotary
+from hydroid.hydraulics.amplifier import coil_current
+from hydroid.hydraulics.calibration import side_voltage
+from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.hydraulics.solenoid import coil_force, force_curve, resting_stroke
+from hydroid.hydraulics.valve import conductance, opening, port_flow, spool
+from hydroid.parameters import Array
+from hydroid.report.actuator import ActuatorCard
+from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled
+
+SIDE_A: dict[str, Any] = {"color": SEARCH}
+SIDE_B: dict[str, Any] = {"color": POLISHED, "linestyle": (0, (5, 2))}
+_SHADES = ("#56B4E9", "#009E73", "#E69F00", "#CC79A7")
+_LITRES = 6e4
+"""L/min in a m³/s"""
+_COMMAND = np.linspace(-100.0, 100.0, 2001)
+_DROPS = (10.0, 50.0, 100.0)
+"""pressure drops at which flow is drawn against the spool [bar]"""
+_OPENINGS = (0.25, 0.5, 0.75, 1.0)
+
+
+@styled
+def overview(card: ActuatorCard) -> Figure:
+    """All panels of an actuator on one page."""
+    drawing = figure(11.0, 7.6)
+    drawing.suptitle(card.title, x=0.02, ha="left", fontsize=12, fontweight="bold")
+    for axes, panel in zip(drawing.subplots(4, 2).flat, PANELS.values(), strict=True):
+        panel(axes, card)
+    return drawing
+
+
+@styled
+def single(card: ActuatorCard, name: str) -> Figure:
+    """One panel, by its name in `PANELS`."""
+    drawing = figure(3.8)
+    axes = drawing.subplots()
+    PANELS[name](axes, card)
+    axes.set_title(f"{card.title}: {axes.get_title(loc='left').lower()}")
+    return drawing
+
+
+def _calibration(axes: Axes, card: ActuatorCard) -> None:
+    a, b = _voltages(card.parameters, _COMMAND)
+    _sides(axes, _COMMAND, a, b)
+    _name(axes, "Calibration, (2) and (3)", "command [%]", "voltage [V]")
+
+
+def _current(axes: Axes, card: ActuatorCard) -> None:
+    _sides(axes, _COMMAND, *_currents(card.parameters, _COMMAND))
+    axes.set_ylim(0, 1.1 * float(card.parameters.current_max))
+    _name(axes, "Coil current, (4)", "command [%]", "current [A]")
+
+
+def _force(axes: Axes, card: ActuatorCard) -> None:
+    p = card.parameters
+    coil, gap = _curve(p)
+    stroke = np.linspace(0.0, 1.08 * p.stroke_2, 400)
+    currents = {float(i) for i in (p.current_min, 0.5 * (p.current_min + p.current_max), p.current_max)}
+    for shade, current in zip(_SHADES, sorted(currents | {float(p.rated_current)}), strict=False):
+        drive = coil * current**2
+        axes.plot(1e3 * stroke, coil_force(drive, stroke, gap), color=shade, label=f"{current:.3g} A")
+        rest = resting_stroke(drive, gap, p.plunger_stiffness)
+        axes.plot(1e3 * rest, p.plunger_stiffness * rest, "o", color=shade, markeredgecolor="white", zorder=4)
+    axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=MEASURED, linewidth=1.0, label="spring")
+    points = 1e3 * np.array([p.stroke_1, p.stroke_2]), np.array([p.force_1, p.force_2])
+    axes.plot(*points, "D", color=POLISHED, markeredgecolor="white", label="F1, F2 (rated)")
+    axes.plot([], [], "o", color=GREY, label="at rest")
+    steepest = float(coil_force(coil * max(currents) ** 2, 0.0, gap))
+    axes.set_ylim(0, min(1.6 * float(p.force_1), 1.1 * steepest))
+    _name(axes, "Solenoid force, (5)", "stroke [mm]", "force [N]", "upper right")
+
+
+def _spool(axes: Axes, card: ActuatorCard) -> None:
+    p = card.parameters
+    axes.plot(_COMMAND, 1e3 * _displacement(p, _COMMAND), **SIDE_A)
+    for edge, label in ((0.0, "opens"), (p.slot_width, "fully open")):
+        for sign, overlap in ((1.0, p.overlap_a), (-1.0, p.overlap_b)):
+            at = 1e3 * sign * (overlap + edge)
+            dashes, once = ":" if edge else "--", label if sign > 0 else None
+            axes.axhline(float(at), color=GREY, linestyle=dashes, linewidth=1.0, label=once)
+    axes.set_ylim(*(1.2 * limit for limit in axes.get_ylim()))
+    _name(axes, "Spool at rest, (6)", "command [%]", "displacement [mm]", "upper left", 2)
+
+
+def _opening(axes: Axes, card: ActuatorCard) -> None:
+    at = _spool_range(card.parameters)
+    area = 1e6 * _area(card.parameters, at)
+    _sides(axes, 1e3 * at, np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan))
+    _name(axes, "Valve opening", "spool displacement [mm]", "opening [mm²]")
+
+
+def _flow(axes: Axes, card: ActuatorCard) -> None:
+    p = card.parameters
+    at = _spool_range(p)
+    for shade, drop in zip(_SHADES, _DROPS, strict=False):
+        axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, _area(p, at)), color=shade, label=f"{drop:g} bar")
+    axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
+    _name(axes, "Flow from the pump, (7)", "spool displacement [mm]", "flow [L/min]", "upper center", 3)
+
+
+def _pressure_flow(axes: Axes, card: ActuatorCard) -> None:
+    p = card.parameters
+    pressure = np.linspace(p.tank_pressure, p.supply_pressure, 400)
+    for shade, share in zip(_SHADES, _OPENINGS, strict=True):
+        flow = _pump_flow(p, p.supply_pressure - pressure, share * p.opening_a)
+        axes.plot(1e-5 * pressure, flow, color=shade, label=f"{100 * share:g} % open")
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
+    _name(
+        axes,
+        "Flow from the pump into A, (7)",
+        "pressure in chamber A [bar]",
+        "flow [L/min]",
+        "upper right",
+        2,
+    )
+
+
+def _torque(axes: Axes, card: ActuatorCard) -> None:
+    p = card.parameters
+    angle = np.linspace(*card.range, 400)
+    arm = card.linkage.moment_arm(np.radians(angle))
+    rotary = isinstance(card.linkage, Rotary)
+    arm = np.ones_like(angle) if rotary else arm  # a rotary actuator's areas are its displacement
+    most, least = p.supply_pressure, p.tank_pressure
+    axes.plot(angle, arm * (p.area_a * most - p.area_b * least), label="A at supply", **SIDE_A)
+    axes.plot(angle, arm * (p.area_a * least - p.area_b * most), label="B at supply", **SIDE_B)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    lever = "" if rotary else f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm"
+    _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
+
+
+PANELS = {
+    "calibration": _calibration,
+    "current": _current,
+    "force": _force,
+    "spool": _spool,
+    "opening": _opening,
+    "flow": _flow,
+    "pressure_flow": _pressure_flow,
+    "torque": _torque,
+}
+"""the panels by name, in the order of the chain"""
+
+
+def _voltages(p: ActuatorParameters, command: Array) -> tuple[Array, Array]:
+    return side_voltage(command, p.onset_a, p.full_a), side_voltage(-command, p.onset_b, p.full_b)
+
+
+def _currents(p: ActuatorParameters, command: Array) -> tuple[Array, Array]:
+    a, b = (coil_current(voltage, p.current_max, p.current_min) for voltage in _voltages(p, command))
+    return a, b
+
+
+def _curve(p: ActuatorParameters) -> tuple[float, float]:
+    coil, gap = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
+    return float(coil), float(gap)
+
+
+def _displacement(p: ActuatorParameters, command: Array) -> Array:
+    """Where the spool comes to rest [m]."""
+    coil, gap = _curve(p)
+    a, b = (resting_stroke(coil * i**2, gap, p.plunger_stiffness) for i in _currents(p, command))
+    return spool(a, b)
+
+
+def _spool_range(p: ActuatorParameters) -> Array:
+    """A little more than from full opening to full opening [m]."""
+    return np.linspace(-1.15 * (p.overlap_b + p.slot_width), 1.15 * (p.overlap_a + p.slot_width), 2001)
+
+
+def _area(p: ActuatorParameters, at: Array) -> Array:
+    return opening(at, p.opening_a, p.opening_b, p.slot_width, p.overlap_a, p.overlap_b, p.opening_exponent)
+
+
+def _pump_flow(p: ActuatorParameters, drop: Array | float, area: Array | float) -> Array:
+    """Flow [L/min] from the pump over a pressure drop [Pa] through an edge of area [m²] and its leakage."""
+    supply, gain, edge = p.supply_pressure, conductance(p.flow_coefficient, p.density), area + p.leakage
+    flow, _ = port_flow(
+        supply - drop, edge, 0.0, supply, p.tank_pressure, gain, p.transition_pressure, p.flow_limit
+    )
+    return _LITRES * flow
+
+
+def _sides(axes: Axes, at: Array, a: Array, b: Array) -> None:
+    axes.plot(at, a, label="side A", **SIDE_A)
+    axes.plot(at, b, label="side B", **SIDE_B)
+
+
+def _name(axes: Axes, title: str, across: str, up: str, place: Any = "best", columns: int = 1) -> None:
+    axes.set_title(title)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc=place, fontsize=8, ncols=columns, frameon=True, framealpha=0.8, edgecolor="none")

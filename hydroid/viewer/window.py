@@ -1,0 +1,132 @@
+"""A player on the screen, in MuJoCo's own viewer and in real time; or as pictures in a file."""
+
+import io
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import mujoco
+
+from hydroid.errors import RunError
+from hydroid.viewer.player import Player
+
+FRAME = 1 / 60
+"""between two pictures of the viewer [s]"""
+LATE = 0.1
+"""a machine too slow by this [s] shows slow motion instead of jumps"""
+CLOSING = 5.0
+"""the longest that closing the window may take [s]"""
+GIF_FRAME = 0.1
+"""between two pictures of a file [s]"""
+SIZE = 480, 360
+"""of a file's pictures [px]"""
+
+
+class Viewer(Protocol):
+    """What is used of `mujoco.viewer.Handle`."""
+
+    def is_running(self) -> bool: ...  # noqa: D102
+    def sync(self) -> None: ...  # noqa: D102
+    def set_texts(self, texts: Any) -> None: ...  # noqa: D102
+
+
+def play(
+    player: Player,
+    viewer: Viewer,
+    clock: Callable[[], float] = time.perf_counter,
+    sleep: Callable[[float], None] = time.sleep,
+) -> None:
+    """Show a player in real time until the window is closed; the viewer's reset starts it again.
+
+    Raises:
+        RunError: the simulation diverged.
+    """
+    begun = clock()
+    while viewer.is_running():
+        frame = clock()
+        begun += max(0.0, frame - begun - player.time - LATE) if player.time < player.duration else 0.0
+        player.advance(frame - begun)
+        viewer.set_texts((None, None, *player.words()))
+        viewer.sync()
+        if player.data.time < player.time:
+            player.restart()
+            begun = clock()
+        sleep(max(0.0, FRAME - (clock() - frame)))
+
+
+@contextmanager
+def window(player: Player) -> Generator[Viewer]:
+    """Open MuJoCo's viewer on a player's arm; it closes with the context.
+
+    Raises:
+        RunError: this machine cannot show a window.
+    """
+    others = set(threading.enumerate())
+    try:
+        import mujoco.viewer  # loads the window library, which a cluster may lack
+
+        if sys.platform != "darwin":
+            _try_window()
+        viewer = mujoco.viewer.launch_passive(player.model, player.data, show_left_ui=False)
+    except (ImportError, RuntimeError) as error:
+        cure = "without a display write a file with --gif OUT.gif"
+        raise RunError(f"no window can be opened ({error})", cure=cure) from None
+    drawing = set(threading.enumerate()) - others
+    try:
+        with viewer.lock():
+            viewer.cam.lookat[:] = player.model.stat.center
+            viewer.cam.distance = 2.3 * player.model.stat.extent
+            viewer.cam.azimuth, viewer.cam.elevation = (
+                135.0,
+                -25.0,
+            )  # where the model's camera `corner` stands
+        yield viewer
+    finally:
+        viewer.close()
+        for thread in drawing:  # a program that ends while it still draws crashes
+            thread.join(CLOSING)
+
+
+def _try_window() -> None:
+    """Open and close a hidden window: where the viewer cannot, it ends the whole program."""
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # glfw says in warnings what it returns as well
+        opened = glfw.init()
+        if opened:
+            glfw.window_hint(glfw.VISIBLE, False)
+            opened = glfw.create_window(64, 64, "", None, None)
+            glfw.terminate()
+    if not opened:
+        raise RuntimeError("no display, or no OpenGL on it")
+
+
+def animation(player: Player, camera: str = "corner") -> bytes:
+    """Render a player's record to its end as an animated GIF.
+
+    Raises:
+        RunError: the simulation diverged, or this machine cannot render.
+    """
+    from PIL import Image  # comes with matplotlib
+
+    try:
+        renderer = mujoco.Renderer(player.model, height=SIZE[1], width=SIZE[0])
+    except (mujoco.FatalError, ImportError, RuntimeError) as error:
+        cure = "install libEGL (Mesa's needs no GPU)"
+        raise RunError(f"no picture can be rendered ({error})", cure=cure) from None
+    frames: list[Image.Image] = []
+    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # most of the time where there is no GPU
+    with renderer:
+        for k in range(round(player.duration / GIF_FRAME) + 1):
+            player.advance(k * GIF_FRAME)
+            renderer.update_scene(player.data, camera)
+            frames.append(Image.fromarray(renderer.render()).quantize(128))
+    buffer = io.BytesIO()
+    pause = round(1e3 * GIF_FRAME)  # [ms]
+    frames[0].save(buffer, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
+    return buffer.getvalue()

@@ -15,8 +15,8 @@ def pseudo_random_log(
 ) -> Log:
     """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad].
 
-    A level that would take the sum of commands beyond ±`reach` [% s] is turned round: a hydraulic joint moves at a
-    speed, and an operator keeps it off its stops.
+    A level that would take the sum of commands beyond ±`reach` [% s] is turned round: a hydraulic joint moves
+    at a speed, and an operator keeps it off its stops.
     """
     rng = np.random.default_rng(seed)
     samples = round(duration / period)

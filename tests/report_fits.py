@@ -8,6 +8,7 @@ import numpy as np
 from hydroid.identification.fit import Estimate, Fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Evaluation, Problem
+from hydroid.identification.sensitivity import Sensitivity
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
 from hydroid.objective.segments import segment_objectives
@@ -104,7 +105,11 @@ def make_fit(
         ),
         history,
         polished,
-        np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(parameters.names)),
+        Sensitivity(
+            np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(parameters.names)),
+            np.zeros(len(parameters.names), dtype=bool),
+            free,
+        ),
     )
 
 

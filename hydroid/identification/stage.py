@@ -55,7 +55,7 @@ class Stage:
         return Members(ArmParameters(**arm), actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
-        """Refuse commands that nothing turns into torque: in stage 1 every active joint needs gain and damping.
+        """Refuse commands that nothing turns into torque: stage 1 needs gain and damping of active joints.
 
         Args:
             driven: joints that a log drives, shape (J,).
@@ -67,9 +67,8 @@ class Stage:
         if self._hydraulics is not None:
             return
         for quantity in ("gain", "damping"):
-            served = {
-                slot for n, slots in self._slots.items() if self._quantities[n] == quantity for slot in slots
-            }
+            serving = [slots for name, slots in self._slots.items() if self._quantities[name] == quantity]
+            served = {slot for slots in serving for slot in slots}
             for joint in sorted({*np.flatnonzero(driven).tolist(), *outputs} - served):
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",

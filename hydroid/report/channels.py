@@ -1,5 +1,6 @@
 """One output of one log as a reader meets it: its name, its joint, what was commanded and measured."""
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -81,9 +82,11 @@ def unique(name: str, taken: Collection[str]) -> str:
     return next(candidate for candidate in candidates if candidate not in taken)
 
 
-def pooled(problem: Problem, responses: Sequence[Array]) -> Array:
-    """Return an estimate's responses as one row beside `problem.measured` [rad], shape (R,)."""
-    return np.concatenate([response.T.ravel() for response in responses])
+def file_name(text: str, taken: Collection[str]) -> str:
+    """Return text of letters, digits, dot, dash and underscore, numbered where its lower case is taken."""
+    safe = re.sub(r"[^A-Za-z0-9._-]+", "_", text)
+    candidates = (f"{safe}_{n}" if n > 1 else safe for n in count(1))
+    return next(candidate for candidate in candidates if candidate.lower() not in taken)
 
 
 def short_name(name: str) -> str:

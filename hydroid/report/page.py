@@ -11,6 +11,11 @@ from hydroid.report.table import Table, number
 from hydroid.report.words import cautions, norm_label, summary
 
 _ALGORITHMS = {"ga": "simple genetic algorithm", "nsga2": "NSGA-II, a multi-objective genetic algorithm"}
+_PARETO = {
+    "ga": "The simple genetic algorithm minimises the error over the whole record and does not look for this "
+    "set: these are merely the sets of its last population that no other beats in every segment.",
+    "nsga2": "What the search was after: to fit one segment better than one of these does costs another.",
+}
 _CAPTIONS = {
     "estimates": "Every estimate between its bounds. Grey: held fixed, or without effect.",
     "learning": "Best parameter set so far, and the median of each population.",
@@ -50,7 +55,11 @@ def fit_page(
             pictures=tuple(Picture(figures[name], _RESPONSE) for name in responses),
         ),
         Section("How the search went", facts=_effort(fit), pictures=_pictures(figures, "learning")),
-        Section("The Pareto set", pictures=_pictures(figures, "pareto")),
+        Section(
+            "The Pareto set",
+            _PARETO[problem.settings.search.algorithm],
+            pictures=_pictures(figures, "pareto"),
+        ),
         Section("What to beware of", points=cautions(problem, fit)),
     )
     versions = {

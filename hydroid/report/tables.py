@@ -8,21 +8,23 @@ import numpy as np
 
 from hydroid.identification.fit import Estimate, Fit
 from hydroid.identification.problem import Problem
-from hydroid.identification.validation import ErrorIndices, error_indices
+from hydroid.identification.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.parameters import Array, Parameter, ParameterSet, relative_error
-from hydroid.report.channels import channels, pooled
+from hydroid.report.channels import channels
 from hydroid.report.table import Cell, Given, Table
 from hydroid.report.words import (
-    NOT_PROVEN,
     estimate_label,
     estimate_words,
     flags,
     in_reader_units,
     norm_label,
+    runs_flag,
+    told,
 )
 
 _INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
-_INDICES_NOTE = "fit = 100 % for a perfect response, 0 % for the mean of the measured angle."
+_INDICES_NOTE = "fit = 100 % for a perfect response, 0 % for the mean of the measured angle, a dash where it does not move."
+_POOLED_NOTE = " all: every joint about its own mean."
 
 
 def parameter_table(problem: Problem, fit: Fit, truth: Mapping[str, float] | None = None) -> Table:
@@ -51,7 +53,9 @@ def parameter_table(problem: Problem, fit: Fit, truth: Mapping[str, float] | Non
     if truth:
         without = [n for n, flag in zip(problem.parameters.names, said, strict=True) if "no effect" in flag]
         rows += _sum_rows(problem.parameters, [e.theta for e in judged], truth, without, 5 + len(names))
-    note = f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {NOT_PROVEN}"
+    note = (
+        f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(problem, fit)}"
+    )
     return Table("Parameters", tuple(header), tuple(rows), note)
 
 
@@ -70,13 +74,13 @@ def objective_table(problem: Problem, fit: Fit) -> Table:
                 (label, c.log, c.joint, *_indices(indices), None if several else _overall(problem, estimate))
             )
         if several:
-            indices = error_indices(problem.measured, pooled(problem, estimate.responses))
+            indices = pooled_indices([(c.measured, c.simulated(estimate.responses)) for c in known])
             rows.append((label, "all", None, *_indices(indices), _overall(problem, estimate)))
     return Table(
         "Output error on the fitted logs",
         ("estimate", "log", "joint", *_INDICES, objective),
         tuple(rows),
-        f"{_INDICES_NOTE} objective: {norm_label(settings)} over the whole record.",
+        f"{_INDICES_NOTE}{_POOLED_NOTE if several else ''} objective: {norm_label(settings)} over the whole record.",
     )
 
 
@@ -135,23 +139,24 @@ def runs_table(
         parameters: the parameters.
         results: one a seed.
         truth: true values by name; adds the relative error of the median, and the spread of each seed's sum.
-        ignore: parameters left out of that sum, having no effect.
+        ignore: parameters left out of that sum, having no effect in any run.
         what: which estimate of the runs this is.
     """
     theta = np.array([r.theta for r in results])
     header = ["name", "unit", "median", "lowest", "lower quartile", "upper quartile", "highest"]
-    end: tuple[Cell, ...] = (None, None) if truth else ()
+    end: tuple[Cell, ...] = (None, None, "") if truth else ("",)
     rows: list[tuple[Cell, ...]] = []
     for i, p in enumerate(parameters.parameters):
         spread = _spread(theta[:, i])
         true = truth.get(p.name) if truth else None
         compared = (Given(true) if true is not None else None, _relative(spread[0], true)) if truth else ()
-        rows.append((p.name, p.unit, *spread, *compared))
+        rows.append((p.name, p.unit, *spread, *compared, runs_flag(p, theta[:, i], ignore)))
     rows.append(("rms output error", "deg", *_spread(np.degrees([r.rms for r in results])), *end))
     if truth:
         header += ["true", "relative error of the median"]
         sums = np.array([_error_sum(parameters, r.theta, truth, ignore) for r in results])
         rows.append((f"sum of relative errors{_but(ignore)}", "", *_spread(sums), *end))
+    header.append("flag")
     seeds = ", ".join(str(r.seed) for r in results)
     return Table(f"{len(results)} runs, {what}", tuple(header), tuple(rows), f"Seeds: {seeds}.")
 

@@ -1,23 +1,19 @@
 """What the numbers of a fit mean, in words and in a reader's units."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydroid.identification.fit import Fit
 from hydroid.identification.problem import Problem
-from hydroid.parameters import Array
+from hydroid.parameters import Array, Parameter
 from hydroid.report.table import number, plain
 from hydroid.settings.objective import ObjectiveSettings
 
 AT_BOUND = 1e-3
 """an estimate is called at a bound within this part of the range"""
-
-NOT_PROVEN = (
-    "A small output error alone does not prove the parameters. One whose effect is nil or tiny is not "
-    "determined by these logs, and changes of several parameters may cancel in the output."
-)
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
@@ -63,23 +59,50 @@ def _flag(problem: Problem, fit: Fit, i: int) -> str:
     freed = fit.final == "refined" and parameter.lower < parameter.upper
     if parameter.fixed is not None and not freed:
         return "held fixed"
-    margin = AT_BOUND * (parameter.upper - parameter.lower)
     found: list[str] = []
     if fit.without_effect[i]:
         found.append("no effect on the outputs")
+    elif fit.sensitivity.undetermined[i]:
+        found.append("not determined alone")
     if math.isnan(fit.effects[i]):
         found.append("effect unknown, the changed arm diverges")
-    if value - parameter.lower <= margin:
-        found.append("at lower bound")
-    if parameter.upper - value <= margin:
-        found.append("at upper bound")
+    found += [f"at {side} bound" for side, at in _at_bounds(parameter, value) if at]
     return ", ".join(found)
+
+
+def runs_flag(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
+    """What is to be known about a parameter over several runs, values of shape (N,); empty where nothing is."""
+    if not parameter.lower < parameter.upper or (parameter.fixed is not None and not np.ptp(values)):
+        return "held fixed"
+    if parameter.name in without_effect:
+        return "no effect on the outputs"
+    counts = ((side, int(np.sum(at))) for side, at in _at_bounds(parameter, values))
+    return ", ".join(f"at {side} bound in {n} of {len(values)} runs" for side, n in counts if n)
+
+
+def _at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Whether values lie at each bound."""
+    margin = AT_BOUND * (parameter.upper - parameter.lower)
+    return (
+        ("lower", np.asarray(value - parameter.lower <= margin)),
+        ("upper", np.asarray(parameter.upper - value <= margin)),
+    )
+
+
+def told(problem: Problem, fit: Fit) -> str:
+    """How much these logs tell, in a sentence or two."""
+    free = sum(flag != "held fixed" for flag in flags(problem, fit))
+    return (
+        f"These logs determine {fit.sensitivity.combinations} independent combinations of the {free} free "
+        "parameters. One that is not determined alone may change by a third or more while others make up for "
+        "it: a small output error does not prove it."
+    )
 
 
 def cautions(problem: Problem, fit: Fit) -> tuple[str, ...]:
     """What a reader of the answer should beware of, one sentence or two each."""
     flagged = list(zip(problem.parameters.parameters, flags(problem, fit), strict=True))
-    said = [NOT_PROVEN]
+    said = [told(problem, fit)]
     idle = [p.name for p, flag in flagged if "no effect" in flag]
     if idle:
         said.append(

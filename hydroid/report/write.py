@@ -14,7 +14,7 @@ from hydroid.identification.search import HISTORY
 from hydroid.identification.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.report.channels import Channel, channel, channels, log_names, short_name, unique
+from hydroid.report.channels import Channel, channel, channels, file_name, log_names, short_name, unique
 from hydroid.report.table import Table
 from hydroid.report.tables import (
     SeedResult,
@@ -107,7 +107,7 @@ def write_runs(
     tables = {name: runs_table(parameters, runs, truth, ignore, name) for name, runs in found.items()}
     for name, table in tables.items():
         _write_table(out, f"runs_{name}", table)
-    figure = plots.runs(parameters, found, truth)
+    figure = plots.runs(parameters, found, truth, ignore)
     _write_figure(out, "runs", figure, plots.svg(figure))
     return list(tables.values())[-1]
 
@@ -129,9 +129,12 @@ def write_validation(out: Path, results: Sequence[Validated]) -> Table:
             name = unique(short_name(result.fit), overlay)
             overlay[name] = result.response[:, column]
             rows.append(ValidationRow(name, record.log, joint, indices))
-    for number, (record, overlay) in enumerate(overlays.values(), start=1):
+    taken: set[str] = set()
+    for record, overlay in overlays.values():
         figure = plots.validation(record, overlay)
-        _write_figure(out, f"validation_{number}", figure, plots.svg(figure))
+        name = file_name(f"validation_{Path(record.log).stem}_joint_{record.joint}", taken)
+        taken.add(name.lower())
+        _write_figure(out, name, figure, plots.svg(figure))
     table = validation_table(rows)
     _write_table(out, "validation", table)
     return table

@@ -1,6 +1,6 @@
 """Parameters against their bounds: the estimates of one fit, or the spread over several runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +24,7 @@ from hydroid.report.plots.style import (
 )
 from hydroid.report.table import number, plain
 from hydroid.report.tables import SeedResult
-from hydroid.report.words import estimate_label, flags
+from hydroid.report.words import estimate_label, flags, runs_flag
 
 _BAR = 0.36
 _ROW = 0.44  # [in]
@@ -66,6 +66,7 @@ def runs(
     parameters: ParameterSet,
     results: Mapping[str, Sequence[SeedResult]],
     truth: Mapping[str, float] | None = None,
+    ignore: Collection[str] = (),
 ) -> Figure:
     """Spread over seeds: each parameter within its bounds, and the output error, one dot a run.
 
@@ -73,6 +74,7 @@ def runs(
         parameters: the parameters.
         results: runs by the name of their estimate, such as `search` and `polished`, in that order.
         truth: true values by name.
+        ignore: parameters without effect in any run, drawn grey.
     """
     rows = parameters.parameters
     drawing = figure(1.9 + _ROW * len(rows) + 0.25 * len(results))
@@ -82,15 +84,17 @@ def runs(
     upper.text(_TEXT_AT, -0.7, final, fontsize=9, fontweight="bold", va="center")
     looks = dict(zip(results, ((SEARCH, "o"), (POLISHED, "D"), *OTHER_LOOKS), strict=False))
     for row, parameter in enumerate(rows):
-        bounded = _bar(upper, row, parameter, dull=parameter.lower == parameter.upper)
+        dull = parameter.name in ignore
+        bounded = _bar(upper, row, parameter, dull=dull)
         for k, (name, found) in enumerate(results.items()):
             values = np.array([r.theta[row] for r in found])
             if bounded:
                 at = _normal(parameter, values)
-                _dots(upper, at, row + _lane(k, len(results)), *looks[name])
+                color, mark = looks[name]
+                _dots(upper, at, row + _lane(k, len(results)), GREY if dull else color, mark)
         if bounded:
             _true(upper, row, parameter, truth)
-        _text(upper, row, *_median_and_range(parameter, np.array([r.theta[row] for r in final_runs])))
+        _text(upper, row, *_median_and_range(parameter, np.array([r.theta[row] for r in final_runs]), ignore))
     for k, (name, found) in enumerate(results.items()):
         _dots(lower, finite(np.degrees([r.rms for r in found])), float(k), *looks[name])
         upper.plot([], [], looks[name][1], color=looks[name][0], markeredgecolor="white", label=name)
@@ -162,11 +166,13 @@ def _lane(k: int, count: int) -> float:
     return 0.0 if count < 2 else (k / (count - 1) - 0.5) * 0.26
 
 
-def _median_and_range(parameter: Parameter, values: Array) -> tuple[str, str]:
-    if parameter.fixed is not None and not np.ptp(values):
-        return f"{number(parameter.fixed)} {parameter.unit}", "held fixed"
-    low, high = number(float(values.min())), number(float(values.max()))
-    return f"median {number(float(np.median(values)))} {parameter.unit}", f"{low} to {high}"
+def _median_and_range(parameter: Parameter, values: Array, ignore: Collection[str]) -> tuple[str, str]:
+    """Median, and below it what is to be known or else the range."""
+    median = f"{number(float(np.median(values)))} {parameter.unit}"
+    flag = runs_flag(parameter, values, ignore)
+    if flag == "held fixed":
+        return median, flag
+    return f"median {median}", flag or f"{number(float(values.min()))} to {number(float(values.max()))}"
 
 
 def _true(axes: Axes, row: int, parameter: Parameter, truth: Mapping[str, float] | None) -> None:

@@ -144,22 +144,6 @@ def _tick(value: float, _: int | None) -> str:
     return plain(value)
 
 
-def span(parts: Sequence[Array], core: Array, room: float = 0.5) -> tuple[float, float]:
-    """Limits [unit of the data] around all parts, but no farther from `core` than `room` times its own range.
-
-    A response that runs away must not flatten those worth looking at.
-    """
-    known = core[np.isfinite(core)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (-1.0, 1.0)
-    reach = room * (high - low) or 1.0
-    rest = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
-    if rest.size:
-        low = max(min(low, float(rest.min())), low - reach)
-        high = min(max(high, float(rest.max())), high + reach)
-    margin = 0.06 * (high - low) or 0.5
-    return low - margin, high + margin
-
-
 def every(count: int, most: int) -> int:
     """Step that leaves at most `most` of `count` labels."""
     return max(1, math.ceil(count / most))

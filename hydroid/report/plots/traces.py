@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,13 +22,15 @@ from hydroid.report.plots.style import (
     figure,
     finite,
     legend_below,
-    span,
     styled,
 )
 from hydroid.report.table import number
 from hydroid.report.words import estimate_label
 
 _NUMBER_ROOM = 0.035  # of the width, for a segment's number
+_RUNAWAY = 3.0  # motions of the measured angle: a response farther off than that has run away
+_STILL = 1.0  # [deg] motion that counts at least, or a joint at rest would call everything a runaway
+_LEAST_ANGLE, _LEAST_RESIDUAL = 0.1, 1e-6  # [deg] height of a panel at least: no picture of rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +40,6 @@ class _Trace:
     label: str
     angle: Array
     color: str
-    width: float
-    dashes: tuple[float, ...] = ()
 
 
 @styled
@@ -50,11 +51,11 @@ def response(problem: Problem, fit: Fit, channel: Channel) -> Figure:
         angle = np.degrees(finite(channel.simulated(fit.estimates[name].responses)))
         label = estimate_label(fit, name)
         if name == fit.searched.name:
-            traces.append(_Trace(label, angle, SEARCH, 1.5))
+            traces.append(_Trace(label, angle, SEARCH))
         elif name == fit.final:
-            traces.append(_Trace(label, angle, POLISHED, 1.5))
+            traces.append(_Trace(label, angle, POLISHED))
         else:
-            traces.append(_Trace(label, angle, next(others), 0.9, (3, 1.5)))
+            traces.append(_Trace(label, angle, next(others)))
     return _traces(f"Joint {channel.joint} in {channel.log}", channel, traces)
 
 
@@ -63,13 +64,7 @@ def validation(channel: Channel, simulated: Mapping[str, Array]) -> Figure:
     """Measured angle of a log and the responses [rad], shape (T,), of several fits by name."""
     colors = (POLISHED, SEARCH, *OTHERS)
     traces = [
-        _Trace(
-            name,
-            np.degrees(finite(angle)),
-            colors[i % len(colors)],
-            1.4,
-            (4, 1.5) if i >= len(colors) else (),
-        )
+        _Trace(name, np.degrees(finite(angle)), colors[i % len(colors)])
         for i, (name, angle) in enumerate(simulated.items())
     ]
     return _traces(f"Joint {channel.joint} in {channel.log}", channel, traces)
@@ -81,16 +76,14 @@ def _traces(title: str, channel: Channel, traces: Sequence[_Trace]) -> Figure:
     measured = np.degrees(channel.measured)
     upper.plot(channel.time, measured, color=MEASURED, linewidth=2.4, alpha=0.6, label="measured")
     for order, trace in enumerate(traces):
-        depth = 3 - order / 100  # the first is the most important and lies on top
-        _plot(upper, channel.time, trace.angle, trace, depth, _with_rms(trace, measured))
-        _plot(middle, channel.time, measured - trace.angle, trace, depth)
-    upper.set_ylim(span([t.angle for t in traces], measured))
+        look = _look(order, len(traces))
+        upper.plot(channel.time, trace.angle, color=trace.color, label=_with_rms(trace, measured), **look)
+        middle.plot(channel.time, measured - trace.angle, color=trace.color, **look)
+    reach = _RUNAWAY * max(float(np.ptp(measured)), _STILL)
+    upper.set_ylim(_around([t.angle for t in traces], measured, reach, _LEAST_ANGLE))
     residuals = [measured - t.angle for t in traces]
-    # the best response sets the scale: others may leave the frame
-    closest = min(
-        residuals, key=lambda r: np.inf if np.isnan(r).any() else float(np.ptp(r)), default=measured
-    )
-    middle.set_ylim(span(residuals, np.append(closest, 0.0), room=2.0))
+    near = [r for r in residuals if np.nanmax(np.abs(r), initial=0.0) <= reach]
+    middle.set_ylim(_around(near or residuals, np.zeros(1), reach, _LEAST_RESIDUAL))
     middle.axhline(0.0, color=MEASURED, linewidth=0.8)
     lower.step(channel.time, channel.command, where="post", color=GREY, linewidth=1.1)
     lower.set_ylim(-108, 108)
@@ -110,17 +103,29 @@ def _traces(title: str, channel: Channel, traces: Sequence[_Trace]) -> Figure:
     return drawing
 
 
-def _plot(axes: Axes, time: Array, angle: Array, trace: _Trace, depth: float, label: str = "") -> None:
-    style = (0, trace.dashes) if trace.dashes else "-"
-    axes.plot(
-        time,
-        angle,
-        color=trace.color,
-        linewidth=trace.width,
-        linestyle=style,
-        label=label or None,
-        zorder=depth,
-    )
+def _look(order: int, count: int) -> dict[str, Any]:
+    """Line of one of several responses: where they coincide, each still shows through those drawn after it.
+
+    The first is wide and whole; later ones lie on it, narrower, each dashed in a place of its own.
+    """
+    width = max(0.8, 2.4 * 0.8**order)
+    slots = min(count, 4)
+    # [pt], which matplotlib multiplies by the width
+    dash, gap, offset = (length / width for length in (5.0, 5.0 * (slots - 1), -5.0 * (order % slots)))
+    style = (offset, (dash, gap)) if order else "-"
+    return {"linewidth": width, "linestyle": style, "dash_capstyle": "butt", "zorder": 3 + order / 100}
+
+
+def _around(curves: Sequence[Array], core: Array, reach: float, least: float) -> tuple[float, float]:
+    """Limits [deg] around core and all curves, as far as `reach` beyond the core, and at least `least` apart.
+
+    A response that runs away must not flatten those worth looking at.
+    """
+    low, high = float(core.min()), float(core.max())
+    known = np.concatenate([core, *(curve[np.isfinite(curve)] for curve in curves)])
+    low, high = max(float(known.min()), low - reach), min(float(known.max()), high + reach)
+    margin = max(0.06 * (high - low), (least - (high - low)) / 2)
+    return low - margin, high + margin
 
 
 def _with_rms(trace: _Trace, measured: Array) -> str:

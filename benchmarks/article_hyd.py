@@ -17,6 +17,7 @@ from pseudo_random import pseudo_random_log
 from hydroid.identification.fit import fit
 from hydroid.identification.problem import Problem
 from hydroid.jobs import load_settings, simulate_log
+from hydroid.log import Log
 from hydroid.parameters import relative_error
 
 TRUTH = {  # table 7
@@ -50,7 +51,12 @@ def main() -> None:
         if arguments.unpinned:
             changes |= {f"parameters.{name}.fixed": None for name in PINS}
         settings, arm = load_settings("article-hyd", changes)
-        log = pseudo_random_log(arm.pose("study"), [2], reach=100.0)
+
+        def off_the_stops(log: Log) -> bool:
+            angle = np.rad2deg(simulate_log(settings, arm, log, TRUTH, "truth").angle[:, 1])  # noqa: B023
+            return angle.min() > -20 and angle.max() < 80
+
+        log = pseudo_random_log(arm.pose("study"), [2], allowed=off_the_stops)
         problem = Problem(arm, settings, [simulate_log(settings, arm, log, TRUTH, "truth")])
         started = time.perf_counter()
         found = fit(problem, lambda state, memo: None, Silent())

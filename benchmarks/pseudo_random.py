@@ -1,5 +1,7 @@
 """Pseudo-random commands for the studies: random levels and dwells, as in the article's figure 17."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hydroid.log import Log
@@ -11,25 +13,27 @@ def pseudo_random_log(
     duration: float = 75.0,
     period: float = 0.01,
     seed: int = 0,
-    reach: float = np.inf,
+    allowed: Callable[[Log], bool] = lambda log: True,
 ) -> Log:
     """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad].
 
-    A level that would take the sum of commands beyond ±`reach` [% s] is turned round: a hydraulic joint moves
-    at a speed, and an operator keeps it off its stops.
+    A level after which `allowed` is false of the log so far is turned round, as an operator would who keeps
+    the arm off its stops.
     """
     rng = np.random.default_rng(seed)
     samples = round(duration / period)
     command = np.zeros((samples, len(pose)))
+
+    def upto(end: int) -> Log:
+        angle = np.tile(pose, (end, 1))
+        return Log("pseudo-random", np.arange(end) * period, command[:end], angle, period)
+
     for joint in joints:
-        start, total = 0, 0.0
+        start = 0
         while start < samples:
             dwell = round(rng.uniform(1.0, 5.0) / period)
-            level = round(rng.uniform(-100.0, 100.0), 1)
-            if abs(total + level * dwell * period) > reach:
-                level = -np.sign(total) * abs(level)
-            command[start : start + dwell, joint - 1] = level
-            total += level * dwell * period
+            command[start : start + dwell, joint - 1] = round(rng.uniform(-100.0, 100.0), 1)
+            if not allowed(upto(min(start + dwell, samples))):
+                command[start : start + dwell, joint - 1] *= -1
             start += dwell
-    angle = np.tile(pose, (samples, 1))
-    return Log("pseudo-random", np.arange(samples) * period, command, angle, period)
+    return upto(samples)

@@ -6,6 +6,8 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from report_fits import make_fit, make_problem
@@ -194,8 +196,54 @@ def test_validation_overlays_every_fit():
     labels = [line.get_label() for line in figure.axes[0].lines]
     assert len(labels) == 11
     assert labels[-1] == "gone (diverged)"
-    looks = {(line.get_color(), str(line.get_linestyle())) for line in figure.axes[0].lines[1:]}
+    looks = {(line.get_color(), line.get_linewidth()) for line in figure.axes[0].lines[1:]}
     assert len(looks) == 10
+
+
+def test_responses_that_coincide_are_all_seen():
+    problem = make_problem()
+    channel = channels(problem)[0]
+    shown = channel.measured + 0.01
+    figure = plots.validation(channel, {"ga": shown, "nsga2": shown, "again": shown})
+    upper, middle, lower = figure.axes
+    figure.legends[0].remove()
+    upper.remove()
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3].reshape(-1, 3).astype(float)
+    for line in middle.lines[:3]:
+        color = 255 * np.array(to_rgb(line.get_color()))
+        assert np.sum(np.abs(pixels - color).max(axis=1) < 40) > 50
+
+
+@pytest.mark.parametrize("worst", [1e-8, 1e-3, 1.0, 40.0])
+def test_panels_hold_every_response_that_does_not_run_away(worst: float):
+    problem = make_problem()
+    channel = channels(problem)[0]
+    wave = np.sin(channel.time * 5)
+    simulated = {
+        "good": channel.measured + np.radians(1e-9) * wave,
+        "bad": channel.measured + np.radians(worst) * wave,
+    }
+    upper, middle, _ = plots.validation(channel, simulated).axes
+    for axes in (upper, middle):
+        low, high = axes.get_ylim()
+        drawn = np.concatenate([line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2])
+        assert low < drawn.min()
+        assert drawn.max() < high
+        assert high - low < 1.3 * max(np.ptp(drawn), 1e-6)
+
+
+def test_a_joint_at_rest_is_drawn_without_its_rounding():
+    problem = make_problem()
+    channel = channels(problem)[0]
+    rest = replace(channel, measured=0.5 + 1e-16 * np.sin(channel.time))
+    figure = plots.validation(rest, {"rests": rest.measured, "moves": rest.measured + 0.01 * channel.time})
+    check(figure)
+    assert all(np.ptp(axes.get_ylim()) > 0.5 for axes in figure.axes[:2])
+    alone = plots.validation(rest, {"rests": rest.measured})
+    check(alone)
+    assert np.ptp(alone.axes[0].get_ylim()) > 0.01
 
 
 @pytest.mark.parametrize("names", [("search",), ("search", "polished")])
@@ -214,6 +262,21 @@ def test_runs_show_one_dot_a_seed(names: tuple[str, ...], count: int):
         dots = [line for line in axes.lines if line.get_marker() in ("o", "D") and len(line.get_xdata())]
         assert len(dots) == rows * len(names)
         assert all(len(line.get_xdata()) == count for line in dots)
+
+
+def test_runs_say_what_lies_at_a_bound_or_has_no_effect():
+    problem = make_problem()
+    theta = problem.parameters.from_unit(np.array([[1.0, 0.5, 0.3, 0.0], [1.0, 0.6, 0.3, 0.4]]))
+    results = {"search": [SeedResult(s, t, 0.01) for s, t in enumerate(theta)]}
+    figure = plots.runs(problem.parameters, results, ignore=["M1"])
+    check(figure)
+    said = [text.get_text() for text in figure.axes[0].texts]
+    for words in (
+        "at upper bound in 2 of 2 runs",
+        "no effect on the outputs",
+        "at lower bound in 1 of 2 runs",
+    ):
+        assert said.count(words) == 1
 
 
 def test_runs_that_diverged_leave_the_error_axis_whole():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from report_fits import MODEL, make_fit, make_problem
 
-from hydroid.identification.validation import error_indices
+from hydroid.identification.validation import error_indices, pooled_indices
 from hydroid.report.channels import channels, log_names
 from hydroid.report.table import Table
 from hydroid.report.tables import (
@@ -90,6 +90,33 @@ def test_errors_are_those_of_the_responses():
         assert row[5] == pytest.approx(row[-1])  # the norm is the largest error
 
 
+def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
+    problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
+    fit = make_fit(problem, names=("best",))
+    *_, everything = objective_table(problem, fit).rows
+    error = spread = 0.0
+    for c in channels(problem):
+        error += np.sum((c.measured - c.simulated(fit.best.responses)) ** 2)
+        spread += np.sum((c.measured - np.mean(c.measured)) ** 2)
+    assert everything[6] == pytest.approx(100 * (1 - np.sqrt(error / spread)))
+
+
+def test_the_fit_of_all_joints_does_not_change_with_where_they_stand():
+    rng = np.random.default_rng(2)
+    pairs = [(y, y + 0.1 * rng.normal(size=50)) for y in rng.normal(size=(3, 50))]
+    moved = [(y + shift, s + shift) for (y, s), shift in zip(pairs, (0.0, 5.0, -70.0), strict=True)]
+    assert pooled_indices(moved).fit == pytest.approx(pooled_indices(pairs).fit)
+
+
+def test_a_joint_that_moves_by_rounding_has_no_fit():
+    rest = 0.3 + 1e-16 * np.arange(1000)
+    assert np.ptp(rest) > 0
+    for indices in (error_indices(rest, rest + 0.1), pooled_indices([(rest, rest + 0.1)] * 2)):
+        assert np.isnan(indices.fit)
+    table = validation_table([ValidationRow("ga", "a.csv", 2, error_indices(rest, rest + 0.1))])
+    assert "| – |" in table.markdown()
+
+
 def test_a_relative_objective_has_no_unit():
     problem = make_problem(relative=True, norm=2)
     fit = make_fit(problem)
@@ -146,6 +173,21 @@ def test_runs_give_median_and_spread_whatever_the_order():
     assert column(table, "lowest")[:4] == list(theta.min(axis=0))
     assert column(table, "highest")[-1] == pytest.approx(np.degrees(0.08))
     assert runs_table(problem.parameters, results[::-1]).rows == table.rows
+
+
+def test_runs_keep_the_flags():
+    problem = make_problem(fixed={"D": 80.0})
+    theta = problem.parameters.from_unit(np.array([[1.0, 0.3, 0.0], [1.0, 0.3, 0.4], [1.0, 0.5, 0.4]]))
+    table = runs_table(
+        problem.parameters, [SeedResult(s, t, 0.1) for s, t in enumerate(theta)], ignore=["M1"]
+    )
+    assert column(table, "flag") == [
+        "at upper bound in 3 of 3 runs",
+        "held fixed",
+        "no effect on the outputs",
+        "at lower bound in 1 of 3 runs",
+        "",
+    ]
 
 
 def test_runs_sum_relative_errors_seed_by_seed():

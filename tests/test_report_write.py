@@ -172,4 +172,24 @@ def test_validation_overlays_fits_that_saw_the_same_record(tmp_path: Path):
     assert [row[0] for row in table.rows] == ["ga", "ga", "ga (2)", "ga (2)", "later", "later"]
     assert {row[2] for row in table.rows} == {2, 4}
     # two joints, and again for the fit whose record is another one
-    assert len(list((tmp_path / "figures").glob("*.png"))) == 4
+    names = {p.stem for p in (tmp_path / "figures").glob("*.png")}
+    assert names == {f"validation_a_joint_{j}{again}" for j in (2, 4) for again in ("", "_2")}
+
+
+def test_figures_of_a_validation_are_named_safely_and_apart(tmp_path: Path):
+    logs = [replace(make_problem().logs[0], source=s) for s in (HOSTILE, "A.csv", "x/a.csv", "../日 志.csv")]
+    results = [Result("ga", log, log.angle[:, [1]], {2: error_indices(*log.angle.T[:2])}) for log in logs]
+    write_validation(tmp_path, results)
+    names = [p.stem for p in (tmp_path / "figures").glob("*.svg")]
+    assert len({name.lower() for name in names}) == len(logs)
+    assert all(re.fullmatch(r"validation_[A-Za-z0-9._-]+_joint_2(_2)?", name) for name in names)
+
+
+@pytest.mark.parametrize("algorithm", ["ga", "nsga2"])
+def test_the_page_says_what_the_pareto_set_of_a_simple_ga_is(tmp_path: Path, algorithm: str):
+    problem = make_problem()
+    search = problem.settings.search.model_copy(update={"algorithm": algorithm})
+    problem.settings = problem.settings.model_copy(update={"search": search})
+    write_report(folder(tmp_path), problem, make_fit(problem, names=("best",)))
+    text = Page((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert ("does not look for this set" in text) == (algorithm == "ga")

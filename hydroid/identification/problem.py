@@ -124,16 +124,13 @@ class Memo:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self._known: dict[bytes, tuple[Array, float]] = {}
+        self.infeasible = 0
+        """sets whose simulation diverged"""
 
     @property
     def simulated(self) -> int:
         """Sets simulated so far."""
         return len(self._known)
-
-    @property
-    def infeasible(self) -> int:
-        """Sets whose simulation diverged."""
-        return sum(not np.isfinite(overall) for _, overall in self._known.values())
 
     @property
     def best(self) -> Array:
@@ -150,6 +147,7 @@ class Memo:
 
     def _keep(self, theta: Array) -> None:
         result = self.problem.evaluate(theta)
+        self.infeasible += int(np.sum(~np.isfinite(result.overall)))
         for row, segments, overall in zip(theta, result.segments, result.overall, strict=True):
             self._known[row.tobytes()] = (segments, float(overall))
 
@@ -162,3 +160,4 @@ class Memo:
     def restore(self, theta: Array, values: Array) -> None:
         """Take back what `arrays` returned."""
         self._known = {t.tobytes(): (v[:-1].copy(), float(v[-1])) for t, v in zip(theta, values, strict=True)}
+        self.infeasible = int(np.sum(~np.isfinite(values[:, -1])))

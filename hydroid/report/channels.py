@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.identification.problem import Problem
 from hydroid.log import Log
 from hydroid.parameters import Array

@@ -23,7 +23,9 @@ from hydroid.report.words import (
 )
 
 _INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
-_INDICES_NOTE = "fit = 100 % for a perfect response, 0 % for the mean of the measured angle, a dash where it does not move."
+_INDICES_NOTE = (
+    "fit = 100 % for a perfect response, 0 % for the mean of the measured angle; a dash: it does not move."
+)
 _POOLED_NOTE = " all: every joint about its own mean."
 
 
@@ -64,6 +66,7 @@ def objective_table(problem: Problem, fit: Fit) -> Table:
     known = channels(problem)
     several = len(known) > 1
     settings = problem.settings.objective
+    about = f"{_INDICES_NOTE}{_POOLED_NOTE if several else ''}"
     objective = "objective [-]" if settings.relative else "objective [deg]"
     rows: list[tuple[Cell, ...]] = []
     for name, estimate in fit.estimates.items():
@@ -80,7 +83,7 @@ def objective_table(problem: Problem, fit: Fit) -> Table:
         "Output error on the fitted logs",
         ("estimate", "log", "joint", *_INDICES, objective),
         tuple(rows),
-        f"{_INDICES_NOTE}{_POOLED_NOTE if several else ''} objective: {norm_label(settings)} over the whole record.",
+        f"{about} objective: {norm_label(settings)} over the whole record.",
     )
 
 

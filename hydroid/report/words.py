@@ -71,7 +71,7 @@ def _flag(problem: Problem, fit: Fit, i: int) -> str:
 
 
 def runs_flag(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
-    """What is to be known about a parameter over several runs, values of shape (N,); empty where nothing is."""
+    """What is to be known about a parameter over several runs, values of shape (N,); or nothing."""
     if not parameter.lower < parameter.upper or (parameter.fixed is not None and not np.ptp(values)):
         return "held fixed"
     if parameter.name in without_effect:

@@ -7,7 +7,7 @@ those of Okabe and Ito, told apart by colour-blind readers, and each comes with 
 import io
 import math
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import wraps
 from typing import Any, ParamSpec

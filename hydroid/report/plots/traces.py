@@ -74,7 +74,7 @@ def _traces(title: str, channel: Channel, traces: Sequence[_Trace]) -> Figure:
     drawing = figure(6.0)
     upper, middle, lower = drawing.subplots(3, 1, sharex=True, height_ratios=(3, 1.7, 1.2))
     measured = np.degrees(channel.measured)
-    upper.plot(channel.time, measured, color=MEASURED, linewidth=2.4, alpha=0.6, label="measured")
+    upper.plot(channel.time, measured, color=MEASURED, linewidth=4.0, alpha=0.35, label="measured")
     for order, trace in enumerate(traces):
         look = _look(order, len(traces))
         upper.plot(channel.time, trace.angle, color=trace.color, label=_with_rms(trace, measured), **look)
@@ -108,10 +108,10 @@ def _look(order: int, count: int) -> dict[str, Any]:
 
     The first is wide and whole; later ones lie on it, narrower, each dashed in a place of its own.
     """
-    width = max(0.8, 2.4 * 0.8**order)
+    width = max(0.8, 2.0 * 0.8**order)
     slots = min(count, 4)
-    # [pt], which matplotlib multiplies by the width
-    dash, gap, offset = (length / width for length in (5.0, 5.0 * (slots - 1), -5.0 * (order % slots)))
+    places = (1, slots - 1, slots - order % slots)
+    dash, gap, offset = (5.0 * n / width for n in places)  # 5 pt each: matplotlib multiplies by the width
     style = (offset, (dash, gap)) if order else "-"
     return {"linewidth": width, "linestyle": style, "dash_capstyle": "butt", "zorder": 3 + order / 100}
 

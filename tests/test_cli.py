@@ -169,3 +169,44 @@ def test_a_closed_pipe_is_no_traceback(short: Path, tmp_path: Path):
     )
     done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert "Traceback" not in done.stderr
+
+
+def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
+    values = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+    (tmp_path / "mech.yaml").write_text(yaml.safe_dump(values))
+    arguments = [
+        "fit-hyd",
+        short,
+        "--mech",
+        "mech.yaml",
+        "--algorithm",
+        "ga",
+        "--out",
+        "run",
+        "--json",
+        *QUICK,
+    ]
+    (found,) = json.loads(hydroid(*arguments, cwd=tmp_path).stdout)["runs"]
+    assert list(found["estimates"]) == ["best", "polished", "refined"]
+    assert all(found["estimates"]["polished"]["parameters"][name] == v for name, v in values.items())
+    rms = [found["estimates"][name]["rms_deg"] for name in ("best", "polished", "refined")]
+    assert rms == sorted(rms, reverse=True)
+    command = ["simulate", short, "--params", "run/estimate.yaml", "--out", "s.csv", "--trace", "t.csv"]
+    hydroid(*command, cwd=tmp_path)
+    header, *rows = (tmp_path / "t.csv").read_text().splitlines()
+    assert header == "time_s,pA2_bar,pB2_bar,qA2_Lmin,qB2_Lmin,spool2_mm,force2_N"
+    assert len(rows) == 1000
+    (row,) = json.loads(
+        hydroid("validate", "s.csv", "--fit", "run", "--json", "--out", "v", cwd=tmp_path).stdout
+    )
+    assert row["largest [deg]"] < 1e-6
+
+
+def test_the_second_stage_needs_the_first(short: Path, tmp_path: Path):
+    done = hydroid("fit-hyd", short, cwd=tmp_path, code=2)
+    assert "--mech" in done.stderr
+    (tmp_path / "mech.yaml").write_text("D: 80.0\n")
+    done = hydroid("fit-hyd", short, "--mech", "mech.yaml", cwd=tmp_path, code=2)
+    assert "M6" in done.stderr
+    done = hydroid("simulate", short, "--params", "mech.yaml", "--out", short, cwd=tmp_path, code=2)
+    assert "overwrite" in done.stderr

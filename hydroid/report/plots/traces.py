@@ -108,10 +108,10 @@ def _look(order: int, count: int) -> dict[str, Any]:
 
     The first is wide and whole; later ones lie on it, narrower, each dashed in a place of its own.
     """
-    width = max(0.8, 2.0 * 0.8**order)
+    width = max(0.8, 2.0 * 0.85**order)
     slots = min(count, 4)
     places = (1, slots - 1, slots - order % slots)
-    dash, gap, offset = (5.0 * n / width for n in places)  # 5 pt each: matplotlib multiplies by the width
+    dash, gap, offset = (3.5 * n / width for n in places)  # 3.5 pt each: matplotlib multiplies by the width
     style = (offset, (dash, gap)) if order else "-"
     return {"linewidth": width, "linestyle": style, "dash_capstyle": "butt", "zorder": 3 + order / 100}
 

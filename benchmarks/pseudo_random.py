@@ -17,8 +17,8 @@ def pseudo_random_log(
 ) -> Log:
     """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad].
 
-    A level after which `allowed` is false of the log so far is turned round, as an operator would who keeps
-    the arm off its stops.
+    A level after which `allowed` is false of the log so far is turned round or reduced, as by an operator who
+    keeps the arm off its stops.
     """
     rng = np.random.default_rng(seed)
     samples = round(duration / period)
@@ -32,8 +32,10 @@ def pseudo_random_log(
         start = 0
         while start < samples:
             dwell = round(rng.uniform(1.0, 5.0) / period)
-            command[start : start + dwell, joint - 1] = round(rng.uniform(-100.0, 100.0), 1)
-            if not allowed(upto(min(start + dwell, samples))):
-                command[start : start + dwell, joint - 1] *= -1
+            level = rng.uniform(-100.0, 100.0)
+            for factor in (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0):
+                command[start : start + dwell, joint - 1] = round(factor * level, 1)
+                if allowed(upto(min(start + dwell, samples))):
+                    break
             start += dwell
     return upto(samples)

@@ -16,7 +16,9 @@ SUSPECT = 1e-3
 """A derivative this much shorter than the longest one may be noise, and is looked at twice."""
 
 
-def derivatives(residuals: Callable[[Float], Float], point: Float, row: Float) -> tuple[Float, Bool]:
+def derivatives(
+    residuals: Callable[[Float], Float], point: Float, row: Float, width: float = 1.0
+) -> tuple[Float, Bool]:
     """Derivatives of the residuals in each parameter.
 
     All steps are one batch, into the wider half of the box. Those that fail are taken to the other side, in
@@ -26,12 +28,13 @@ def derivatives(residuals: Callable[[Float], Float], point: Float, row: Float) -
         residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed member.
         point: shape (p,), within [0, 1].
         row: residual there, shape (R,).
+        width: the step in units of STEP; a wider one looks over small jumps of the residual.
 
     Returns:
         The derivatives, shape (p, R), not finite where both steps failed; and whether each parameter has an
         effect at all, shape (p,).
     """
-    step = np.where(point > 0.5, -STEP, STEP)
+    step = width * np.where(point > 0.5, -STEP, STEP)
     everyone = np.ones(point.size, dtype=bool)
     columns = _quotients(residuals, point, row, step, everyone)
     failed = np.logical_not(np.all(np.isfinite(columns), axis=1))

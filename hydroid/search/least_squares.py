@@ -11,6 +11,8 @@ some things more, which are here:
   none, whatever its unit; in directions that the data hardly determine it is smaller long before they are
   found.
 - Steps that cannot help are not simulated: after a failed step MuJoCo tries shorter ones, down to nothing.
+- Where no step helps, derivatives are taken again over wider differences, and then over narrow ones. A joint
+  that meets its stop makes small jumps in the response, and narrow differences see nothing but the jumps.
 - The best point evaluated is returned, whatever ended the polish, and with it the reason by name.
 - Nothing is printed.
 """
@@ -32,6 +34,12 @@ LARGE = 2.0**40
 """Norm to which the residual is scaled at the start."""
 NEGLIGIBLE = 1e-15
 """Share of the cost that is no more than the cost's own rounding: a smaller gain could not be seen."""
+
+
+WIDTHS = (2.0**6, 2.0**12, 1.0)
+"""Widths of the differences, in units of `derivatives.STEP`, that follow where narrow ones lead nowhere."""
+SOLVED = 1e-20
+"""Share of the first cost at which nothing is left to explain."""
 
 
 class Ending(Enum):
@@ -83,6 +91,27 @@ def polish(start: Float, residuals: Callable[[Float], Float], settings: PolishSe
         The best point evaluated, at least as good as the start.
     """
     course = _Course(residuals, start, settings.step_tolerance)
+    ending, iterations = _descend(course, settings)
+    for width in WIDTHS:
+        left = settings.iterations - iterations
+        if ending is not Ending.NO_IMPROVEMENT or left < 1 or course.cost < SOLVED * course.cost_before:
+            break
+        course.look_again(width)
+        ending, more = _descend(course, settings.model_copy(update={"iterations": left}))
+        iterations += more
+    return Polish(
+        point=course.point,
+        cost_before=course.cost_before,
+        cost_after=course.cost,
+        evaluations=course.evaluations,
+        iterations=iterations,
+        ending=ending,
+    )
+
+
+def _descend(course: "_Course", settings: PolishSettings) -> tuple[Ending, int]:
+    """MuJoCo's least squares from the course's best point; why it ended, and the steps accepted."""
+    start, jacobians = course.point, course.jacobians
     try:
         _, trace = minimize.least_squares(
             start,
@@ -96,18 +125,8 @@ def polish(start: Float, residuals: Callable[[Float], Float], settings: PolishSe
             verbose=minimize.Verbosity.SILENT,
         )
     except _StopError as stop:
-        ending, iterations = stop.ending, max(course.jacobians - 1, 0)
-    else:
-        iterations = len(trace) - 1
-        ending = course.ending([log.candidate[:, 0] for log in trace], settings)
-    return Polish(
-        point=course.point,
-        cost_before=course.cost_before,
-        cost_after=course.cost,
-        evaluations=course.evaluations,
-        iterations=iterations,
-        ending=ending,
-    )
+        return stop.ending, max(course.jacobians - jacobians - 1, 0)
+    return course.ending([log.candidate[:, 0] for log in trace], settings), len(trace) - 1
 
 
 class _StopError(Exception):
@@ -135,14 +154,21 @@ class _Course:
         self._scale = 0.0  # a power of two, so that scaling rounds nothing; 0 before the start is known
         self._linear: _Linear | None = None  # the model at the present point
         self._tried = False  # a step since the last Jacobian
+        self._width = 1.0
+        self._best_row: Float | None = None  # residual at the best point
+
+    def look_again(self, width: float) -> None:
+        """Begin again from the best point, with differences of another width."""
+        self._width, self._linear, self._tried = width, None, False
 
     def residual(self, x: Float) -> Float:
         """Scaled residual at the start or at a trial step; inf throughout where it failed."""
         point = np.clip(x[:, 0], 0.0, 1.0)  # MuJoCo's steps overshoot the bounds by a rounding
         if self._linear is not None:
             self._worth_trying(point, self._linear)
-        self._tried = True
-        row = self._simulate(point)
+        self._tried = self._linear is not None
+        again = self._linear is None  # at the start, which a further look knows already
+        row = self._best_row if again and self._best_row is not None else self._simulate(point)
         return np.concatenate((self._scale * row, np.zeros(point.size)))[:, None]
 
     def jacobian(self, x: Float, r: Float) -> Float:
@@ -150,7 +176,7 @@ class _Course:
         self.jacobians += 1
         self._tried = False
         point, row = np.clip(x[:, 0], 0.0, 1.0), r[: -x.size, 0] / self._scale
-        columns, effective = derivatives(self._evaluate, point, row)
+        columns, effective = derivatives(self._evaluate, point, row, self._width)
         if not np.isfinite(columns).all():
             raise _StopError(Ending.JACOBIAN_FAILED)
         columns[~effective] = 0.0
@@ -182,13 +208,13 @@ class _Course:
         row = self._evaluate(point[None])[0]
         with np.errstate(over="ignore", invalid="ignore"):
             cost = 0.5 * float(row @ row)
-        if self._linear is None:
+        if not np.isfinite(self.cost_before):
             self.cost_before = cost if np.isfinite(cost) else np.inf
             if not np.isfinite(cost):
                 raise _StopError(Ending.START_FAILED)
             self._scale = LARGE / 2.0 ** np.frexp(np.sqrt(cost))[1]
         if cost < self.cost:
-            self.cost, self.point = cost, point
+            self.cost, self.point, self._best_row = cost, point, row
         return row if np.isfinite(cost) else np.full(row.size, np.inf)
 
     def _evaluate(self, points: Float) -> Float:

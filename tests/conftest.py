@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.simulation import ArmParameters
+
+# an example's time says nothing on a machine that is busy with something else
+settings.register_profile("hydroid", deadline=None)
+settings.load_profile("hydroid")
 
 
 @pytest.fixture(scope="session")

@@ -74,9 +74,14 @@ def test_a_fault_names_file_line_and_setting(tmp_path: Path, text: str, says: li
         assert part in message
 
 
-def test_a_fault_in_an_override_names_the_override(tmp_path: Path):
-    with pytest.raises(SettingsError, match=r"--set search\.ga\.population"):
-        load(written(tmp_path, MINIMAL), FitSettings, {"search.ga.population": 1})
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("search.ga.population", 1), ("parameters.K.bounds", [2, 1]), ("search", {"ga": {"population": 1}})],
+)
+def test_a_fault_in_an_override_names_the_override(tmp_path: Path, key: str, value: object):
+    with pytest.raises(SettingsError) as caught:
+        load(written(tmp_path, MINIMAL), FitSettings, {key: value})
+    assert str(caught.value).startswith(f"--set {key}: ")
 
 
 @pytest.mark.parametrize("text", ["novalue", "=3", "a=[1"])

@@ -78,8 +78,12 @@ def validate(
         loc = tuple(str(part) for part in first["loc"])
         where = f"{source}{_line(loc, lines or {})}"
         key = ".".join(loc)
-        if overridden and any(key == o or key.startswith(f"{o}.") for o in overridden):
-            where = f"--set {key}"
+        # the fault may lie in the override, below it, or in what it is a part of
+        guilty = [
+            o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")
+        ]
+        if guilty:
+            where = f"--set {guilty[0]}"
         more = error.error_count() - 1
         cure = f"and {more} more fault{'s' if more > 1 else ''} in this file" if more else ""
         raise SettingsError(_explain(key, first, kind), where=where, cure=cure) from None

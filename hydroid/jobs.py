@@ -195,6 +195,16 @@ def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, An
     return replace(log, angle=angle)
 
 
+def read_commands(path: Path, settings: FitSettings, arm: Arm, pose: str | None, warn: Warn) -> Log:
+    """Read a CSV of commands: to start in `pose`, or as logged, or in the settings' pose where unmeasured."""
+    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    log, findings = read_log(path, settings.log, ranges, angles_required=False)
+    for finding in findings:
+        warn(finding)
+    start = arm.pose(pose or settings.start_pose)
+    return replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
+
+
 def simulate_file(
     settings: FitSettings,
     arm: Arm,
@@ -231,13 +241,7 @@ def simulate_file(
         raise SettingsError("would overwrite the commands", where=f"--out {out}", cure="name another file")
     if trace is not None and settings.stage != "hyd":
         raise SettingsError("stage mech has no pressures to trace", where=source, cure="set stage: hyd")
-    ranges = np.stack([arm.lower, arm.upper], axis=1)
-    log, findings = read_log(commands, settings.log, ranges, angles_required=False)
-    for finding in findings:
-        warn(finding)
-    start = arm.pose(pose or settings.start_pose)
-    known = log.measured & (pose is None)
-    log = replace(log, angle=np.where(known, log.angle, start))
+    log = read_commands(commands, settings, arm, pose, warn)
     result = simulate_log(settings, arm, log, values, source)
     noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
     write_log(out, replace(result, angle=result.angle + noise), settings.log)

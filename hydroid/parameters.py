@@ -47,11 +47,6 @@ class ParameterSet:
         return np.array([p.fixed is None for p in self.parameters], dtype=bool)
 
     @property
-    def free_names(self) -> tuple[str, ...]:
-        """Names of the free parameters, the columns of the unit box."""
-        return tuple(p.name for p in self.parameters if p.fixed is None)
-
-    @property
     def lower(self) -> Array:
         """Lower bounds, shape (P,)."""
         return np.array([p.lower for p in self.parameters])

@@ -1,6 +1,5 @@
 """The commands `plot-actuator` and `view` as plain functions."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +8,8 @@ from hydroid.arm.model import load_model
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 from hydroid.identification.problem import make_simulation
-from hydroid.jobs import Warn
-from hydroid.log import Log, read_log
+from hydroid.jobs import Warn, read_commands
+from hydroid.log import Log
 from hydroid.report.actuator import actuator_card, write_actuator
 from hydroid.simulation import HydraulicSimulation
 from hydroid.viewer.choice import Chosen
@@ -58,18 +57,14 @@ def _player(chosen: Chosen, path: Path | None, pose: str | None, warn: Warn) -> 
     settings, arm = chosen.settings, chosen.arm
     for joint in range(1, 1 + len(arm.joints)):
         actuator_card(arm, chosen.member, joint, chosen.source)  # says what is wrong with one
-    start = arm.pose(pose or settings.start_pose)
     if path is None:
+        start = arm.pose(pose or settings.start_pose)
         log = Log(
             "sliders", np.array([0.0, PERIOD]), np.zeros((2, len(start))), np.tile(start, (2, 1)), PERIOD
         )
         outputs = list(range(len(start)))  # what is compared can move, and what can move has a slider
     else:
-        ranges = np.stack([arm.lower, arm.upper], axis=1)
-        log, findings = read_log(path, settings.log, ranges, angles_required=False)
-        for finding in findings:
-            warn(finding)
-        log = replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
+        log = read_commands(path, settings, arm, pose, warn)
         outputs = [int(j) for j in np.flatnonzero(log.driven)]
         if not outputs:
             raise SettingsError("commands nothing", where=str(path), cure="leave it out to use the sliders")

@@ -26,7 +26,7 @@ from hydroid.report.write import write_report
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 from hydroid.settings.load import load, read_yaml
-from hydroid.simulation import HydraulicSimulation
+from hydroid.simulation import HydraulicSimulation, Response
 
 TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool", "mm"), ("force", "N"))
 """columns of a trace, a joint"""
@@ -96,6 +96,7 @@ def fit_logs(
     Raises:
         HydroidError: what the user can mend.
     """
+    _refuse_stray_payloads(settings, paths)
     problem = Problem(arm, settings, read_logs(paths, settings, arm, warn, repair))
     folder = RunFolder(out)
     checkpoint = None
@@ -116,6 +117,14 @@ def fit_logs(
     write_report(folder, problem, result)
     folder.status("done")
     return problem, result
+
+
+def _refuse_stray_payloads(settings: FitSettings, paths: Sequence[Path]) -> None:
+    """A payload whose log's name is misspelt would be left out silently."""
+    stray = sorted(set(settings.payloads) - {path.name for path in paths})
+    if stray:
+        names = ", ".join(path.name for path in paths)
+        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", cure=f"logs: {names}")
 
 
 def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
@@ -181,7 +190,8 @@ def read_parameters(path: Path) -> dict[str, Any]:
 def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 
-    Joints that the simulation locks stay where they start; prescribed ones keep their logged motion.
+    Joints that the simulation locks stay where they start; prescribed ones keep their logged motion. Stage 2
+    gives the chamber pressures of driven joints too, where `log.pressure` maps columns for them.
 
     Raises:
         RunError: the simulation diverged.
@@ -191,8 +201,16 @@ def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, An
     angle = log.angle.copy()
     if settings.simulation.other_joints == "locked":
         angle[:] = log.angle[0]
-    angle[:, [j - 1 for j in moving]] = respond(settings, arm, log, values, source, moving)
-    return replace(log, angle=angle)
+    pressures: list[int] = []
+    if settings.stage == "hyd":
+        pressures = [j for j in range(log.joints) if log.driven[j] and settings.log.pressure_of(j + 1)]
+    response = _response(settings, arm, log, values, source, moving, pressures)
+    angle[:, [j - 1 for j in moving]] = response.angle[0]
+    pressure = None
+    if response.pressure is not None:
+        pressure = np.zeros((*angle.shape, 2))  # an idle cylinder's are not simulated
+        pressure[:, pressures] = response.pressure[0]
+    return replace(log, angle=angle, pressure=pressure)
 
 
 def read_commands(path: Path, settings: FitSettings, arm: Arm, pose: str | None, warn: Warn) -> Log:
@@ -282,11 +300,24 @@ def respond(
         SettingsError: a parameter that is missing or unknown.
         RunError: the simulation diverged.
     """
+    return _response(settings, arm, log, values, source, joints).angle[0]
+
+
+def _response(
+    settings: FitSettings,
+    arm: Arm,
+    log: Log,
+    values: dict[str, Any],
+    source: str,
+    joints: Sequence[int],
+    pressures: Sequence[int] = (),
+) -> Response:
+    """The same with the pressures of some joints, 0-based, as a response of one member."""
     stage = Stage(arm, settings)
     theta = stage.parameters.vector(values, source)
     outputs = [j - 1 for j in joints]
-    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings)
+    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings, pressures)
     response = simulation.simulate(stage.members(theta[None]))
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=source)
-    return response.angle[0]
+    return response

@@ -5,10 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.identification.channels import make_channels
 from hydroid.identification.fit import Estimate, Fit
 from hydroid.identification.folder import RunFolder
+from hydroid.identification.identifiability import identifiability
+from hydroid.identification.jacobian import Jacobian, relative_scale
+from hydroid.identification.knowledge import Knowledge
+from hydroid.identification.noise import channel_noise
 from hydroid.identification.problem import Evaluation, Problem
-from hydroid.identification.sensitivity import Sensitivity
+from hydroid.identification.uncertainty import Uncertainty, judge
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
 from hydroid.objective.segments import segment_objectives
@@ -33,7 +38,9 @@ def make_problem(
     problem = object.__new__(Problem)
     one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
     how = {"segments": {"equal": segments}} | objective
-    problem.settings = FitSettings(parameters={"K": one}, outputs=list(outputs), objective=how)
+    problem.settings = FitSettings(
+        parameters=dict.fromkeys(parameters, one), outputs=list(outputs), objective=how
+    )
     fixed = fixed or {}
     problem.parameters = ParameterSet(
         tuple(Parameter(name, "kg", low, high, fixed.get(name)) for name, (low, high) in parameters.items())
@@ -48,6 +55,8 @@ def make_problem(
     problem.outputs = [joint - 1 for joint in outputs]
     channels = [log.angle[:, k] for log in logs for k in problem.outputs]
     problem.measured = np.concatenate(channels)
+    problem.channels = make_channels(logs, problem.outputs, [[]] * len(logs), problem.settings.objective)
+    problem.knowledge = Knowledge({}, problem.parameters)
     starts = np.cumsum([0, *map(len, channels)])
     problem.bounds = np.array(
         [
@@ -91,6 +100,8 @@ def make_fit(
             float(np.sqrt(np.mean(error**2))),
             responses,
         )
+    final = "polished" if "polished" in names else names[0]
+    uncertain = make_uncertainty(problem, estimates[final].theta, effects)
     segments = rng.uniform(0.005, 0.2, (front, len(problem.bounds)))
     evaluations = np.arange(1, 8) * 20.0
     best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
@@ -98,19 +109,37 @@ def make_fit(
     polished = Polish(np.full(free, 0.5), 1.0, 0.1, 40, 5, Ending.STEP) if "polished" in names else None
     return Fit(
         estimates,
-        "polished" if "polished" in names else names[0],
+        final,
         (
             parameters.from_unit(rng.uniform(0, 1, (front, free))),
             Evaluation(segments, segments.max(axis=1, initial=0)),
         ),
         history,
         polished,
-        Sensitivity(
-            np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(parameters.names)),
-            np.zeros(len(parameters.names), dtype=bool),
-            free,
-        ),
+        uncertain,
+        identifiability(problem, uncertain),
     )
+
+
+def make_uncertainty(
+    problem: Problem, theta: np.ndarray, effects: tuple[float, ...] | None = None
+) -> Uncertainty:
+    """What a problem with independent parameters of these effects [rad] would say, its noise 0.1 deg."""
+    rng = np.random.default_rng(1)
+    size = np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(theta))
+    waves = np.linalg.qr(rng.normal(size=(len(problem.measured), len(theta))))[0].T
+    slopes = 100 * size[:, None] * waves * np.sqrt(len(problem.measured))
+    slopes[~problem.parameters.free] = np.nan
+    residual = rng.normal(0, np.deg2rad(0.1), len(problem.measured))
+    at = Jacobian(
+        residual,
+        slopes,
+        np.zeros((len(theta), 0)),
+        relative_scale(problem.parameters, theta),
+        np.zeros_like(slopes),
+    )
+    noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
+    return judge(problem, theta, at, noise)
 
 
 class Folder(RunFolder):

@@ -112,7 +112,7 @@ def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, tmp_path: Path):
         (["fit-mech"], "no log given"),
         (["fit-mech", "{log}", "--config", "nonsense"], "nonsense"),
         (["fit-mech", "{log}", "--set", "search.seed=x"], "--set search.seed"),
-        (["fit-mech", "{log}", "--algorithm", "pso"], "'ga' or 'nsga2'"),
+        (["fit-mech", "{log}", "--algorithm", "pso"], "'nsga2', 'cmaes'"),
         (["fit-mech", "{log}", "--out", "."], "holds no run"),
         (["fit-mech", "{log}", "--set", "outputs=[9]"], "joint 9"),
         (["fit-mech", "{log}", "--sed", "1"], "--sed"),

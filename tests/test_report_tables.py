@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_fits import MODEL, make_fit, make_problem
+from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.identification.validation import error_indices, pooled_indices
 from hydroid.report.channels import channels, log_names
@@ -25,11 +25,13 @@ def column(table: Table, name: str) -> list[object]:
     return [row[table.header.index(name)] for row in table.rows]
 
 
-def with_theta(fit, problem, **values: float):
+def with_theta(fit, problem, effects=None, **values: float):
     theta = fit.best.theta.copy()
     for name, value in values.items():
         theta[problem.parameters.names.index(name)] = value
-    return replace(fit, estimates=fit.estimates | {fit.final: replace(fit.best, theta=theta)})
+    told = make_uncertainty(problem, theta, effects)
+    estimates = fit.estimates | {fit.final: replace(fit.best, theta=theta)}
+    return replace(fit, estimates=estimates, uncertainty=told)
 
 
 def test_every_estimate_of_every_parameter_is_in_the_table():
@@ -45,18 +47,19 @@ def test_every_estimate_of_every_parameter_is_in_the_table():
 
 def test_flags_name_what_the_data_cannot_tell():
     problem = make_problem(fixed={"D": 100.0})
-    fit = make_fit(problem, effects=(1e-3, 0.0, 0.0, 1e-3))
+    effects = (1e-3, 0.0, 0.0, 1e-3)
+    fit = make_fit(problem, effects=effects)
     low, high = MODEL["K"]
-    assert flags(problem, fit) == ("", "held fixed", "no effect on the outputs", "")
-    at = with_theta(fit, problem, K=low + 1e-4 * (high - low), M2=MODEL["M2"][1])
-    assert flags(problem, at) == (
+    assert flags(fit) == ("", "held fixed", "no effect on the outputs", "")
+    at = with_theta(fit, problem, effects, K=low + 1e-4 * (high - low), M2=MODEL["M2"][1])
+    assert flags(at) == (
         "at lower bound",
         "held fixed",
         "no effect on the outputs",
         "at upper bound",
     )
-    off = with_theta(fit, problem, K=low + 2e-3 * (high - low))
-    assert flags(problem, off)[0] == ""
+    off = with_theta(fit, problem, effects, K=low + 2e-3 * (high - low))
+    assert flags(off)[0] == ""
     assert any(sentence.startswith("M1: no effect") for sentence in cautions(problem, fit))
     assert any("M2 (12.75 kg): at the upper bound" in sentence for sentence in cautions(problem, at))
 

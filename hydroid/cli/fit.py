@@ -13,7 +13,10 @@ Logs = Annotated[
         metavar="LOG.csv...", help="Logs to fit together; with --resume, the run's own if left out."
     ),
 ]
-Algorithm = Annotated[str | None, typer.Option(help="ga (simple) or nsga2 (multi-objective).")]
+Algorithm = Annotated[
+    str | None, typer.Option(help="ga (simple), nsga2 (multi-objective), cmaes, or pymoo's: pymoo:NSGA3, ...")
+]
+_PYMOO = "pymoo:"
 Seed = Annotated[int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")]
 Runs = Annotated[int, typer.Option(min=1, max=10_000, help="Repeat over this many seeds, from --seed on.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")]
@@ -114,8 +117,10 @@ def _changes(
 ) -> dict[str, Any]:
     """The settings that flags replace."""
     changes = overrides(setting)
+    pymoo = algorithm is not None and algorithm.startswith(_PYMOO)
     flags: dict[str, Any] = {
-        "search.algorithm": algorithm,
+        "search.algorithm": "pymoo" if pymoo else algorithm,
+        "search.pymoo.algorithm": algorithm.removeprefix(_PYMOO) if algorithm and pymoo else None,
         "search.seed": seed,
         "simulation.threads": workers,
     }

@@ -25,8 +25,8 @@ class Progress:
 
     def __init__(self, settings: FitSettings, label: str, *, quiet: bool) -> None:
         search = settings.search
-        self._name = {"ga": "GA", "nsga2": "NSGA-II"}[search.algorithm]
-        self._total = 1 + (search.ga if search.algorithm == "ga" else search.nsga2).generations
+        self._name = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES"}.get(search.name, search.name)
+        self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (57.29577951308232, " deg")
         self._label, self._quiet = label, quiet
         self._bar: Any = None

@@ -37,7 +37,7 @@ def run_fits(
     settings, arm = load_settings(config, changes)
     if not logs:
         logs, settings, arm = _continued(out, changes, resume, runs)
-    out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.algorithm}"
+    out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.name}"
     results: list[tuple[int, Problem, Fit]] = []
     for seed in range(settings.search.seed, settings.search.seed + runs):
         search = settings.search.model_copy(update={"seed": seed})

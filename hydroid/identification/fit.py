@@ -7,12 +7,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.identification.identifiability import Identifiability, identifiability
+from hydroid.identification.polishing import polish_estimate
 from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.identification.search import Checkpoint, Search, SearchState
-from hydroid.identification.sensitivity import Sensitivity, sensitivity
+from hydroid.identification.uncertainty import Uncertainty, uncertainty
 from hydroid.parameters import Array
 from hydroid.search import compromise
-from hydroid.search.least_squares import Polish, polish
+from hydroid.search.least_squares import Polish
 from hydroid.search.pareto import non_dominated
 
 
@@ -37,8 +39,8 @@ class Fit:
     """What a fit found.
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
-    objectives. polish: the last one. history: shape (G, len(HISTORY)). sensitivity: what moves the
-    response at the final estimate.
+    objectives. polish: the last one. history: shape (G, len(HISTORY)). uncertainty,
+    identifiability: what the logs say about the final estimate.
     """
 
     estimates: dict[str, Estimate]
@@ -46,7 +48,8 @@ class Fit:
     front: tuple[Array, Evaluation]
     history: Array
     polish: Polish | None
-    sensitivity: Sensitivity
+    uncertainty: Uncertainty
+    identifiability: Identifiability
 
     @property
     def best(self) -> Estimate:
@@ -61,12 +64,12 @@ class Fit:
     @property
     def effects(self) -> Array:
         """Rms change of the response per 1 % of each parameter [rad], shape (P,)."""
-        return self.sensitivity.effects
+        return self.uncertainty.jacobian.effects
 
     @property
     def without_effect(self) -> NDArray[np.bool_]:
         """Parameters that the outputs do not feel at all, shape (P,)."""
-        return self.sensitivity.without_effect
+        return self.uncertainty.jacobian.without_effect
 
 
 class Watcher(Protocol):
@@ -106,7 +109,7 @@ def fit(
     state = search.run(checkpoint.state if checkpoint else None, save, watch.generation)
     theta = search.theta(state.population)
     evaluation = memo.evaluate(theta)
-    if settings.search.algorithm == "ga":
+    if search.single:
         found = {"best": compromise.best(theta, evaluation.overall)}
     else:
         found = _from_front(theta, evaluation, memo, settings.search.compromise)
@@ -124,20 +127,22 @@ def fit(
             theta_refined = last.parameters.from_unit(polished.point[None])
             estimates |= _estimates(last, {"refined": theta_refined[0]})
             final = "refined"
+    told = uncertainty(last, estimates[final].theta)
     return Fit(
         estimates,
         final,
         _front(theta, evaluation, memo),
         state.history,
         polished,
-        sensitivity(last, estimates[final].theta),
+        told,
+        identifiability(last, told),
     )
 
 
 def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]:
     theta = np.array(list(found.values()))
     evaluation, responses = problem.evaluate(theta), problem.responses(theta)
-    rms = np.sqrt(np.mean(problem.residuals(theta) ** 2, axis=1))
+    rms = problem.rms(problem.residuals(theta))
     return {
         name: Estimate(
             name,
@@ -145,7 +150,7 @@ def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]
             evaluation.segments[i],
             float(evaluation.overall[i]),
             float(rms[i]),
-            tuple(r[i] for r in responses),
+            tuple(r.angle[i] for r in responses),
         )
         for i, name in enumerate(found)
     }
@@ -175,13 +180,4 @@ def _front(theta: Array, evaluation: Evaluation, memo: Memo) -> tuple[Array, Eva
 
 def _polish(problem: Problem, start: Estimate, watch: Watcher) -> Polish:
     assert problem.settings.polish is not None
-    simulated = 0
-
-    def residuals(unit: Array) -> Array:
-        nonlocal simulated
-        simulated += len(unit)
-        watch.polishing(simulated)
-        return problem.residuals(problem.parameters.from_unit(unit))
-
-    unit = problem.parameters.to_unit(start.theta[None])[0]
-    return polish(unit, residuals, problem.settings.polish)
+    return polish_estimate(problem, start.theta, problem.settings.polish, watch.polishing)

@@ -117,6 +117,13 @@ class RunFolder:
             "final": fit.final,
             "parameters": mapping(fit.best.theta),
             "units": {p.name: p.unit for p in problem.parameters.parameters},
+            "standard_deviation": mapping(fit.uncertainty.standard_deviation),
+            "interval_95": {
+                name: [float(low), float(high)]
+                for name, (low, high) in zip(names, fit.uncertainty.interval, strict=True)
+            },
+            "flags": {n: list(f) for n, f in zip(names, fit.uncertainty.flags, strict=True) if f},
+            "not_determined": [direction.words for direction in fit.identifiability.weak],
             "without_effect": [n for n, none in zip(names, fit.without_effect, strict=True) if none],
             "estimates": {
                 e.name: {

@@ -6,12 +6,16 @@ cluster may stand; the search knows only its arrays.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.arm.model import load_model
+from hydroid.arm.payload import add_payload
+from hydroid.identification.channels import Channel, make_channels
+from hydroid.identification.knowledge import Knowledge
 from hydroid.identification.stage import Stage
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
@@ -19,7 +23,7 @@ from hydroid.objective.segments import segment_bounds, segment_objectives
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import HydraulicSimulation, MechanicalSimulation
+from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
 from hydroid.simulation.record import Record
 
 
@@ -44,6 +48,12 @@ class Problem:
         arm: the arm's settings.
         settings: the fit's settings.
         logs: one or more records, each with its own start pose.
+
+    Attributes:
+        channels: what is compared, in the order of a row of residuals.
+        knowledge: what is known besides the logs.
+        measured: all channels in a row, times their weights, shape (R,).
+        bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
     def __init__(self, arm: Arm, settings: FitSettings, logs: Sequence[Log]) -> None:
@@ -54,21 +64,15 @@ class Problem:
         self.stage = Stage(arm, settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
-        self._simulations = [make_simulation(spec, arm, log, outputs, settings) for log in logs]
-        self._measured = [log.angle[:, outputs].T for log in logs]  # (K, T) a log
-        # one channel a log and output, one after the other: errors of several logs are one long row
-        channels = [
-            (log, angle) for log, measured in zip(logs, self._measured, strict=True) for angle in measured
+        self.knowledge = Knowledge(settings.known, self.parameters)
+        pressures = [compared_pressures(log, settings) for log in logs]
+        self._simulations = [
+            make_simulation(spec, arm, log, outputs, settings, joints)
+            for log, joints in zip(logs, pressures, strict=True)
         ]
-        self.measured = np.concatenate([angle for _, angle in channels])
-        starts = np.cumsum([0, *(len(angle) for _, angle in channels)])
-        how = settings.objective.segments
-        self.bounds: NDArray[np.int64] = np.concatenate(
-            [
-                segment_bounds(angle, log.period, how) + start
-                for (log, angle), start in zip(channels, starts[:-1], strict=True)
-            ]
-        )
+        self.channels = make_channels(logs, outputs, pressures, settings.objective)
+        self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
+        self.bounds: NDArray[np.int64] = np.concatenate([self._segments(c) for c in self.channels])
 
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
@@ -78,6 +82,10 @@ class Problem:
         }
         settings = self.settings.model_copy(update={"parameters": free})
         return Problem(self._arm, settings, self.logs)
+
+    def theta(self, unit: Array) -> Array:
+        """Return parameter sets, (n, P), from points of the unit box, moved to where what is known holds."""
+        return self.knowledge.project(self.parameters.from_unit(unit))
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
@@ -91,31 +99,64 @@ class Problem:
         return Evaluation(segments, overall)
 
     def residuals(self, theta: Array) -> Array:
-        """Output errors y - y_hat of (17) [rad], shape (n, R): channel after channel; NaN where diverged."""
-        parts = [
-            measured - simulated.transpose(0, 2, 1)
-            for measured, simulated in zip(self._measured, self.responses(theta), strict=True)
-        ]
-        return np.concatenate([p.reshape(len(theta), -1) for p in parts], axis=1)
+        """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged."""
+        responses = self.responses(theta)
+        return np.concatenate([channel.residual(responses) for channel in self.channels], axis=1)
 
-    def responses(self, theta: Array) -> list[Array]:
-        """Simulated outputs [rad], one array of shape (n, T, K) a log."""
+    def responses(self, theta: Array) -> list[Response]:
+        """Simulate theta, shape (n, P); one response of n members a log."""
         members = self.stage.members(theta)
-        return [simulation.simulate(members).angle for simulation in self._simulations]
+        return [simulation.simulate(members) for simulation in self._simulations]
+
+    def rms(self, residuals: Array) -> Array:
+        """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""
+        angles = [residuals[:, c.rows] / c.weight for c in self.channels if c.quantity == "angle"]
+        return np.sqrt(np.mean(np.concatenate(angles, axis=1) ** 2, axis=1))
+
+    def _segments(self, channel: Channel) -> NDArray[np.int64]:
+        """Samples of each objective: an angle's segments; a pressure is one objective, however long."""
+        if channel.quantity != "angle":
+            return np.array([[channel.rows.start, channel.rows.stop]])
+        period, how = self.logs[channel.log].period, self.settings.objective.segments
+        return segment_bounds(channel.measured, period, how) + channel.rows.start
 
     def _chunks(self, n: int) -> Iterator[slice]:
         size = min(simulation.record.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
 
 
+def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
+    """Joints whose chamber pressures count in the objectives, 0-based: driven ones that the log measures."""
+    if settings.stage != "hyd" or settings.objective.pressure_weight == 0 or log.pressure is None:
+        return []
+    return [j for j in range(log.joints) if log.driven[j] and not np.isnan(log.pressure[0, j]).all()]
+
+
 def make_simulation(
-    spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: FitSettings
+    spec: mujoco.MjSpec,
+    arm: Arm,
+    log: Log,
+    outputs: list[int],
+    settings: FitSettings,
+    pressures: Sequence[int] = (),
 ) -> MechanicalSimulation | HydraulicSimulation:
-    """Return what simulates one log in the settings' stage; outputs are 0-based joints."""
+    """Return what simulates one log in the settings' stage.
+
+    Args:
+        spec: the arm's MJCF.
+        arm: the arm's settings.
+        log: the record.
+        outputs: joints whose angles are wanted, 0-based.
+        settings: the fit's settings.
+        pressures: joints whose chamber pressures are wanted, 0-based.
+    """
+    payload = settings.payloads.get(Path(log.source).name)
+    if payload:
+        spec = add_payload(spec, arm, payload)
     record = Record(spec, arm, log, outputs, settings.simulation)
     if settings.stage == "mech":
         return MechanicalSimulation(record, settings.simulation)
-    return HydraulicSimulation(record, arm, settings.hydraulics, settings.simulation)
+    return HydraulicSimulation(record, arm, settings.hydraulics, settings.simulation, pressures)
 
 
 class Memo:

@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.errors import RunError, SettingsError
 from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.parameters import Array
 from hydroid.search.algorithm import Algorithm, Population
+from hydroid.search.cmaes import cmaes
 from hydroid.search.ga import SimpleGa
+from hydroid.search.library import LibraryAlgorithm
+from hydroid.search.moo import pymoo
 from hydroid.search.nsga2 import Nsga2
 from hydroid.settings.fit import SearchSettings
 
@@ -49,12 +53,8 @@ class Search:
     """
 
     def __init__(self, problem: Problem, settings: SearchSettings, memo: Memo) -> None:
-        self._parameters, self._memo, self._seed = problem.parameters, memo, settings.seed
-        self._single = settings.algorithm == "ga"
-        free = int(problem.parameters.free.sum())
-        self._algorithm: Algorithm = (
-            SimpleGa(settings.ga, free) if self._single else Nsga2(settings.nsga2, free)
-        )
+        self._problem, self._memo, self._seed = problem, memo, settings.seed
+        self._algorithm = make_algorithm(problem, settings)
 
     def run(
         self,
@@ -68,7 +68,12 @@ class Search:
             state: a state to continue from.
             save: called with the state now and then, at the end, and when interrupted.
             watch: called with a row of HISTORY after every generation.
+
+        Raises:
+            RunError: a library's algorithm does not do again what it did before `state`.
         """
+        if state is not None and len(state.history) < self.generations:
+            self._replay(state)
         saved = time.monotonic()
         try:
             while state is None or not self._finished(state):
@@ -84,7 +89,12 @@ class Search:
 
     def theta(self, population: Population) -> Array:
         """Return the population's parameter sets, shape (n, P)."""
-        return self._parameters.from_unit(self._algorithm.decode(population.chromosomes))
+        return self._problem.theta(self._algorithm.decode(population.chromosomes))
+
+    @property
+    def single(self) -> bool:
+        """Whether it minimises the error over the whole record alone, not that of each segment."""
+        return self._algorithm.single
 
     @property
     def generations(self) -> int:
@@ -100,13 +110,25 @@ class Search:
             rng.bit_generator.state = state.rng
         before = None if state is None else state.population
         chromosomes = self._algorithm.start(rng) if before is None else self._algorithm.ask(before, rng)
-        unit = self._algorithm.decode(chromosomes)
-        result = self._memo.evaluate(self._parameters.from_unit(unit))
-        objectives = result.overall[:, None] if self._single else result.segments
+        result = self._memo.evaluate(self._problem.theta(self._algorithm.decode(chromosomes)))
+        objectives = result.overall[:, None] if self.single else result.segments
         population = self._algorithm.tell(before, Population(chromosomes, objectives))
         history = np.empty((0, len(HISTORY))) if state is None else state.history
         row = self._row(history, population, result)
         return SearchState(population, rng.bit_generator.state, np.vstack([history, row]))
+
+    def _replay(self, state: SearchState) -> None:
+        """Bring a library's algorithm to where `state` was; the memo answers, nothing is simulated."""
+        if not isinstance(self._algorithm, LibraryAlgorithm):
+            return
+        again, known = None, self._memo.simulated
+        for _ in state.history:
+            again = self._next(again)
+            if self._memo.simulated > known:
+                raise RunError(
+                    "the search cannot be continued: its library does not do again what it did",
+                    cure="use the library's version and the machine of then, or begin with another --out",
+                )
 
     def _row(self, history: Array, population: Population, result: Evaluation) -> Array:
         overall = self._memo.evaluate(self.theta(population)).overall
@@ -122,3 +144,23 @@ class Search:
                 np.median(finite) if finite.size else np.inf,
             ]
         )
+
+
+def make_algorithm(problem: Problem, settings: SearchSettings) -> Algorithm:
+    """The search that the settings name, on the unit box of the problem's free parameters.
+
+    Raises:
+        SettingsError: a library is not installed, or has no such algorithm.
+    """
+    free = int(problem.parameters.free.sum())
+    match settings.algorithm:
+        case "ga":
+            return SimpleGa(settings.ga, free)
+        case "nsga2":
+            return Nsga2(settings.nsga2, free)
+        case "cmaes":
+            return cmaes(settings.cmaes, free)
+        case "pymoo":
+            return pymoo(settings.pymoo, free, len(problem.bounds))
+        case other:
+            raise SettingsError(f"{other} is no search by populations", where="search.algorithm")

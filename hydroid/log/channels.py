@@ -15,11 +15,12 @@ from hydroid.log.table import Cells, Table
 from hydroid.settings.log import LogSettings
 
 _LISTED = 40  # column names in a message
+_PRESSURES = (-5e5, 2e8)  # [Pa]: a sensor may be off by its offset, and no hydraulic hose holds more
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One column in use: value = gain · cell + offset in [s], [%] or [rad].
+    """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa].
 
     Attributes:
         name: in the header.
@@ -27,16 +28,18 @@ class Channel:
         joint: number, from 1; 0 for the time.
         low, high: what the value may be; a continuous joint has ∓inf.
         sign: +1, or −1 for the column of a command's negative direction.
+        chamber: of a pressure, 0 for A and 1 for B.
     """
 
     name: str
-    kind: Literal["time", "command", "angle"]
+    kind: Literal["time", "command", "angle", "pressure"]
     joint: int = 0
     gain: float = 1.0
     offset: float = 0.0
     low: float = -np.inf
     high: float = np.inf
     sign: int = 1
+    chamber: int = 0
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.joint}" if self.joint else self.kind
@@ -96,6 +99,14 @@ class Record:
                 angle[:, channel.joint - 1] = values
         return command, angle
 
+    def pressures(self, joints: int) -> Floats | None:
+        """Return chamber pressures [Pa], shape (R, J, 2), NaN where unmeasured; None: there are none."""
+        pressure = np.full((len(self.values), joints, 2), np.nan)
+        measured = [(c, v) for c, v in zip(self.channels, self.values.T, strict=True) if c.kind == "pressure"]
+        for channel, values in measured:
+            pressure[:, channel.joint - 1, channel.chamber] = values
+        return pressure if measured else None
+
 
 def map_channels(settings: LogSettings, ranges: Floats) -> list[Channel]:
     """Return the channels that the settings ask for, time first.
@@ -117,6 +128,11 @@ def map_channels(settings: LogSettings, ranges: Floats) -> list[Channel]:
             unit = np.pi / 180 if angle.unit == "deg" else 1.0
             gain, offset = angle.scale * unit, angle.offset * unit
             channels.append(Channel(angle.column, "angle", joint, gain, offset, low - margin, high + margin))
+    for joint in range(1, len(ranges) + 1):
+        if pressure := settings.pressure_of(joint):
+            unit = {"bar": 1e5, "Pa": 1.0, "MPa": 1e6}[pressure.unit]
+            one = Channel("", "pressure", joint, pressure.scale * unit, pressure.offset * unit, *_PRESSURES)
+            channels += [replace(one, name=name, chamber=k) for k, name in enumerate(pressure.column)]
     return channels
 
 

@@ -115,6 +115,8 @@ def _outside(record: Record) -> Iterator[Finding]:
 def _presented(channel: Channel) -> tuple[float, str, str]:
     if channel.kind == "command":
         return 1.0, "%", "correct the cells, or log.command's scale and offset"
+    if channel.kind == "pressure":
+        return 1e-5, "bar", "correct the cells, or log.pressure's unit, scale and offset"
     cure = "correct the cells, log.angle's unit, scale and offset, or the joint's range"
     return 180 / np.pi, "deg", cure
 

@@ -18,6 +18,7 @@ class Log:
         command: [%], shape (T, J), in [-100, 100], held until the next sample; 0 where undriven.
         angle: [rad], shape (T, J); a column of NaN where unmeasured.
         period: [s].
+        pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
     """
 
     source: str
@@ -25,6 +26,7 @@ class Log:
     command: Floats
     angle: Floats
     period: float
+    pressure: Floats | None = None
 
     @property
     def joints(self) -> int:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from hydroid.errors import LogError
 from hydroid.log.channels import Channel, Record, map_channels, missing_columns, to_record
 from hydroid.log.checks import check_record, sample_period
@@ -69,7 +71,7 @@ def check_log(
     wanted = map_channels(settings, ranges)
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:
-        wanted = [c for c in wanted if c.kind != "angle" or c.name in table.names]
+        wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in table.names]
     findings += missing_columns(table, wanted)
     channels = [channel for channel in wanted if channel.name in table.names]
     log = None
@@ -101,9 +103,14 @@ def _mapping_faults(
 
 def _to_log(record: Record, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
     command, angle = record.signals(joints)
-    period = settings.period_s
-    time, command, angle = resample(record.time, command.clip(-100, 100), angle, period, settings.delay_s)
-    log = Log(record.table.source, time, command, angle, period)
+    pressure, period = record.pressures(joints), settings.period_s
+    measured = angle if pressure is None else np.column_stack([angle, pressure.reshape(len(angle), -1)])
+    time, command, measured = resample(
+        record.time, command.clip(-100, 100), measured, period, settings.delay_s
+    )
+    if pressure is not None:
+        pressure = measured[:, joints:].reshape(-1, joints, 2)
+    log = Log(record.table.source, time, command, measured[:, :joints], period, pressure)
     findings = list[Finding]()
     if not is_on_grid(record.time, period):
         what = f"resampled from {sample_period(record.time):.6g} s to {period:g} s"

@@ -17,15 +17,17 @@ def resample(
 ) -> tuple[Floats, Floats, Floats]:
     """Bring a record to the grid k · period, from its first sample to its last.
 
+    Pressures are interpolated as angles are.
+
     Args:
         time: [s], shape (R,), strictly increasing.
         command: [%], shape (R, J).
-        angle: [rad], shape (R, J).
+        angle: [rad] (and other signals that are measured), shape (R, M).
         period: [s].
         delay: the command acts this much later [s] than logged; before the first one acts it is 0 %.
 
     Returns:
-        Grid [s] from 0, shape (T,); command and angle, shapes (T, J).
+        Grid [s] from 0, shape (T,); command and angle, shapes (T, J) and (T, M).
     """
     time, grid = time - time[0], _grid(time, period)
     if is_on_grid(time, period):

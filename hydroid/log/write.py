@@ -27,6 +27,8 @@ def write_log(path: Path, log: Log, settings: LogSettings) -> None:
         RunError: the file cannot be written.
     """
     channels = map_channels(settings, np.full((log.joints, 2), np.inf))
+    if log.pressure is None:
+        channels = [channel for channel in channels if channel.kind != "pressure"]
     _check(path, log, channels)
     command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
     columns = [_cells(channel, log, command) for channel in channels]
@@ -58,4 +60,7 @@ def _cells(channel: Channel, log: Log, command: Floats) -> Floats:
         values = values.clip(min=0.0) if channel.low == 0 else values
     elif channel.kind == "angle":
         values = log.angle[:, channel.joint - 1]
+    elif channel.kind == "pressure":
+        assert log.pressure is not None
+        values = log.pressure[:, channel.joint - 1, channel.chamber]
     return (values - channel.offset) / channel.gain

@@ -6,15 +6,20 @@ from typing import Any
 from hydroid.identification.fit import Fit
 from hydroid.identification.problem import Problem
 from hydroid.report.channels import channels
+from hydroid.report.identifiability import told_section
 from hydroid.report.html import Picture, Section, report_html
 from hydroid.report.table import Table, number
-from hydroid.report.words import cautions, norm_label, summary
+from hydroid.report.words import cautions, norm_label, summary, told
 
-_ALGORITHMS = {"ga": "simple genetic algorithm", "nsga2": "NSGA-II, a multi-objective genetic algorithm"}
+_ALGORITHMS = {
+    "ga": "simple genetic algorithm",
+    "nsga2": "NSGA-II, a multi-objective genetic algorithm",
+    "cmaes": "CMA-ES, an evolution strategy",
+}
 _PARETO = {
-    "ga": "The simple genetic algorithm minimises the error over the whole record and does not look for this "
-    "set: these are merely the sets of its last population that no other beats in every segment.",
-    "nsga2": "What the search was after: to fit one segment better than one of these does costs another.",
+    "single": "The search minimises the error over the whole record and does not look for this set: these are "
+    "merely the sets of its last population that no other beats in every segment.",
+    "several": "What the search was after: to fit one segment better than one of these does costs another.",
 }
 _CAPTIONS = {
     "estimates": "Every estimate between its bounds. Grey: held fixed, or without effect.",
@@ -54,10 +59,11 @@ def fit_page(
             tables=(tables["errors"],),
             pictures=tuple(Picture(figures[name], _RESPONSE) for name in responses),
         ),
+        told_section(told(fit), problem, fit.uncertainty, fit.identifiability, figures),
         Section("How the search went", facts=_effort(fit), pictures=_pictures(figures, "learning")),
         Section(
             "The Pareto set",
-            _PARETO[problem.settings.search.algorithm],
+            _PARETO[_objectives(problem, fit)],
             pictures=_pictures(figures, "pareto"),
         ),
         Section("What to beware of", points=cautions(problem, fit)),
@@ -94,9 +100,16 @@ def _facts(arm: str, identity: Mapping[str, Any], problem: Problem) -> tuple[tup
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
         ("other joints", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
-        ("search", _ALGORITHMS[settings.search.algorithm]),
+        ("search", _ALGORITHMS.get(settings.search.name, settings.search.name)),
         ("seed", str(settings.search.seed)),
     )
+
+
+def _objectives(problem: Problem, fit: Fit) -> str:
+    """Which objectives the search had; of a library's algorithm the estimates tell it."""
+    algorithm = problem.settings.search.algorithm
+    several = "average" in fit.estimates if algorithm == "pymoo" else algorithm == "nsga2"
+    return "several" if several else "single"
 
 
 def _effort(fit: Fit) -> tuple[tuple[str, str], ...]:

@@ -43,20 +43,21 @@ def parameter_table(problem: Problem, fit: Fit, truth: Mapping[str, float] | Non
     judged = [fit.estimates[name] for name in dict.fromkeys([fit.searched.name, fit.final])]
     if truth:
         header += ["true", *(f"relative error, {_short(estimate, fit)}" for estimate in judged)]
-    header += ["effect [deg]", "flag"]
-    said = flags(problem, fit)
+    header += ["±", "effect [deg]", "flag"]
+    said = flags(fit)
+    half = np.diff(fit.uncertainty.interval, axis=1)[:, 0] / 2
     rows: list[tuple[Cell, ...]] = []
     for i, parameter in enumerate(problem.parameters.parameters):
         row: list[Cell] = [*_named(parameter), *(float(fit.estimates[name].theta[i]) for name in names)]
         if truth:
             true = truth.get(parameter.name)
             row += [Given(true) if true is not None else None, *(_relative(e.theta[i], true) for e in judged)]
-        rows.append((*row, degrees(fit.effects[i]), said[i]))
+        rows.append((*row, _known(half[i]), _known(degrees(fit.effects[i])), said[i]))
     if truth:
         without = [n for n, flag in zip(problem.parameters.names, said, strict=True) if "no effect" in flag]
         rows += _sum_rows(problem.parameters, [e.theta for e in judged], truth, without, 5 + len(names))
     note = (
-        f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(problem, fit)}"
+        f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(fit)}"
     )
     return Table("Parameters", tuple(header), tuple(rows), note)
 
@@ -170,6 +171,11 @@ def _named(parameter: Parameter) -> tuple[Cell, ...]:
     return (parameter.name, parameter.unit, *limits)
 
 
+def _known(value: float) -> float | None:
+    """A number, or nothing where there is none; what has no limit stays so."""
+    return None if np.isnan(value) else float(value)
+
+
 def _short(estimate: Estimate, fit: Fit) -> str:
     return "search" if estimate is fit.searched else estimate.name
 
@@ -198,7 +204,7 @@ def _sum_rows(
     rows: list[tuple[Cell, ...]] = []
     for ignore in ([], without) if without else ([],):
         sums = [_error_sum(parameters, theta, truth, ignore) for theta in thetas]
-        rows.append((f"sum{_but(ignore)}", *(None,) * (before - 1), *sums, None, ""))
+        rows.append((f"sum{_but(ignore)}", *(None,) * (before - 1), *sums, None, None, ""))
     return rows
 
 

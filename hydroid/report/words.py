@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from hydroid.identification.fit import Fit
 from hydroid.identification.problem import Problem
+from hydroid.identification.patterns import listed
+from hydroid.identification.uncertainty import KNOWN, NOT_DETERMINED, WEAK, at_bounds
 from hydroid.parameters import Array, Parameter
 from hydroid.report.table import number, plain
 from hydroid.settings.objective import ObjectiveSettings
-
-AT_BOUND = 1e-3
-"""an estimate is called at a bound within this part of the range"""
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
@@ -23,6 +22,9 @@ _ESTIMATES = {
     "polished": "least squares from the best of the others",
     "refined": "least squares over both stages' parameters from there",
 }
+
+
+_OPEN = "Hold fixed or state (`known`) what is {} otherwise, compare more joints, or add logs in other poses."
 
 
 def estimate_label(fit: Fit, name: str) -> str:
@@ -49,25 +51,9 @@ def in_reader_units(settings: ObjectiveSettings, objectives: Array) -> Array:
     return objectives if settings.relative else np.degrees(objectives)
 
 
-def flags(problem: Problem, fit: Fit) -> tuple[str, ...]:
+def flags(fit: Fit) -> tuple[str, ...]:
     """What is to be known about the final estimate of each parameter; empty where nothing is."""
-    return tuple(_flag(problem, fit, i) for i in range(len(problem.parameters.names)))
-
-
-def _flag(problem: Problem, fit: Fit, i: int) -> str:
-    parameter, value = problem.parameters.parameters[i], fit.best.theta[i]
-    freed = fit.final == "refined" and parameter.lower < parameter.upper
-    if parameter.fixed is not None and not freed:
-        return "held fixed"
-    found: list[str] = []
-    if fit.without_effect[i]:
-        found.append("no effect on the outputs")
-    elif fit.sensitivity.undetermined[i]:
-        found.append("not determined alone")
-    if math.isnan(fit.effects[i]):
-        found.append("effect unknown, the changed arm diverges")
-    found += [f"at {side} bound" for side, at in _at_bounds(parameter, value) if at]
-    return ", ".join(found)
+    return tuple(", ".join(said) for said in fit.uncertainty.flags)
 
 
 def runs_flag(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
@@ -76,39 +62,34 @@ def runs_flag(parameter: Parameter, values: Array, without_effect: Collection[st
         return "held fixed"
     if parameter.name in without_effect:
         return "no effect on the outputs"
-    counts = ((side, int(np.sum(at))) for side, at in _at_bounds(parameter, values))
+    counts = ((side, int(np.sum(at))) for side, at in at_bounds(parameter, values))
     return ", ".join(f"at {side} bound in {n} of {len(values)} runs" for side, n in counts if n)
 
 
-def _at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
-    """Whether values lie at each bound."""
-    margin = AT_BOUND * (parameter.upper - parameter.lower)
-    return (
-        ("lower", np.asarray(value - parameter.lower <= margin)),
-        ("upper", np.asarray(parameter.upper - value <= margin)),
-    )
-
-
-def told(problem: Problem, fit: Fit) -> str:
+def told(fit: Fit) -> str:
     """How much these logs tell, in a sentence or two."""
-    free = sum(flag != "held fixed" for flag in flags(problem, fit))
+    names, rank = fit.identifiability.names, fit.identifiability.rank
     return (
-        f"These logs determine {fit.sensitivity.combinations} independent combinations of the {free} free "
-        "parameters. One that is not determined alone may change by a third or more while others make up for "
-        "it: a small output error does not prove it."
+        f"These logs determine {rank} independent combination{'' if rank == 1 else 's'} of the {len(names)} free "
+        f"parameters to {100 * KNOWN:.0f} % or better. ±: 95 % interval for noise as these logs show it; it holds "
+        "as far as the model does. A parameter that is not determined has none: a small output error does not "
+        "prove it."
     )
 
 
 def cautions(problem: Problem, fit: Fit) -> tuple[str, ...]:
     """What a reader of the answer should beware of, one sentence or two each."""
-    flagged = list(zip(problem.parameters.parameters, flags(problem, fit), strict=True))
-    said = [told(problem, fit)]
+    flagged = list(zip(problem.parameters.parameters, flags(fit), strict=True))
+    said = [told(fit)]
     idle = [p.name for p, flag in flagged if "no effect" in flag]
     if idle:
         said.append(
             f"{listed(idle)}: no effect on the outputs. Any value within the bounds fits as well; "
             "hold it fixed, or measure a joint that feels it."
         )
+    for word, advice in ((NOT_DETERMINED, "known"), (WEAK, "known better")):
+        if open_ := [p.name for p, flag in flagged if word in flag]:
+            said.append(f"{listed(open_)}: {word}. {_OPEN.format(advice)}")
     for side in ("lower", "upper"):
         bounded = [
             f"{p.name} ({plain(p.lower if side == 'lower' else p.upper)} {p.unit})"
@@ -121,12 +102,6 @@ def cautions(problem: Problem, fit: Fit) -> tuple[str, ...]:
                 "the bound is too narrow, or the model lacks something."
             )
     return (*said, *_search_cautions(problem, fit), "The model's geometry is as configured in arm.yaml.")
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _search_cautions(problem: Problem, fit: Fit) -> list[str]:

@@ -15,6 +15,7 @@ from hydroid.identification.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.report.channels import Channel, channel, channels, file_name, log_names, short_name, unique
+from hydroid.report.identifiability import direction_table, noise_table
 from hydroid.report.table import Table
 from hydroid.report.tables import (
     SeedResult,
@@ -66,12 +67,18 @@ def write_report(
     from hydroid.report import plots
     from hydroid.report.page import fit_page
 
-    tables = {"parameters": parameter_table(problem, fit, truth), "errors": objective_table(problem, fit)}
+    tables = {
+        "parameters": parameter_table(problem, fit, truth),
+        "errors": objective_table(problem, fit),
+        "directions": direction_table(fit.identifiability),
+        "noise": noise_table(problem, fit.uncertainty),
+    }
     drawn = {
         **_responses(problem, fit),
         "learning": plots.learning(problem, fit),
         "pareto": plots.pareto(problem, fit),
         "estimates": plots.estimates(problem, fit, truth),
+        **plots.told(fit.uncertainty, fit.identifiability),
     }
     vector = {name: plots.svg(figure) for name, figure in drawn.items()}
     page = fit_page(folder.settings()[1].name, folder.identity(), problem, fit, tables, vector)
@@ -95,7 +102,7 @@ def write_runs(
     from hydroid.report import plots
 
     parameters = results[0][1].parameters
-    said = [flags(problem, fit) for _, problem, fit in results]
+    said = [flags(fit) for _, _, fit in results]
     ignore = [
         name
         for name, *each in zip(parameters.names, *said, strict=True)

@@ -1,7 +1,8 @@
 """The words that every search shares: a population, and `start`, `ask`, `tell`.
 
-An algorithm holds settings only. The whole state of a run is its population, the state of its random
-generator and the number of the generation: store these three, and the run continues bit for bit.
+Our algorithms hold settings only. The whole state of a run is its population, the state of its random
+generator and the number of the generation: store these three, and the run continues bit for bit. Those of
+other libraries (`library`) hold more, and are replayed.
 
     genes = algorithm.start(rng)
     population = algorithm.tell(None, Population(genes, objectives(algorithm.decode(genes))))
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from hydroid.search.coding import Genes
 from hydroid.search.pareto import feasible
-from hydroid.settings.search import GeneticSettings
+from hydroid.settings.search import PopulationSettings
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -68,11 +69,16 @@ class Population:
 
 
 class Algorithm(Protocol):
-    """A search strategy: frozen, without state of its own."""
+    """A search strategy."""
 
     @property
-    def settings(self) -> GeneticSettings:
-        """Size, length, coding and operators."""
+    def settings(self) -> PopulationSettings:
+        """Size and length."""
+        ...
+
+    @property
+    def single(self) -> bool:
+        """Whether it minimises one objective, shape (n, 1), rather than several at once."""
         ...
 
     @property
@@ -81,7 +87,7 @@ class Algorithm(Protocol):
         ...
 
     def start(self, rng: Generator) -> Genes:
-        """Chromosomes of the first population: uniform over the search space (article 4.1)."""
+        """Chromosomes of the first population."""
         ...
 
     def ask(self, population: Population, rng: Generator) -> Genes:

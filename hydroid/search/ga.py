@@ -25,6 +25,11 @@ class SimpleGa:
     parameters: int
 
     @property
+    def single(self) -> bool:
+        """One objective."""
+        return True
+
+    @property
     def population_size(self) -> int:
         """Members of a population."""
         return self.settings.population

@@ -27,6 +27,11 @@ class Nsga2:
     parameters: int
 
     @property
+    def single(self) -> bool:
+        """Several objectives."""
+        return False
+
+    @property
     def population_size(self) -> int:
         """Members of a population."""
         return self.settings.population

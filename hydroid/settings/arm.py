@@ -53,6 +53,14 @@ class FixedPart(Link):
     """in the frame of the link that carries it [m]"""
 
 
+class PayloadPlace(Settings):
+    """Where a payload sits: its centre of mass, carried by a link."""
+
+    carried_by: Name
+    at: Vector
+    """in the frame of the link [m]"""
+
+
 class Joint(Settings):
     """A hinge; it moves the link of the same position in the list of links."""
 
@@ -89,6 +97,8 @@ class Arm(Settings):
     links: Annotated[tuple[Link, ...], Field(min_length=1)]
     fixed: tuple[FixedPart, ...] = ()
     joints: tuple[Joint, ...]
+    payload: PayloadPlace | None = None
+    """where the gripper holds what a log's `payloads` names"""
     poses: dict[Name, tuple[float, ...]]
     """joint angles by name [deg], one a joint"""
 
@@ -110,6 +120,8 @@ class Arm(Settings):
                 raise ValueError(
                     f"{part.name} is carried by {part.carried_by!r}, which is none of: {', '.join(moving)}"
                 )
+        if self.payload is not None and self.payload.carried_by not in moving:
+            raise ValueError(f"payload: {self.payload.carried_by!r} is none of: {', '.join(moving)}")
         for name, pose in self.poses.items():
             _check_pose(name, pose, self.joints)
         return self

@@ -5,11 +5,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hydroid.settings.design import DesignSettings
 from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
+from hydroid.settings.knowledge import KnownSettings
 from hydroid.settings.load import Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.objective import ObjectiveSettings
-from hydroid.settings.search import GaSettings, Nsga2Settings, PolishSettings
+from hydroid.settings.search import (
+    CmaesSettings,
+    GaSettings,
+    Nsga2Settings,
+    PolishSettings,
+    PymooSettings,
+)
 from hydroid.settings.simulation import SimulationSettings
 
 MECHANICAL_UNITS = {
@@ -68,12 +76,19 @@ class ParameterSettings(Settings):
 class SearchSettings(Settings):
     """Which algorithm searches, from which seed, and how one estimate is taken from a Pareto set."""
 
-    algorithm: Literal["ga", "nsga2"] = "nsga2"
+    algorithm: Literal["ga", "nsga2", "cmaes", "pymoo", "multistart"] = "nsga2"
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     compromise: Literal["average", "utopia", "best"] = "average"
     """average: of the best point of each segment, the article's; utopia: nearest to it; best: lowest norm"""
     ga: GaSettings = GaSettings()
     nsga2: Nsga2Settings = Nsga2Settings()
+    cmaes: CmaesSettings = CmaesSettings()
+    pymoo: PymooSettings = PymooSettings()
+
+    @property
+    def name(self) -> str:
+        """The algorithm, one of pymoo by its name there."""
+        return self.pymoo.algorithm if self.algorithm == "pymoo" else self.algorithm
 
 
 class FitSettings(Settings):
@@ -89,6 +104,10 @@ class FitSettings(Settings):
     """the arm's pose in which joints without a measured angle stand"""
     parameters: dict[str, ParameterSettings]
     hydraulics: HydraulicSettings = HydraulicSettings()
+    known: dict[str, KnownSettings] = Field(default_factory=dict[str, KnownSettings])
+    """what is known besides the logs, by any name"""
+    payloads: dict[str, Annotated[float, Field(gt=0)]] = Field(default_factory=dict[str, float])
+    """known mass in the gripper [kg], by a log's file name"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()
@@ -97,6 +116,8 @@ class FitSettings(Settings):
     """null: none, as in the article"""
     refine: bool = False
     """then polish all parameters that have bounds together, those held fixed included"""
+    design: DesignSettings = DesignSettings()
+    """of `hydroid design`; a fit does not use it"""
 
     @model_validator(mode="before")
     @classmethod

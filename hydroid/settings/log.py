@@ -63,14 +63,30 @@ class AngleColumn(Settings):
     offset: Offset = 0.0
 
 
+class PressureColumns(Settings):
+    """Columns of chambers A (pushes to positive angles) and B: pressure [unit] = scale · cell + offset."""
+
+    column: Annotated[tuple[str, str], Field(min_length=2, max_length=2)] = (
+        f"pA{JOINT}_bar",
+        f"pB{JOINT}_bar",
+    )
+    unit: Literal["bar", "Pa", "MPa"] = "bar"
+    scale: Scale = 1.0
+    offset: Offset = 0.0
+
+
 class JointColumns(Settings):
     """The columns of one joint; null: the log does not have it."""
 
     command: CommandColumns | None
     angle: AngleColumn | None
+    pressure: PressureColumns | None = None
 
 
-def _common(columns: CommandColumns | AngleColumn | None) -> CommandColumns | AngleColumn | None:
+Columns = CommandColumns | AngleColumn | PressureColumns
+
+
+def _common(columns: Columns | None) -> Columns | None:
     """Columns of all joints must tell the joints apart."""
     names = (
         () if columns is None else (columns.column,) if isinstance(columns.column, str) else columns.column
@@ -87,6 +103,7 @@ class LogSettings(Settings):
     time: TimeColumn = TimeColumn()
     command: Annotated[CommandColumns | None, AfterValidator(_common)] = CommandColumns()
     angle: Annotated[AngleColumn | None, AfterValidator(_common)] = AngleColumn()
+    pressure: Annotated[PressureColumns | None, AfterValidator(_common)] = None  # most logs have none
     joints: dict[Annotated[int, Field(ge=1)], JointColumns] = Field(default_factory=dict[int, JointColumns])
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01  # of the Log, whatever the file's rate
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0  # the command acts this much later than logged
@@ -113,6 +130,11 @@ class LogSettings(Settings):
         own = self.joints[joint].angle if joint in self.joints else self.angle
         return own and own.model_copy(update={"column": _numbered(own.column, joint)})
 
+    def pressure_of(self, joint: int) -> PressureColumns | None:
+        """Return the columns of a joint's pressures, with its number in their names; None: not in the log."""
+        own = self.joints[joint].pressure if joint in self.joints else self.pressure
+        return own and own.model_copy(update={"column": tuple(_numbered(c, joint) for c in own.column)})
+
 
 def _numbered(column: str, joint: int) -> str:
     return column.replace(JOINT, str(joint))
@@ -120,12 +142,13 @@ def _numbered(column: str, joint: int) -> str:
 
 def _complete(common: dict[str, Any], own: Any) -> Any:
     if own is None:
-        return {"command": None, "angle": None}
+        return {"command": None, "angle": None, "pressure": None}
     if not isinstance(own, dict):
         return own
     entry = dict(cast(dict[str, Any], own))
-    for kind in ("command", "angle"):
-        base = common.get(kind, {})
+    for kind in ("command", "angle", "pressure"):
+        # of pressures there are none unless they are named
+        base = common.get(kind, None if kind == "pressure" else {})
         base = base.model_dump() if isinstance(base, BaseModel) else base
         mine = entry.setdefault(kind, base)
         if isinstance(mine, dict) and isinstance(base, dict):

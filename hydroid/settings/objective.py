@@ -13,6 +13,7 @@ def _name_infinity(value: Any) -> Any:
     return "inf" if isinstance(value, float) and value == math.inf else value
 
 
+Positive = Annotated[float, Field(gt=0)]
 Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
 
 
@@ -48,3 +49,14 @@ class ObjectiveSettings(Settings):
     relative: bool = False
     """Divide by the norm of the measured output of the same segment, equation (19)."""
     segments: SegmentSettings = SegmentSettings(equal=8)
+    weights: dict[Annotated[int, Field(ge=1)], Annotated[float, Field(gt=0)]] = Field(
+        default_factory=dict[int, float]
+    )
+    """By joint: its angle's error counts this many times; 1 where none is given."""
+    pressure_weight: Annotated[float, Field(ge=0)] = 0.0
+    """What a chamber pressure's error counts in stage 2 [deg/bar]; 0: pressures are not compared."""
+    noise_deg: Positive | dict[Annotated[int, Field(ge=1)], Positive] | None = None
+    """Standard deviation of the measured angles' (white) noise, for all joints or joint by joint, where it is known;
+    by default it is estimated from what the fit leaves over, with its autocorrelation."""
+    noise_bar: Positive | None = None
+    """The same of chamber pressures."""

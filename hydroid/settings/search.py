@@ -9,12 +9,17 @@ from hydroid.settings.load import Settings
 Rate = Annotated[float, Field(ge=0, le=1)]
 
 
-class GeneticSettings(Settings):
-    """What both searches share: size, length, coding and operators."""
+class PopulationSettings(Settings):
+    """What all searches by populations share: their size and how long they run."""
 
     population: Annotated[int, Field(ge=2)]
     generations: Annotated[int, Field(ge=0)]
-    """Populations bred after the first, random one. Ours: both defaults cost about 2,800 simulations."""
+    """Populations bred after the first one. Ours: all defaults cost about 2,800 simulations."""
+
+
+class GeneticSettings(PopulationSettings):
+    """What both genetic algorithms share: coding and operators."""
+
     crossover_rate: Rate
     """Chance P_c that a pair of parents crosses; otherwise its children are copies."""
     mutation_rate: Rate
@@ -56,6 +61,26 @@ class Nsga2Settings(GeneticSettings):
     generations: Annotated[int, Field(ge=0)] = 140
     crossover_rate: Rate = 0.4
     mutation_rate: Rate = 0.2
+
+
+class CmaesSettings(PopulationSettings):
+    """CMA-ES (Hansen), of the library cma: one objective, the error over the whole record."""
+
+    population: Annotated[int, Field(ge=6)] = 20
+    generations: Annotated[int, Field(ge=0)] = 140
+    """The search ends before, where cma finds that it has converged."""
+    sigma: Annotated[float, Field(gt=0, le=1)] = 0.3
+    """Standard deviation of the first population about the middle of the bounds, in terms of their widths."""
+
+
+class PymooSettings(PopulationSettings):
+    """An algorithm of the library pymoo."""
+
+    algorithm: str = "NSGA3"
+    """Its class there: NSGA3, MOEAD, RVEA, AGEMOEA, SMSEMOA, ... with the segments as objectives; DE, PSO,
+    GA, ... with the error over the whole record."""
+    population: Annotated[int, Field(ge=4)] = 40
+    generations: Annotated[int, Field(ge=0)] = 70
 
 
 class PolishSettings(Settings):

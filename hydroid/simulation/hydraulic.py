@@ -7,6 +7,7 @@ another within the record; members are independent, and no thread count changes 
 
 import logging
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
@@ -48,6 +49,7 @@ class HydraulicSimulation:
         arm: the arm's settings, for the cylinders' triangles.
         hydraulics: settings of the chain.
         settings: threads.
+        pressures: active joints whose chamber pressures are wanted in the response, 0-based.
 
     Attributes:
         joints: those with actuators and those they couple with, 0-based among the arm's, shape (J,).
@@ -55,7 +57,12 @@ class HydraulicSimulation:
     """
 
     def __init__(
-        self, record: Record, arm: Arm, hydraulics: HydraulicSettings, settings: SimulationSettings
+        self,
+        record: Record,
+        arm: Arm,
+        hydraulics: HydraulicSettings,
+        settings: SimulationSettings,
+        pressures: Sequence[int] = (),
     ) -> None:
         compile_kernels(lambda: _log.warning("compiling the actuator's kernels, once on this machine ..."))
         self.record, self._hydraulics = record, hydraulics
@@ -65,6 +72,7 @@ class HydraulicSimulation:
         # joints that follow the log keep their servo; all others couple through their inertia and belong in
         self._columns = np.setdiff1d(np.arange(len(record.joints)), prescribed)
         self.joints = record.joints[self._columns]
+        self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
         driven = [int(j) for j in self.joints if record.active[j]]
         self._linkages = Linkages.of(arm, [int(j) for j in self.joints], driven)
         self._entries = _entries(record.arm.model)[np.ix_(self._columns, self._columns)]
@@ -74,7 +82,7 @@ class HydraulicSimulation:
         """Simulate n members, whatever n is.
 
         Returns:
-            Angles of the outputs at the log's samples, shape (n, T, K); the first sample is the start pose.
+            Angles of the outputs, and the pressures asked for, at the log's samples; the first is the start.
             A member without a force-stroke curve, or that diverged, is infeasible.
         """
         return in_chunks(self._simulate_chunk, members, self.record.chunk)
@@ -90,15 +98,19 @@ class HydraulicSimulation:
     def _simulate_chunk(self, members: Members) -> Response:
         assert members.actuators is not None
         exists = members.actuators.feasible
-        out = np.full((len(members), 1 + len(self.command) // self._steps, len(self.record.outputs)), np.nan)
+        n, samples = len(members), 1 + len(self.command) // self._steps
+        out = np.full((n, samples, len(self.record.outputs)), np.nan)
+        pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
         share = np.array_split(np.flatnonzero(exists), min(self._threads, max(int(exists.sum()), 1)))
         with quiet_mujoco(), ThreadPoolExecutor(len(share)) as pool:
-            for rows, angle in zip(
+            for rows, (angle, oil) in zip(
                 share, pool.map(self._run, [members[rows] for rows in share]), strict=True
             ):
                 out[rows] = angle
+                if pressure is not None:
+                    pressure[rows] = oil
         feasible: NDArray[np.bool_] = np.all(np.isfinite(out), axis=(1, 2))
-        return Response(out, feasible)
+        return Response(out, feasible, pressure)
 
     def begin(self, members: Members) -> "HydraulicRun":
         """Put n feasible members at the start of the record, to be stepped one by one."""
@@ -120,22 +132,28 @@ class HydraulicSimulation:
         )
         return HydraulicRun(self.record, self._columns, population, actuator, balance)
 
-    def _run(self, members: Members, trace: list[tuple[Array, ...]] | None = None) -> Array:
-        """Step n members over the whole record; return the outputs at its samples, NaN where one diverged."""
+    def _run(self, members: Members, trace: list[tuple[Array, ...]] | None = None) -> tuple[Array, Array]:
+        """Step n members over the record; outputs and pressures at its samples, NaN where one diverged."""
         outputs, steps = self.record.outputs, len(self.command)
+        samples = 1 + steps // self._steps
+        pressure = np.empty((len(members), samples, len(self._pressures), 2))
         if len(members) == 0:
-            return np.empty((0, 1 + steps // self._steps, len(outputs)))
+            return np.empty((0, samples, len(outputs))), pressure
         run = self.begin(members)
         angle = np.empty((len(members), steps, len(outputs)))
         for k, command in enumerate(self.command):
             if trace is not None:
                 trace.append(_first(run.observe()))
+            if self._pressures.size and k % self._steps == 0:
+                pressure[:, k // self._steps] = run.observe().pressure[:, self._pressures]
             run.step(command)
             angle[:, k] = run.position[:, outputs]
         if trace is not None:
             trace.append(_first(run.observe()))
-        angle[~run.healthy] = np.nan
-        return self.record.sampled(angle)
+        if self._pressures.size:
+            pressure[:, -1] = run.observe().pressure[:, self._pressures]
+        angle[~run.healthy], pressure[~run.healthy] = np.nan, np.nan
+        return self.record.sampled(angle), pressure
 
 
 class HydraulicRun:

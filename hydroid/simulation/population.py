@@ -59,17 +59,24 @@ class Members:
 class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints.
 
-    A member that diverged has `feasible` False, shape (n,), and NaN throughout.
+    A member that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
+    (n, T, L, 2), are those of chambers A and B of L joints, where they were asked for.
     """
 
     angle: Array
     feasible: NDArray[np.bool_]
+    pressure: Array | None = None
 
 
 def in_chunks(simulate: Callable[[Members], Response], members: Members, size: int) -> Response:
     """Simulate members `size` at a time: memory for the steps does not grow with their number."""
     parts = [simulate(members[i : i + size]) for i in range(0, len(members), size)]
-    return Response(np.concatenate([p.angle for p in parts]), np.concatenate([p.feasible for p in parts]))
+    pressures = [p.pressure for p in parts if p.pressure is not None]
+    return Response(
+        np.concatenate([p.angle for p in parts]),
+        np.concatenate([p.feasible for p in parts]),
+        np.concatenate(pressures) if pressures else None,
+    )
 
 
 @contextmanager

@@ -40,7 +40,7 @@ def estimates(problem: Problem, fit: Fit, truth: Mapping[str, float] | None = No
     _frame(axes, parameters, "Estimates within their bounds")
     looks = estimate_looks(fit)
     axes.text(_TEXT_AT, -0.7, estimate_label(fit, fit.final), fontsize=9, fontweight="bold", va="center")
-    for row, (parameter, flag) in enumerate(zip(parameters, flags(problem, fit), strict=True)):
+    for row, (parameter, flag) in enumerate(zip(parameters, flags(fit), strict=True)):
         dull = "no effect" in flag or "fixed" in flag
         if _bar(axes, row, parameter, dull=dull):
             beside = iter((-0.25, 0.25, -0.25, 0.25))  # compromises often coincide

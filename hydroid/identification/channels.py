@@ -1,0 +1,78 @@
+"""Channels: what is measured and simulated, one log and one signal each, and its place in a row of errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.settings.objective import ObjectiveSettings
+from hydroid.simulation import Response
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One signal of one log.
+
+    Attributes:
+        log: index of the log.
+        joint: number, from 1.
+        quantity: what is measured.
+        column: of the signal in the response's angles, or of its joint in the response's pressures.
+        measured: [rad] or [Pa], shape (T,).
+        weight: error times weight is the residual [rad]: no unit for an angle, rad/Pa for a pressure.
+        rows: its residuals in a row of all channels' residuals.
+    """
+
+    log: int
+    joint: int
+    quantity: Literal["angle", "pressure_a", "pressure_b"]
+    column: int
+    measured: Array
+    weight: float
+    rows: slice
+
+    def residual(self, responses: Sequence[Response]) -> Array:
+        """Return the weighted output error y - y_hat of (17) [rad], shape (n, T)."""
+        response = responses[self.log]
+        if self.quantity == "angle":
+            simulated = response.angle[:, :, self.column]
+        else:
+            assert response.pressure is not None
+            simulated = response.pressure[:, :, self.column, "ab".index(self.quantity[-1])]
+        return self.weight * (self.measured - simulated)
+
+
+def make_channels(
+    logs: Sequence[Log], outputs: Sequence[int], pressures: Sequence[Sequence[int]], how: ObjectiveSettings
+) -> tuple[Channel, ...]:
+    """List the channels log by log, angles first.
+
+    Args:
+        logs: the logs.
+        outputs: joints whose angles are compared, 0-based.
+        pressures: for each log the joints whose pressures are compared, 0-based.
+        how: weights.
+    """
+    channels: list[Channel] = []
+    at = 0
+    for i, log in enumerate(logs):
+        count = len(log.time)
+        for column, joint in enumerate(outputs):
+            weight = how.weights.get(joint + 1, 1.0)
+            rows = slice(at, at + count)
+            channels.append(Channel(i, joint + 1, "angle", column, log.angle[:, joint], weight, rows))
+            at += count
+        for column, joint in enumerate(pressures[i]):
+            assert log.pressure is not None
+            for side, quantity in enumerate(("pressure_a", "pressure_b")):
+                measured = log.pressure[:, joint, side]
+                if np.isnan(measured[0]):
+                    continue
+                weight = np.deg2rad(how.pressure_weight) / 1e5  # deg/bar -> rad/Pa
+                rows = slice(at, at + count)
+                channels.append(Channel(i, joint + 1, quantity, column, measured, weight, rows))  # pyright: ignore[reportArgumentType]
+                at += count
+    return tuple(channels)

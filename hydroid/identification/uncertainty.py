@@ -1,0 +1,190 @@
+"""How well the data determine each parameter: covariance, intervals, flags.
+
+The estimate minimises the weighted squares of the residuals, and of the statements' scores times the residual's
+level; the noise need not be white nor the weights match it. With J the derivatives of all that (per relative
+change), and S the covariance of the noise, the covariance of such an estimate is the *sandwich*
+
+    C = (J J')^-1 J S J' (J J')^-1        (J of shape (p, R); P. J. Huber, 1967; G. A. F. Seber and C. J. Wild, 1989)
+
+which for white noise of one level is the usual s² (J J')^-1. All of it goes through one singular value
+decomposition J = V D U, C^-1 = G' G with G = (U S U')^-1/2 D V': directions that the data do not feel keep a
+singular value of exactly zero, and nothing is squared on the way.
+
+It is a first-order, local look, and holds as far as the model does: an error of the model that shifts an estimate is
+in no interval. An estimate on a bound is treated as if the bound were not there, and gets no interval.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from hydroid.identification.jacobian import Jacobian, jacobian
+from hydroid.identification.noise import FLOOR, Noise, channel_noise
+from hydroid.identification.problem import Problem
+from hydroid.parameters import Array, Parameter
+
+KNOWN = 0.3
+"""a parameter or direction is determined when its relative standard deviation is at most this, else weak"""
+LOST = 1.0
+"""beyond this relative standard deviation it is not determined at all: no linear interval says anything"""
+COVERED = 0.95
+"""chance with which an interval covers the truth"""
+AT_BOUND = 1e-3
+"""an estimate is called at a bound within this part of the range"""
+ZERO = 1e-12
+"""a singular value this much smaller than the first is zero"""
+PART = 0.01
+"""a parameter that has less than this part in a direction of no effect does not depend on it"""
+DOUBT = 0.1
+"""two steps whose derivatives differ by more than this part are flagged"""
+
+Flags = tuple[str, ...]
+FIXED, NO_EFFECT, NOT_DETERMINED, WEAK = (
+    "held fixed",
+    "no effect on the outputs",
+    "not determined",
+    "weakly determined",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What the data say about P parameters, p of them free, at an estimate.
+
+    Attributes:
+        theta: the estimate, shape (P,).
+        jacobian: derivatives there.
+        noise: of each channel.
+        free: which parameters are free, shape (P,).
+        root: G of C^-1 = G' G, shape (p, p): a relative change v of the free parameters is |G v| standard
+            deviations away from the estimate.
+        relative: relative standard deviation of each parameter, shape (P,); inf where it is not determined, NaN
+            where it is fixed.
+        interval: of 95 %, from Student's t, shape (P, 2); infinite where not determined, NaN where fixed or at a
+            bound.
+        correlation: of the free parameters' estimates, shape (p, p); NaN where not determined.
+        freedom: degrees of freedom of the noise's level.
+        flags: by parameter, what is to be known about its estimate.
+    """
+
+    theta: Array
+    jacobian: Jacobian
+    noise: tuple[Noise, ...]
+    free: NDArray[np.bool_]
+    root: Array
+    relative: Array
+    interval: Array
+    correlation: Array
+    freedom: float
+    flags: tuple[Flags, ...]
+
+    @property
+    def standard_deviation(self) -> Array:
+        """Of each parameter, in its unit, shape (P,)."""
+        return self.relative * self.jacobian.scale
+
+
+def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
+    """Return how well the problem's data determine theta, shape (P,), with the noise that they show there."""
+    slopes = jacobian(problem, theta)
+    noise = tuple(
+        channel_noise(channel, slopes.residual[channel.rows], problem.settings.objective)
+        for channel in problem.channels
+    )
+    return judge(problem, theta, slopes, noise)
+
+
+def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, ...]) -> Uncertainty:
+    """Return the uncertainty from derivatives and noise: `uncertainty` without its simulations."""
+    free = problem.parameters.free
+    root, freedom = _root(problem, slopes, noise)
+    covariance, lost = covariance_of(root)
+    relative = np.full(len(theta), np.nan)
+    relative[free] = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
+    unknown = relative > LOST
+    relative[unknown] = np.inf
+    bound = [next((s for s, at in at_bounds(p, v) if at), "") for p, v in zip(problem.parameters.parameters, theta)]
+    half = student.ppf(0.5 + COVERED / 2, freedom) * relative * slopes.scale
+    interval = np.stack([theta - half, theta + half], axis=1)
+    interval[[side != "" for side in bound] & ~unknown] = np.nan
+    flags = tuple(
+        _flags(float(relative[i]), slopes, i, bound[i]) if free[i] else (FIXED,) for i in range(len(theta))
+    )
+    deviation = np.where(unknown[free], np.nan, relative[free])
+    return Uncertainty(
+        theta,
+        slopes,
+        noise,
+        free,
+        root,
+        relative,
+        interval,
+        covariance / np.outer(deviation, deviation),
+        freedom,
+        flags,
+    )
+
+
+def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return (G' G)^-1 over the directions that are felt, shape (p, p), and who has a part in the others, (p,)."""
+    _, values, directions = np.linalg.svd(root)
+    felt = values > ZERO * values.max(initial=0.0)
+    known = directions[felt] / values[felt, None]
+    return known.T @ known, np.linalg.norm(directions[~felt], axis=0) > PART
+
+
+def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Whether values lie at each bound."""
+    margin = AT_BOUND * (parameter.upper - parameter.lower)
+    return (
+        ("lower", np.asarray(value - parameter.lower <= margin)),
+        ("upper", np.asarray(parameter.upper - value <= margin)),
+    )
+
+
+def _statement_unit(slopes: Jacobian) -> float:
+    """What a statement's score counts in the polish, in units of the residual [rad]."""
+    return float(np.fmax(np.sqrt(np.mean(slopes.residual**2)), FLOOR["angle"]))
+
+
+def _root(problem: Problem, slopes: Jacobian, noise: tuple[Noise, ...]) -> tuple[Array, float]:
+    """Return G, shape (p, p), and the degrees of freedom of the noise's level."""
+    free, unit = problem.parameters.free, _statement_unit(slopes)
+    felt = np.nan_to_num(np.hstack([slopes.slopes, unit * slopes.statements])[free])
+    error = np.nan_to_num(slopes.error[free])
+    directions, values, course = np.linalg.svd(felt, full_matrices=False)
+    resolved = np.maximum(np.linalg.norm(directions.T @ error, axis=1), ZERO * values[0])
+    values[values <= resolved] = 0.0
+    count = len(slopes.residual)
+    scatter = unit**2 * course[:, count:] @ course[:, count:].T
+    samples = 0.0
+    for channel, process in zip(problem.channels, noise, strict=True):
+        own = process.covariance_of(course[:, channel.rows])
+        if process.source == "residual":
+            # the fit has taken up a share of the noise: what is left over shows less than there was
+            share = np.trace(own[values > 0][:, values > 0]) / (process.samples * process.level**2)
+            own = own / (1 - min(share, 0.9))
+        scatter += own
+        samples += process.independent_samples
+    strength, axes = np.linalg.eigh(scatter)
+    inverse = (axes / np.sqrt(np.maximum(strength, np.finfo(float).tiny))) @ axes.T
+    return inverse @ (values[:, None] * directions.T), max(samples - np.count_nonzero(values), 1.0)
+
+
+def _flags(relative: float, slopes: Jacobian, i: int, bound: str) -> Flags:
+    found: list[str] = []
+    if not np.isfinite(slopes.slopes[i]).all():
+        found.append("effect unknown, the changed arm diverges")
+    elif slopes.without_effect[i]:
+        found.append(NO_EFFECT)
+    elif not relative <= LOST:
+        found.append(NOT_DETERMINED)
+    elif relative > KNOWN:
+        found.append(WEAK)
+    if slopes.doubt[i] > DOUBT:
+        found.append(f"derivative only to {100 * slopes.doubt[i]:.0f} %")
+    if bound:
+        found.append(f"at {bound} bound")
+    return tuple(found)

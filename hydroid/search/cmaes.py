@@ -1,0 +1,53 @@
+"""CMA-ES: the evolution strategy with covariance matrix adaptation (Hansen), of the library cma."""
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.search.library import LibraryAlgorithm, need
+from hydroid.settings.search import CmaesSettings
+
+Float = NDArray[np.float64]
+
+
+def cmaes(settings: CmaesSettings, parameters: int) -> LibraryAlgorithm:
+    """CMA-ES on the unit box of so many parameters, from its middle.
+
+    Raises:
+        SettingsError: cma is not installed.
+    """
+    cma = need("cma", "cma")
+    return LibraryAlgorithm(settings, lambda rng: _Cmaes(cma, settings, parameters, rng), single=True)
+
+
+class _Cmaes:
+    def __init__(self, cma: Any, settings: CmaesSettings, parameters: int, rng: Generator) -> None:
+        def normal(*shape: int) -> Float:
+            return rng.standard_normal(shape)
+
+        options = {
+            "bounds": [0.0, 1.0],
+            "popsize": settings.population,
+            "maxiter": np.inf,  # generations are counted outside
+            "seed": np.nan,  # leave numpy's global generator alone
+            "randn": normal,
+            "verbose": -10,  # below -9, no file of signals is looked for in the working folder either
+            "verb_log": 0,
+            # a generation that diverged throughout is flat, and no sign of having converged
+            "tolflatfitness": np.inf,
+            "tolfun": 0.0,
+        }
+        self._strategy = cma.CMAEvolutionStrategy(np.full(parameters, 0.5), settings.sigma, options)
+        self._asked: list[Float] = []
+
+    def ask(self) -> Float:
+        """Return the next population, none once cma finds itself converged."""
+        converged = bool(self._strategy.stop())
+        self._asked = [] if converged else self._strategy.ask()
+        return np.array(self._asked) if self._asked else np.empty((0, 0))
+
+    def tell(self, objectives: Float) -> None:
+        """Take the one objective, shape (n, 1)."""
+        self._strategy.tell(self._asked, objectives[:, 0].tolist())

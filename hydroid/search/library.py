@@ -1,0 +1,128 @@
+"""Algorithms of other libraries in the words of ours: `start`, `ask`, `tell`.
+
+A library keeps a run's state in its own objects, which no file takes without pickle. But it does the same
+again from the same random numbers and the same objectives: a run is continued by replaying it from its
+start, on a fresh `LibraryAlgorithm`, with the objectives it was told then.
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.errors import SettingsError
+from hydroid.search.algorithm import Population
+from hydroid.search.coding import Genes
+from hydroid.search.nsga2 import crowded_order
+from hydroid.search.pareto import feasible
+from hydroid.settings.search import PopulationSettings
+
+Float = NDArray[np.float64]
+
+HUGE = 1e100
+"""Objectives from here on are taken as infeasible: libraries square what they are told."""
+
+UNSCALED = 1e6
+"""What infeasible members are told to have while no feasible one has shown the objectives' scale."""
+
+
+class Engine(Protocol):
+    """A run of a library's algorithm."""
+
+    def ask(self) -> Float:
+        """Points of the unit box to be evaluated next, shape (n, p); n = 0 once the algorithm has ended."""
+        ...
+
+    def tell(self, objectives: Float) -> None:
+        """Take the objectives of these points, shape (n, m), all finite."""
+        ...
+
+
+class LibraryAlgorithm:
+    """A library's algorithm as ours; its chromosomes are points of the unit box.
+
+    The population is the best `population` members that the run has evaluated, by the crowded comparison
+    of NSGA-II: with one objective the lowest, with several the first fronts.
+
+    Args:
+        settings: population and generations.
+        single: whether it minimises one objective.
+        engine: begins a run from a source of randomness.
+    """
+
+    def __init__(
+        self, settings: PopulationSettings, engine: Callable[[Generator], Engine], *, single: bool
+    ) -> None:
+        self.settings, self.single = settings, single
+        self._begin, self._engine = engine, None
+        self._asked = np.empty((0, 0))
+        self._penalty = _Penalty()
+
+    @property
+    def population_size(self) -> int:
+        """Members of a population."""
+        return self.settings.population
+
+    def start(self, rng: Generator) -> Genes:
+        """Begin the run; return its first points, shape (n, p)."""
+        self._engine, self._penalty = self._begin(rng), _Penalty()
+        self._asked = self._engine.ask()
+        return self._asked
+
+    def ask(self, population: Population, rng: Generator) -> Genes:
+        """Points that the library wants next, shape (n, p); neither argument decides them."""
+        return self._asked
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """Tell the library; return the best of present population and offspring."""
+        assert self._engine is not None
+        self._engine.tell(self._penalty.applied(offspring.objectives))
+        self._asked = self._engine.ask()
+        everyone = offspring if population is None else population.join(offspring)
+        return everyone.take(crowded_order(everyone.objectives)[: self.population_size])
+
+    def decode(self, chromosomes: Genes) -> Float:
+        """The points themselves."""
+        return chromosomes
+
+    def reached(self, population: Population) -> bool:
+        """Whether the library's algorithm has ended by itself: converged, or without new points."""
+        return not len(self._asked)
+
+
+class _Penalty:
+    """Finite objectives for infeasible members: worse, by their range, than all feasible ones so far."""
+
+    def __init__(self) -> None:
+        self._best: Float | float = np.inf
+        self._worst: Float | float = -np.inf
+
+    def applied(self, objectives: Float) -> Float:
+        usable = feasible(objectives) & np.all(np.abs(objectives) < HUGE, axis=1)
+        if usable.any():
+            self._best = np.minimum(self._best, objectives[usable].min(axis=0))
+            self._worst = np.maximum(self._worst, objectives[usable].max(axis=0))
+        if np.ndim(self._worst) == 0:
+            return np.full_like(objectives, UNSCALED)
+        span = self._worst - self._best
+        return np.where(usable[:, None], objectives, self._worst + np.where(span > 0, span, 1.0))
+
+
+def need(module: str, extra: str) -> Any:
+    """Import an optional library.
+
+    Raises:
+        SettingsError: it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        library = module.partition(".")[0]
+        raise SettingsError(
+            f"the library {library} cannot be imported ({error})",
+            where="search.algorithm",
+            cure=f"install it with: pip install 'hydroid[{extra}]'",
+        ) from None

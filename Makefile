@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test demo demo-hyd bench article article-hyd wheel meshes model clean
+.PHONY: setup check test demo bench article article-hyd many-parameters design-study coverage kill-resume wheel meshes model clean fuzz
 
 setup: .venv/.ready
 
@@ -18,29 +18,40 @@ check: setup  ## formatter, linter, type checker
 test: setup
 	$(BIN)/pytest
 
-demo: setup  ## both algorithms on one log of the virtual rig, and the other log to judge them by
+demo: setup  ## both stages on one log of the virtual rig, and the other log to judge them by
 	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."
 	rm -rf runs/demo
 	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm ga --out runs/demo/ga
 	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm nsga2 --out runs/demo/nsga2
-	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
-		--fit runs/demo/ga --fit runs/demo/nsga2 --out runs/demo/validation
-
-demo-hyd: setup  ## stage 2 on the same log, from the demo's stage 1
-	@test -f runs/demo/nsga2/estimate.yaml || $(MAKE) demo
-	rm -rf runs/demo/hyd
 	$(BIN)/hydroid fit-hyd examples/logs/rig_shoulder_1.csv --mech runs/demo/nsga2 --out runs/demo/hyd
 	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
-		--fit runs/demo/hyd --out runs/demo/validation-hyd
+		--fit runs/demo/ga --fit runs/demo/nsga2 --fit runs/demo/hyd --out runs/demo/validation
 
 bench: setup  ## what a simulation costs, and what hydroid adds to it (README, "Speed")
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/scaling.py --dask
 
 article: setup  ## the article's simulated study over ten seeds (README, "Accuracy"); half an hour
 	$(BIN)/python benchmarks/article_mech.py
 
 article-hyd: setup  ## the same for stage 2
 	$(BIN)/python benchmarks/article_hyd.py
+
+many-parameters: setup  ## 27 parameters from far-off starts, beside mujoco.sysid; half an hour
+	$(BIN)/pip install --quiet --disable-pip-version-check 'mujoco[sysid]'
+	$(BIN)/python benchmarks/many_parameters.py
+
+design-study: setup  ## a designed experiment against random ones of the same length; about ten minutes
+	$(BIN)/python benchmarks/designed_experiment.py
+
+coverage: setup  ## whether the intervals hold the truth as often as they say (docs/uncertainty.md)
+	$(BIN)/python benchmarks/interval_coverage.py
+
+fuzz: setup  ## 12,000 damaged files of every kind; a quarter of an hour
+	$(BIN)/python benchmarks/fuzz.py
+
+kill-resume: setup  ## 100 runs killed at random moments, resumed, and compared bit for bit; 10 minutes
+	$(BIN)/python benchmarks/kill_resume.py
 
 wheel: setup  ## the wheel in an empty environment, run from an empty folder
 	PYTHON=$(BIN)/python sh .ci/wheel

@@ -4,7 +4,7 @@
    to 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
 2. The seven-joint arm, all joints driven at once, every actuator with its own random set: 1,000 members.
 
-    python benchmarks/hydraulic_accuracy.py [SETS] [MEMBERS]
+    python benchmarks/hydraulic_accuracy.py [SETS] [MEMBERS]    ("0 1000": stability alone)
 """
 
 import sys
@@ -53,7 +53,7 @@ def stability(members: int) -> None:
     joints = list(range(7))
     command = np.stack([pulses(rng, 3000) for _ in joints], axis=1)
     command[-200:] = 0.0
-    failed, fastest, last = 0, np.zeros(7), np.zeros(7)
+    diverged, fastest, last = 0, np.zeros(7), np.zeros(7)
     for first in range(0, members, 100):
         count = min(100, members - first)
         driven = DrivenArm(
@@ -64,13 +64,16 @@ def stability(members: int) -> None:
             threads=2,
         )
         speed = abs(np.diff(driven.run(command), axis=1)) / 0.01
-        failed += int((driven.failed | ~np.isfinite(speed).all(axis=(1, 2))).sum())
+        diverged += int((driven.failed | ~np.isfinite(speed).all(axis=(1, 2))).sum())
         fastest = np.maximum(fastest, np.nanmax(speed, axis=(0, 1)))
         last = np.maximum(last, np.nanmax(speed[:, -50:], axis=(0, 1)))
-    print(f"{members} members, seven joints driven, 30 s: {failed} failed")
+    print(f"{members} random parameter sets, seven joints driven at once, 30 s: {diverged} diverged")
     print(f"fastest [rad/s] {fastest.round(2)}, after 1.5 s of rest {last.round(3)}")
 
 
 if __name__ == "__main__":
-    accuracy(int(sys.argv[1]) if len(sys.argv) > 1 else 24)
-    stability(int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
+    sets, members = (int(number) for number in (sys.argv[1:] + ["24", "1000"][len(sys.argv) - 1 :]))
+    if sets:
+        accuracy(sets)
+    if members:
+        stability(members)

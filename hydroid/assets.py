@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from hydroid.errors import SettingsError
+from hydroid.files import is_file
 
 _PACKAGE = Path(__file__).parent
 
@@ -27,7 +28,7 @@ def find_config(name: str | Path, beside: Path | None = None) -> Path:
     folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]
     for folder in folders:
         for candidate in (folder / name, folder / f"{name}.yaml"):
-            if candidate.is_file():
+            if is_file(candidate):
                 return candidate
     known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
     raise SettingsError("no such config", where=str(name), cure=f"give a YAML file or one of: {known}")

@@ -4,6 +4,9 @@ Every class here ends a command with one line and exit status 2. Anything else t
 defect of hydroid and keeps its traceback.
 """
 
+LONGEST = 1500
+"""characters of a message"""
+
 
 class HydroidError(Exception):
     """A fault the user can mend.
@@ -17,11 +20,17 @@ class HydroidError(Exception):
     def __init__(self, what: str, *, where: str = "", cure: str = "") -> None:
         self.what, self.where, self.cure = what, where, cure
         text = f"{where}: {what}" if where else what
-        super().__init__(f"{text}; {cure}" if cure else text)
+        super().__init__(_one_line(f"{text}; {cure}" if cure else text))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
         return _rebuild, (type(self), self.what, self.where, self.cure)
+
+
+def _one_line(text: str) -> str:
+    """What a file holds stands in messages: escape what a terminal would obey, and cut what nobody reads."""
+    plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} ... {plain[-LONGEST // 2 :]}"
 
 
 def _rebuild(kind: type[HydroidError], what: str, where: str, cure: str) -> HydroidError:

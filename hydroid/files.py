@@ -1,34 +1,99 @@
 """Files appear whole or not at all."""
 
+import logging
 import os
+import signal
 import tempfile
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 from hydroid.errors import RunError
 
+PART = ".part"
+"""ending of a file that is being written"""
 
-def write_atomic(path: Path, content: str | bytes) -> None:
+_STOPS = tuple(getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGUSR1") if hasattr(signal, n))
+
+_log = logging.getLogger(__name__)
+
+
+def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
     """Write a file so that a reader, or a crash, sees the old content or the new, never a part.
+
+    The content is on the disk before the name is: after a power cut the name may stand for the old content,
+    but not for a part of the new. A killed process may leave a hidden file that ends in PART behind.
+
+    Args:
+        path: the file.
+        content: of it; text is written as UTF-8.
+        keep: a name in the same folder under which the old content, if any, is kept. A crash between the two
+            renamings leaves it there and nothing at `path`.
 
     Raises:
         RunError: the folder cannot be written, or the disk is full.
     """
-    data = content.encode() if isinstance(content, str) else content
+    with undisturbed():
+        _write(path, content.encode() if isinstance(content, str) else content, keep)
+
+
+@contextmanager
+def undisturbed() -> Generator[None]:
+    """Hold Ctrl-C and a cluster's notices back for as long as a file is written.
+
+    A KeyboardInterrupt may come between any two bytecodes; zipfile, for one, makes a ValueError of it.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only that one is interrupted
+        yield
+        return
+    held: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in _STOPS}
+    before = {number: handler for number, handler in handlers.items() if handler is not None}
+    for number in before:
+        signal.signal(number, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in held[:1]:
+            signal.raise_signal(number)
+
+
+def _write(path: Path, data: bytes, keep: Path | None) -> None:
     temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PART)
         with os.fdopen(handle, "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
         os.chmod(temporary, 0o666 & ~_umask())
+        if keep is not None and path.exists():
+            os.replace(path, keep)
         os.replace(temporary, path)
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", where=str(path)) from None
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what killed processes have left of files that they were writing; nobody else may write there."""
+    for part in folder.rglob(f".*{PART}"):
+        _log.info("removed %s, left by a process that was killed while it wrote", part.name)
+        part.unlink(missing_ok=True)
+
+
+def is_file(path: Path) -> bool:
+    """Return whether there is such a file; a name that no file can have is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _umask() -> int:

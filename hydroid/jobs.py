@@ -4,6 +4,8 @@ The command line is a thin cover of these; a script or a notebook calls them dir
 """
 
 import io
+import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,10 +16,14 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
+from hydroid.execution import Executor
 from hydroid.files import write_atomic
 from hydroid.identification.fit import Fit, Watcher, fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Problem, make_simulation
+from hydroid.identification.run_log import log_end, log_start
+from hydroid.identification.search import check_search
+from hydroid.identification.spread import SpreadProblem
 from hydroid.identification.stage import Stage
 from hydroid.identification.validation import ErrorIndices, error_indices
 from hydroid.log import Finding, Log, check_log, read_log, write_log
@@ -32,6 +38,8 @@ TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool"
 """columns of a trace, a joint"""
 
 Warn = Callable[[Finding], None]
+
+_log = logging.getLogger(__name__)
 
 
 def load_settings(config: str | Path, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
@@ -80,6 +88,7 @@ def fit_logs(
     *,
     resume: bool = False,
     repair: bool = False,
+    executor: Executor | None = None,
 ) -> tuple[Problem, Fit]:
     """Fit one run: logs in, a run folder out.
 
@@ -92,31 +101,57 @@ def fit_logs(
         warn: takes what is odd about the logs.
         resume: go on where a run in `out` stopped; without one, begin.
         repair: fill short gaps of the logs.
+        executor: workers that simulate; None: this process.
 
     Raises:
         HydroidError: what the user can mend.
     """
     _refuse_stray_payloads(settings, paths)
-    problem = Problem(arm, settings, read_logs(paths, settings, arm, warn, repair))
+    findings: list[Finding] = []
+    logs = read_logs(paths, settings, arm, findings.append, repair)
+    for finding in findings:
+        warn(finding)
+    problem = (
+        Problem(arm, settings, logs) if executor is None else SpreadProblem(arm, settings, logs, executor)
+    )
     folder = RunFolder(out)
-    checkpoint = None
     if not folder.exists:
-        folder.begin(settings, arm, paths)
-    elif resume:
-        folder.check(settings, paths)
-        checkpoint = folder.checkpoint()
-    else:
+        check_search(problem)
+    elif not resume:
         cure = "continue it with --resume, or choose another --out"
         raise RunError("holds a run already", where=str(out), cure=cure)
-    try:
-        result = fit(problem, folder.save, watch, checkpoint)
-    except KeyboardInterrupt:
-        folder.status("interrupted")
-        raise
+    with folder.owned():
+        log_start(settings, paths, findings)
+        began = time.monotonic()
+        try:
+            result = _fit(folder, problem, arm, paths, watch)
+        except KeyboardInterrupt:
+            _log.info("interrupted after %.0f s; --resume goes on", time.monotonic() - began)
+            folder.status("interrupted")
+            raise
+        except Exception as error:
+            _log.error("ended by %s: %s", type(error).__name__, error)
+            raise
+        log_end(result, time.monotonic() - began)
+    return problem, result
+
+
+def _fit(folder: RunFolder, problem: Problem, arm: Arm, paths: Sequence[Path], watch: Watcher) -> Fit:
+    """Begin the folder's run, or go on with it, to its report."""
+    checkpoint = None
+    if folder.exists:
+        folder.check(problem.settings, arm, paths)
+        checkpoint = folder.checkpoint()
+        folder.status("running")
+        done = 0 if checkpoint is None else len(checkpoint.state.history)
+        _log.info("resumed after generation %d", done)
+    else:
+        folder.begin(problem.settings, arm, paths)
+    result = fit(problem, folder.save, watch, checkpoint, folder.journal())
     folder.write_estimate(problem, result)
     write_report(folder, problem, result)
     folder.status("done")
-    return problem, result
+    return result
 
 
 def _refuse_stray_payloads(settings: FitSettings, paths: Sequence[Path]) -> None:
@@ -200,7 +235,7 @@ def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, An
     moving = [j + 1 for j in range(log.joints) if passive or log.driven[j]]
     angle = log.angle.copy()
     if settings.simulation.other_joints == "locked":
-        angle[:] = log.angle[0]
+        angle[:] = log.start
     pressures: list[int] = []
     if settings.stage == "hyd":
         pressures = [j for j in range(log.joints) if log.driven[j] and settings.log.pressure_of(j + 1)]

@@ -14,6 +14,9 @@ from hydroid.errors import SettingsError
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e100
+"""more than any quantity can be, and squares of it are still finite"""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -73,9 +76,9 @@ class ParameterSet:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
 
         Raises:
-            SettingsError: a name that does not exist, is missing, or has no finite number.
+            SettingsError: a name that does not exist, is missing, or has no finite number, or a negative one.
         """
-        unknown = sorted(set(values) - set(self.names))
+        unknown = [name for name in values if name not in self.names]
         if unknown:
             known = ", ".join(self.names)
             raise SettingsError(f"unknown parameter {unknown[0]!r}", where=source, cure=f"known: {known}")
@@ -94,8 +97,11 @@ def relative_error(estimate: Array, truth: Array) -> Array:
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
         raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    # no quantity can be negative; infinity and nan compare as too large
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < LARGEST:
         raise SettingsError(
-            f"parameter {parameter.name!r} is {value!r}", where=source, cure=f"a number in {parameter.unit}"
+            f"parameter {parameter.name!r} is {value!r}",
+            where=source,
+            cure=f"a number from 0, in {parameter.unit}",
         )
     return float(value)

@@ -62,6 +62,23 @@ def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 
+def test_identifiability_tells_what_a_log_determines(short: Path, tmp_path: Path):
+    values = tmp_path / "values.yaml"
+    values.write_text("{K: 1.5, D: 400, S: 80, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4.0, M6: 4.7}")
+    how = ["--params", values, "--bootstrap", 20, "--profile", "S", "--set", "objective.noise_deg=0.5"]
+    done = hydroid("identifiability", short, *how, "--out", "told", "--json", cwd=tmp_path)
+    found = json.loads(done.stdout)
+    assert any("M1 has no effect on the angle of joint 2" in words for words in found["open"])
+    rows = {row["name"]: row for row in found["parameters"]}
+    assert set(rows) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
+    assert rows["M1"]["flag"] == "no effect on the outputs"
+    assert rows["M1"]["standard deviation"] is None  # JSON has no infinity
+    for name in ("identifiability.html", "tables/intervals.csv", "figures/profiles.png"):
+        assert (tmp_path / "told" / name).stat().st_size > 0
+    done = hydroid("identifiability", short, "--profile", "Z", cwd=tmp_path, code=2)
+    assert "no free parameter 'Z' to profile" in done.stderr
+
+
 def test_runs_repeat_over_seeds(short: Path, tmp_path: Path):
     arguments = ["fit-mech", short, "--algorithm", "ga", "--runs", 2, "--seed", 5, "--out", "many", *QUICK]
     done = hydroid(*arguments, cwd=tmp_path)

@@ -19,7 +19,7 @@ from hydraulic_reference import (
     simulate,
 )
 
-from hydroid.hydraulics.actuator import Actuator, Observation, compile_kernels
+from hydroid.hydraulics.actuator import Actuator, Observation
 from hydroid.hydraulics.cylinder import triangle
 from hydroid.hydraulics.parameters import ROTARY, Linkages
 from hydroid.hydraulics.solenoid import force_curve
@@ -272,10 +272,3 @@ def test_a_rotary_actuator_turns_by_flow_over_displacement():
     # swept volume plus compression of a chamber of constant volume, to the last digits
     assert flowed == pytest.approx(10e-6 * angle[0, 0] + 50e-6 * pressed / 8e8, rel=1e-9)
     assert abs(velocity[0, 0]) < 1e-6
-
-
-def test_compiling_is_announced_only_when_it_happens():
-    compile_kernels(lambda: None)
-    said: list[str] = []
-    compile_kernels(lambda: said.append("compiling"))
-    assert not said

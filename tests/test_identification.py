@@ -10,7 +10,6 @@ from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.identification.fit import fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Memo, Problem
-from hydroid.identification.sensitivity import sensitivity
 from hydroid.identification.stage import Stage
 from hydroid.identification.validation import error_indices
 from hydroid.jobs import load_settings, simulate_log
@@ -53,7 +52,7 @@ def run(folder: RunFolder, settings, arm, log, path, watcher):
     problem = Problem(arm, settings, [log])
     checkpoint = None
     if folder.exists:
-        folder.check(settings, [path])
+        folder.check(settings, arm, [path])
         checkpoint = folder.checkpoint()
     else:
         folder.begin(settings, arm, [path])
@@ -156,12 +155,12 @@ def test_a_folder_of_another_run_is_refused_by_name(tmp_path):
     assert folder.settings()[0].parameters == settings.parameters
     changed = settings.model_copy(update={"outputs": (3,)})
     with pytest.raises(RunError, match="outputs"):
-        folder.check(changed, [path])
+        folder.check(changed, arm, [path])
     threads = settings.simulation.model_copy(update={"threads": 1})
-    folder.check(settings.model_copy(update={"simulation": threads}), [path])  # changes no result
+    folder.check(settings.model_copy(update={"simulation": threads}), arm, [path])  # changes no result
     path.write_text(path.read_text() + "# edited\n")
     with pytest.raises(RunError, match="log"):
-        folder.check(settings, [path])
+        folder.check(settings, arm, [path])
     with pytest.raises(RunError, match="holds no run"):
         RunFolder(tmp_path).begin(settings, arm, [path])
     with pytest.raises(RunError, match="no run"):
@@ -255,28 +254,6 @@ def test_error_indices_against_their_definitions():
     assert error_indices(measured, measured).fit == 100
     assert error_indices(measured, np.full(500, measured.mean())).fit == pytest.approx(0, abs=1e-9)
     assert np.isnan(error_indices(np.ones(5), np.zeros(5)).fit)
-
-
-def test_sensitivity_counts_what_the_logs_tell_apart(tmp_path):
-    """Locked, what moves is one body: K, D, S, its inertia and two moments of weight, but for one scale."""
-    settings, arm, log, _ = make(tmp_path, **{"simulation.other_joints": "locked"})
-    problem = Problem(arm, settings, [log])
-    truth = problem.parameters.vector(TRUTH, "truth")
-    found = sensitivity(problem, truth)
-    names = np.array(problem.parameters.names)
-    assert list(names[found.without_effect]) == ["M1"]
-    assert 2 <= found.combinations <= 5
-    assert found.undetermined[names == "M4"].all()
-    # with all but the gain known, the gain is determined; what is held fixed is not called undetermined
-    fixed = {f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name != "K"}
-    alone, _ = load_settings("article-mech", SMALL | fixed)
-    known = sensitivity(Problem(arm, alone, [log]), truth)
-    assert known.combinations == 1
-    assert not known.undetermined.any()
-    # effects are what one per cent really does
-    more = truth * np.where(names == "K", 1.01, 1.0)
-    change = np.diff(problem.residuals(np.vstack([truth, more])), axis=0)
-    assert found.effects[names == "K"] == pytest.approx(np.sqrt(np.mean(change**2)), rel=0.02)
 
 
 def test_a_joint_that_nothing_drives_is_refused(tmp_path):

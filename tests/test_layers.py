@@ -12,10 +12,11 @@ LAYERS = [
     {"errors", "__init__"},
     {"assets", "files", "parameters", "settings"},
     {"log", "arm", "hydraulics"},
-    {"simulation", "objective", "search"},
+    {"simulation", "objective", "search", "execution"},
     {"identification"},
     {"report"},
     {"jobs"},
+    {"studies", "collect"},
     {"viewer"},
     {"cli"},
 ]
@@ -61,6 +62,11 @@ def test_the_search_knows_no_robot(name: str):
         assert imported_rooms(path) <= allowed, path
         text = path.read_text()
         assert "mujoco" not in text or path.name == "least_squares.py", path
+
+
+def test_the_execution_knows_no_robot():
+    for path in (ROOT / "execution").glob("*.py"):
+        assert imported_rooms(path) <= {"errors", "settings", "execution"}, path
 
 
 def test_the_command_line_imports_nothing_heavy():

@@ -71,7 +71,7 @@ def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
         ("command: {scale: 0}", "must not be 0"),
         ("angle: {unit: grad}", "'deg' or 'rad'"),
         ("time: {unit: us}", "'s' or 'ms'"),
-        ("joints: {0: null}", "greater than or equal to 1"),
+        ("joints: {0: null}", "at least 1"),
         ("joints: {2: u2}", "joints.2"),
         ("joints: {2: {comand: null}}", "comand"),
         ("joints: [1, 2]", "joints"),

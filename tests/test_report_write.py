@@ -53,8 +53,10 @@ def written(tmp_path_factory: pytest.TempPathFactory):
 
 def test_a_report_has_all_its_files_and_no_others(written):
     path, _, _, paths = written
-    tables = {f"tables/{t}.{e}" for t in ("parameters", "errors") for e in ("csv", "md", "tex")}
-    names = ("response", "learning", "pareto", "estimates")
+    named = ("parameters", "errors", "directions", "noise")
+    tables = {f"tables/{t}.{e}" for t in named for e in ("csv", "md", "tex")}
+    told = ("singular_values", "directions", "correlation")
+    names = ("response", "learning", "pareto", "estimates", *told)
     figures = {f"figures/{f}.{e}" for f in names for e in ("png", "svg")}
     rest = {"tables/pareto.csv", "history.csv", "pareto.csv", "report.html"}
     assert set(files(path)) == tables | figures | rest

@@ -1,18 +1,24 @@
 """Stage 2 as the fit sees it: commands in, angles out, through the whole chain beside MuJoCo."""
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from conftest import members as arms
 from conftest import step_log
 
-from hydroid.hydraulics.parameters import nominal_parameters
+from hydroid.hydraulics.actuator import Actuator
+from hydroid.hydraulics.parameters import Linkages, nominal_parameters
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import HydraulicSimulation, Members
+from hydroid.simulation.hydraulic import mass_entries
+from hydroid.simulation.population import Population, quiet_mujoco
 from hydroid.simulation.record import Record
+from hydroid.simulation.rollout import compile_rollout, roll
 
 JOINTS = range(7)
 SHOULDER = [1]
@@ -132,3 +138,74 @@ def test_the_trace_explains_the_motion(spec, arm, steps):
     oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.actuators.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
+
+
+def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, steps):
+    """Step by step in Python, with delayed commands."""
+    one = members(arm, 1, delay=0.033)
+    run = simulation(spec, arm, steps, [1, 3], HydraulicSettings(delay=0.033), other_joints="passive")
+    together = run.simulate(one).angle[0]
+    record = run.record
+    population = Population(record.arm, 1, 1)
+    balance = population.start(one.arm, record.joints, record.pose)
+    model = copy(record.arm.model)
+    data = mujoco.MjData(model)
+    population.copy(0, model, data)
+    model.dof_damping[:] = 0.0
+    assert one.actuators is not None
+    actuator = Actuator(
+        one.actuators,
+        Linkages.of(arm, JOINTS, [1, 3]),
+        one.arm.damping,
+        0.01,
+        HydraulicSettings(delay=0.033),
+        mass_entries(model),
+    )
+    state = actuator.start(data.qpos[None], balance)
+    angle = [data.qpos.copy()]
+    for command in steps.command[:-1]:
+        torque, armature = actuator.advance(state, command, data.qpos[None], data.qvel[None], data.M[None])
+        data.qfrc_applied[:], model.dof_armature[:] = torque[0], record.arm.model.dof_armature + armature[0]
+        mujoco.mj_step(model, data)
+        data.qpos[:] = actuator.close(state, data.qvel[None], data.M[None])[0]
+        angle.append(data.qpos.copy())
+    assert np.ptp(together[:, 0]) > np.deg2rad(1)
+    np.testing.assert_array_equal(together, np.array(angle)[:, [1, 3]])
+
+
+def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    everyone = members(arm, 3)
+    run = simulation(spec, arm, steps, other_joints="passive", threads=1)
+    healthy = run.simulate(everyone).angle
+    stiffness = everyone.arm.stiffness.copy()
+    stiffness[1, 4] = 1e9  # MuJoCo's spring is explicit in the angle: at 0.01 s it blows up
+    capfd.readouterr()
+    response = run.simulate(Members(replace(everyone.arm, stiffness=stiffness), everyone.actuators))
+    np.testing.assert_array_equal(response.feasible, [True, False, True])
+    assert np.isnan(response.angle[1]).all()
+    np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()
+
+
+def test_single_steps_are_the_whole_record(spec, arm, steps):
+    """As the viewer does it: with a delay, and joints that follow the log."""
+    one = members(arm, 1, delay=0.033)
+    run = simulation(spec, arm, steps, hydraulics=HydraulicSettings(delay=0.033), other_joints="measured")
+    whole = run.simulate(one).angle[0, :, 0]
+    live = run.begin(one)
+    with quiet_mujoco():
+        for command, angle in zip(run.command, whole, strict=False):
+            assert live.position[0, 1] == angle
+            live.step(command)
+    assert live.healthy
+
+
+def test_compiling_is_announced_only_when_it_happens(spec, arm, steps):
+    compile_rollout(lambda: None)
+    said: list[str] = []
+    compile_rollout(lambda: said.append("compiling"))
+    assert not said
+    simulation(spec, arm, steps, other_joints="measured").simulate(members(arm, 1))
+    assert len(roll.signatures) == 1  # what was made ready is what is used

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from hydroid.arm.quiet import quiet_mujoco
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm
 
@@ -112,7 +113,8 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
         wrong = sorted(set(moving) - set(joints))
         what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
         raise ModelError(what, where=arm.name, cure=f"joints: {', '.join(arm.joint_names)}")
-    full = spec.compile()
+    with quiet_mujoco():
+        full = spec.compile()
     data = mujoco.MjData(full)
     for name, angle in zip(arm.joint_names, pose, strict=True):
         if name not in joints:
@@ -185,7 +187,8 @@ def _skeleton(
         )
         joint = full.joint(name)
         bodies[body].add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
-    model = spec.compile()
+    with quiet_mujoco():
+        model = spec.compile()
     for option in _OPTIONS:
         setattr(model.opt, option, getattr(full.opt, option))
     disable = mujoco.mjtDisableBit
@@ -204,7 +207,8 @@ def _write(locked: LockedArm, masses: Array) -> None:
     inertials, model = locked.inertials(masses[None]), locked.model
     model.body_mass[:], model.body_ipos[:] = inertials.mass[0], inertials.ipos[0]
     model.body_iquat[:], model.body_inertia[:] = inertials.iquat[0], inertials.inertia[0]
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    with quiet_mujoco():
+        mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def _steiner(away: Array) -> Array:

@@ -13,8 +13,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from hydroid.errors import MeshError
+from hydroid.files import is_file
 
 LARGEST_LINK = 5.0  # [m]; a link beyond this is taken for one in millimetres
+KINDS = (".stl", ".obj")
 SMALLEST_VOLUME = 1e-9  # [m³]; one cubic millimetre
 
 
@@ -37,10 +39,12 @@ def mass_properties(path: Path) -> MassProperties:
         path: an STL or OBJ file, in m, its origin in the link's joint.
 
     Raises:
-        MeshError: missing, unreadable, empty, non-finite, in millimetres, open, inverted, or without volume.
+        MeshError: missing, unreadable, empty, non-finite, in millimetres, away from its joint, open,
+            inverted, or without volume.
     """
-    mesh = _read(path)
-    _check(mesh, str(path))
+    with np.errstate(all="ignore"):  # what is not finite is refused below
+        mesh = _read(path)
+        _check(mesh, str(path))
     inertia = np.asarray(mesh.moment_inertia, dtype=float) / mesh.mass
     return MassProperties(
         volume=float(mesh.volume),
@@ -51,8 +55,12 @@ def mass_properties(path: Path) -> MassProperties:
 
 def _read(path: Path) -> trimesh.Trimesh:
     where = str(path)
-    if not path.is_file():
+    if not is_file(path):
         raise MeshError("no such mesh", where=where, cure="put the link's STL there, or correct its name")
+    if path.suffix.lower() not in KINDS:
+        raise MeshError("is neither STL nor OBJ", where=where, cure="export it again, as binary STL")
+    if path.suffix.lower() == ".stl":
+        _check_stl(path)
     try:
         mesh = trimesh.load(path, force="mesh", process=False)  # processing would drop NaN faces
     except Exception as error:  # trimesh's readers raise whatever their format's parser does
@@ -69,6 +77,26 @@ def _read(path: Path) -> trimesh.Trimesh:
     return mesh
 
 
+def _check_stl(path: Path) -> None:
+    """A binary STL is as long as its number of faces says; an ASCII one MuJoCo cannot show."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(84)
+        size = path.stat().st_size
+    except OSError as error:
+        raise MeshError(f"cannot be read ({error.strerror})", where=str(path)) from None
+    faces = int.from_bytes(head[80:84], "little")
+    if len(head) == 84 and size == 84 + 50 * faces:
+        return
+    if head.lstrip()[:5].lower() == b"solid":
+        raise MeshError("is an ASCII STL", where=str(path), cure="export it again, as binary STL")
+    what = f"is no binary STL: it has {size} bytes"
+    what += (
+        f", and {faces} faces would need {84 + 50 * faces}" if len(head) == 84 else ", its head alone is 84"
+    )
+    raise MeshError(what, where=str(path), cure="copy or export it again, as binary STL")
+
+
 def _check(mesh: trimesh.Trimesh, where: str) -> None:
     if not np.isfinite(mesh.vertices).all():
         raise MeshError("has vertices that are not finite", where=where, cure="export it again")
@@ -79,6 +107,11 @@ def _check(mesh: trimesh.Trimesh, where: str) -> None:
             f"is {extent:.4g} m long, which looks like millimetres",
             where=where,
             cure="export it in metres, or scale it by 0.001",
+        )
+    away = float(np.linalg.norm(mesh.vertices.mean(axis=0)))
+    if away > LARGEST_LINK:
+        raise MeshError(
+            f"lies {away:.4g} m from its origin", where=where, cure="put the origin in the link's joint"
         )
     if not mesh.is_watertight:
         raise MeshError(

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from hydroid.arm.linkage import pivots
 from hydroid.arm.mesh import MassProperties, mass_properties
+from hydroid.arm.quiet import quiet_mujoco
 from hydroid.arm.scene import CHROME, PAINT, STEEL, add_scene
 from hydroid.errors import ModelError
-from hydroid.files import write_atomic
+from hydroid.files import is_file, write_atomic
 from hydroid.settings.arm import Arm, FixedPart, Joint, LinearActuator, Link
 
 TIMESTEP = 0.01  # [s]; the logs' sample period
@@ -33,7 +34,7 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
 
     Raises:
         MeshError: a mesh from which no mass properties can be computed.
-        ModelError: a mesh that MuJoCo cannot show: an ASCII STL, or one of more than 200,000 faces.
+        ModelError: a mesh that MuJoCo cannot show, such as one of more than 200,000 faces.
     """
     folder = (mesh_folder or arm.meshes).resolve()
     spec = mujoco.MjSpec()
@@ -89,10 +90,11 @@ def load_model(path: Path, arm: Arm) -> mujoco.MjSpec:
             no setting names, that is not a hinge, or that shares its body; with an equality constraint.
     """
     where = str(path)
-    if not path.is_file():
+    if not is_file(path):
         raise ModelError("no such model", where=where, cure="`hydroid build-model` writes it")
     try:
-        spec = mujoco.MjSpec.from_file(where)
+        with quiet_mujoco():
+            spec = mujoco.MjSpec.from_file(where)
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(error, where) from None
     _compile(spec, where)
@@ -102,7 +104,8 @@ def load_model(path: Path, arm: Arm) -> mujoco.MjSpec:
 
 def _compile(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
     try:
-        return spec.compile()
+        with quiet_mujoco():
+            return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(error, where) from None
 
@@ -211,7 +214,8 @@ def _exclude_contacts(spec: mujoco.MjSpec) -> None:
     pairs: set[tuple[int, int]] = set()
     for key in range(model.nkey):
         mujoco.mj_resetDataKeyframe(model, data, key)
-        mujoco.mj_forward(model, data)
+        with quiet_mujoco():
+            mujoco.mj_forward(model, data)
         pairs |= {(int(pair.min()), int(pair.max())) for pair in model.geom_bodyid[data.contact.geom]}
     for first, second in sorted(pairs):
         spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)

@@ -3,13 +3,25 @@
 Nothing heavy is imported before a command runs, so that `--help` answers at once.
 """
 
-import signal
 import sys
-from types import FrameType
 
 import typer
 
-from hydroid.cli import check, fit, model, plot_actuator, simulate, validate, view
+from hydroid.cli import (
+    check,
+    collect,
+    design,
+    fit,
+    identifiability,
+    model,
+    plot_actuator,
+    sensitivity,
+    simulate,
+    stopping,
+    surface,
+    validate,
+    view,
+)
 
 STOPPED = 130
 """exit status of what Ctrl-C or a signal ended, as shells have it"""
@@ -27,6 +39,11 @@ app.command("fit-hyd")(fit.fit_hyd)
 app.command("validate")(validate.validate)
 app.command("simulate")(simulate.simulate)
 app.command("check")(check.check)
+app.command("collect")(collect.collect)
+app.command("identifiability")(identifiability.identifiability)
+app.command("sensitivity")(sensitivity.sensitivity)
+app.command("surface")(surface.surface)
+app.command("design")(design.design)
 app.command("plot-actuator")(plot_actuator.plot_actuator)
 app.command("view")(view.view)
 app.command("build-model")(model.build_model)
@@ -53,10 +70,7 @@ def main() -> None:
     """Run a command: exit 0 done, 2 for what the user can mend, 130 when stopped."""
     from hydroid.errors import HydroidError
 
-    # a cluster's "time is nearly up" stops a run as Ctrl-C does: with a checkpoint
-    for name in ("SIGTERM", "SIGUSR1"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _stop)
+    stopping.listen()
     try:
         code = app(standalone_mode=False)
     except typer.Exit as end:
@@ -68,16 +82,12 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
         code = 0
-    except Exception as error:
-        code = _usage(error)
+    except Exception as error:  # after a notice: what the interrupt met may have made another error of it
+        code = STOPPED if stopping.asked() else _usage(error)
     if code == STOPPED:
         message = "stopped; what was computed is kept, and the same command with --resume goes on"
         typer.echo(f"hydroid: {message}", err=True)
     sys.exit(code or 0)
-
-
-def _stop(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _fail(message: str) -> int:

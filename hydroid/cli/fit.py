@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Json, Quiet, Repair, Set, overrides, warn
+from hydroid.cli.options import Config, Dask, Json, Quiet, Repair, Set, Verbose, Workers, overrides, warn
 
 Logs = Annotated[
     list[Path] | None,
@@ -14,7 +14,8 @@ Logs = Annotated[
     ),
 ]
 Algorithm = Annotated[
-    str | None, typer.Option(help="ga (simple), nsga2 (multi-objective), cmaes, or pymoo's: pymoo:NSGA3, ...")
+    str | None,
+    typer.Option(help="ga (simple), nsga2, cmaes, multistart, or one of pymoo's: pymoo:NSGA3, ..."),
 ]
 _PYMOO = "pymoo:"
 Seed = Annotated[int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")]
@@ -22,7 +23,9 @@ Runs = Annotated[int, typer.Option(min=1, max=10_000, help="Repeat over this man
 Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run in --out, or begin it.")]
 Polish = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
-Workers = Annotated[int | None, typer.Option(min=0, max=1024, help="Threads; 0: one a core.")]
+Threads = Annotated[
+    int | None, typer.Option(min=0, max=1024, help="Threads; 0: one a core, or one a worker.")
+]
 
 
 def fit_mech(
@@ -34,18 +37,21 @@ def fit_mech(
     out: Out = None,
     resume: Resume = False,
     polish: Polish = None,
+    threads: Threads = None,
     workers: Workers = None,
+    dask: Dask = None,
     setting: Set = None,
     repair: Repair = False,
     json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
     Writes a run folder: parameter tables, figures, report.html, estimate.yaml, the fitted MJCF, history,
     checkpoint. Tell what the estimate is worth with `hydroid validate` on a log it was not fitted on.
     """
-    changes = _changes(setting, algorithm, seed, workers, polish)
+    changes = _changes(setting, algorithm, seed, threads, polish)
     from hydroid.cli.running import run_fits
 
     run_fits(
@@ -58,7 +64,10 @@ def fit_mech(
         repair=repair,
         json=json,
         quiet=quiet,
+        verbose=verbose,
         warn=warn,
+        workers=workers,
+        dask=dask,
     )
 
 
@@ -76,18 +85,21 @@ def fit_hyd(
     resume: Resume = False,
     polish: Polish = None,
     refine: Annotated[bool | None, typer.Option(help="Then polish both stages' parameters together.")] = None,
+    threads: Threads = None,
     workers: Workers = None,
+    dask: Dask = None,
     setting: Set = None,
     repair: Repair = False,
     json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Estimate the hydraulic actuator with the arm fixed at stage 1's estimate (stage 2).
 
     Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as
     fit-mech does.
     """
-    changes = _changes(setting, algorithm, seed, workers, polish)
+    changes = _changes(setting, algorithm, seed, threads, polish)
     if refine is not None:
         changes["refine"] = refine
     from hydroid.cli.running import run_fits, with_mechanical
@@ -104,7 +116,10 @@ def fit_hyd(
         repair=repair,
         json=json,
         quiet=quiet,
+        verbose=verbose,
         warn=warn,
+        workers=workers,
+        dask=dask,
     )
 
 
@@ -112,7 +127,7 @@ def _changes(
     setting: list[str] | None,
     algorithm: str | None,
     seed: int | None,
-    workers: int | None,
+    threads: int | None,
     polish: bool | None,
 ) -> dict[str, Any]:
     """The settings that flags replace."""
@@ -122,7 +137,7 @@ def _changes(
         "search.algorithm": "pymoo" if pymoo else algorithm,
         "search.pymoo.algorithm": algorithm.removeprefix(_PYMOO) if algorithm and pymoo else None,
         "search.seed": seed,
-        "simulation.threads": workers,
+        "simulation.threads": threads,
     }
     changes |= {key: value for key, value in flags.items() if value is not None}
     if polish is False:

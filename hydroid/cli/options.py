@@ -25,8 +25,29 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace one setting, such as search.ga.generations=80."),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, max=1024, metavar="N", help="Simulate in N processes; the result is the same."),
+]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS|slurm", help="Simulate on a Dask cluster, or on Slurm jobs (the settings' cluster)."
+    ),
+]
+FitDir = Annotated[
+    Path | None, typer.Option("--fit", metavar="DIR", help="Run folder of a fit: its estimate and settings.")
+]
+Estimate = Annotated[
+    Path | None, typer.Option("--params", metavar="P.yaml", help="Values by name, instead of --fit.")
+]
+StudyConfig = Annotated[
+    str | None,
+    typer.Option("--config", help="Settings [default: the fit's, those beside the values, or fit-mech]."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for scripts.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show the lines of run.log as they come.")]
 Repair = Annotated[bool, typer.Option(help="Fill short gaps of the logs, and say how many.")]
 
 

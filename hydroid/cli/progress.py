@@ -6,6 +6,7 @@ from typing import Any
 
 import typer
 
+from hydroid.cli import stopping
 from hydroid.identification.search import HISTORY
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
@@ -25,7 +26,9 @@ class Progress:
 
     def __init__(self, settings: FitSettings, label: str, *, quiet: bool) -> None:
         search = settings.search
-        self._name = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES"}.get(search.name, search.name)
+        names = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
+        self._name = names.get(search.name, search.name)
+        self._step = "start" if search.algorithm == "multistart" else "generation"
         self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (57.29577951308232, " deg")
         self._label, self._quiet = label, quiet
@@ -45,16 +48,18 @@ class Progress:
 
     def generation(self, row: Array) -> None:
         """Take a row of HISTORY."""
+        _stop_if_asked()
         now = dict(zip(HISTORY, row, strict=True))
         elapsed = time.monotonic() - self._started
         if now["generation"] > 1 and self._first == 0:
             self._first = now["simulated"]  # a resumed run's rate counts from here
         rate = (now["simulated"] - (self._first if self._first > 0 else 0)) / max(elapsed, 1e-9)
         text = f"best {now['best'] * self._scale:.4g}{self._unit}, {rate:.0f} simulations/s"
-        self._show(f"generation {now['generation']:.0f} of {self._total}", text, now["generation"])
+        self._show(f"{self._step} {now['generation']:.0f} of {self._total}", text, now["generation"])
 
     def polishing(self, simulated: int) -> None:
         """Take the number of simulations the polish has made."""
+        _stop_if_asked()
         self._show("polish", f"{simulated} simulations", None)
 
     def _show(self, where: str, text: str, done: float | None) -> None:
@@ -63,6 +68,11 @@ class Progress:
         elif not self._quiet and time.monotonic() - self._spoken > LINE_EVERY:
             self._spoken = time.monotonic()
             typer.echo(f"{self._label} {self._name}: {where}: {text}".strip(), err=True)
+
+
+def _stop_if_asked() -> None:
+    if stopping.asked():
+        raise KeyboardInterrupt
 
 
 def _bar(label: str, total: int) -> tuple[Any, Any]:

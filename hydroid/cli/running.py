@@ -9,7 +9,9 @@ import numpy as np
 import typer
 
 from hydroid.cli.progress import Progress
+from hydroid.cli.terminal import shown
 from hydroid.errors import RunError, SettingsError
+from hydroid.execution import open_executor
 from hydroid.identification.fit import Fit
 from hydroid.identification.folder import RunFolder
 from hydroid.identification.problem import Problem
@@ -31,7 +33,10 @@ def run_fits(
     repair: bool,
     json: bool,
     quiet: bool,
+    verbose: bool,
     warn: Warn,
+    workers: int | None = None,
+    dask: str | None = None,
 ) -> None:
     """Fit over one seed or several and print the tables, or JSON."""
     settings, arm = load_settings(config, changes)
@@ -39,14 +44,19 @@ def run_fits(
         logs, settings, arm = _continued(out, changes, resume, runs)
     out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.name}"
     results: list[tuple[int, Problem, Fit]] = []
-    for seed in range(settings.search.seed, settings.search.seed + runs):
-        search = settings.search.model_copy(update={"seed": seed})
-        seeded = settings.model_copy(update={"search": search})
-        folder = out / f"seed-{seed}" if runs > 1 else out
-        with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
-            problem, fit = fit_logs(seeded, arm, logs, folder, progress, warn, resume=resume, repair=repair)
-        results.append((seed, problem, fit))
-        warn = _silent  # the logs are the same for every seed
+    warn = _silent if verbose else warn  # the log has them
+    with shown(verbose, quiet), open_executor(workers, dask, settings.cluster) as executor:
+        for seed in range(settings.search.seed, settings.search.seed + runs):
+            search = settings.search.model_copy(update={"seed": seed})
+            seeded = settings.model_copy(update={"search": search})
+            folder = out / f"seed-{seed}" if runs > 1 else out
+            options = {"resume": resume, "repair": repair}
+            with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
+                problem, fit = fit_logs(
+                    seeded, arm, logs, folder, progress, warn, **options, executor=executor
+                )
+            results.append((seed, problem, fit))
+            warn = _silent  # the logs are the same for every seed
     table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])
     if json:
         found = [summary(problem, fit) | {"seed": seed} for seed, problem, fit in results]

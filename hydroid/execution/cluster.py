@@ -4,20 +4,22 @@ Dask gives a killed worker's tasks to the others, and marks a task as the killer
 `distributed.scheduler.allowed-failures` (3 unless the scheduler is configured otherwise) more tries than one.
 """
 
-import asyncio
 import logging
 import pickle
 import shutil
 import threading
+import time
 import uuid
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Generator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.metadata import version
 from types import TracebackType
 from typing import Any
 
 from distributed import Client, Worker, get_worker, wait
+from distributed.client import ClosedClientError
 from distributed.diagnostics.plugin import WorkerPlugin
 from distributed.scheduler import KilledWorker
 
@@ -27,8 +29,12 @@ from hydroid.settings.cluster import ClusterSettings
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""
+LOOK = 5.0
+"""seconds between two looks at whether the scheduler is there: what it was told last may have got lost"""
 REMIND = 60.0
 """seconds between two notes that there are no workers"""
+CLOSE = 30.0
+"""seconds for the jobs to end; those that are left then end with this process"""
 SAME = ("hydroid", "mujoco", "numpy", "numba")
 """packages whose versions decide the bits of a result"""
 
@@ -65,20 +71,24 @@ class DaskCluster:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(Exception):  # the scheduler may be gone
+        # the scheduler may be gone, at any point of this
+        with suppress(Exception):
             self._forget()
-        self._client.close()
+        with suppress(Exception):
+            self._client.close()
         if self._cluster is not None:
-            self._cluster.close()
+            with suppress(Exception):
+                self._cluster.close(timeout=CLOSE)
 
     @property
     def workers(self) -> int:
         """Workers connected now; 1 where none is."""
-        return max(1, len(self._client.nthreads()))
+        with self._reached():
+            return max(1, len(self._client.nthreads()))
 
     def map(self, work: Work[C, R], chunks: Sequence[C]) -> list[R | None]:
         """Apply the work to every chunk, in order (see `Executor`)."""
-        try:
+        with self._reached():
             name = self._keep(work)
             answers = self._answers(name, chunks)
             # who only waited behind a killer was counted with it: once more, each alone
@@ -86,12 +96,21 @@ class DaskCluster:
                 answers[i] = self._answers(name, [chunks[i]])[0]
                 if answers[i] is None:
                     _log.warning("a chunk has ended worker after worker and counts as failed")
-        except (OSError, asyncio.CancelledError) as error:
+        return [None if answered is None else result(answered) for answered in answers]
+
+    @contextmanager
+    def _reached(self) -> Generator[None]:
+        """Make one error of the many that a scheduler leaves behind which is gone."""
+        try:
+            yield
+        except Exception as error:
+            lost = isinstance(error, OSError | CancelledError | ClosedClientError)
+            if not lost and self._client.status == "running":
+                raise
             words = " ".join(str(error).split()) or type(error).__name__
             raise RunError(
                 f"the Dask scheduler is gone ({words})", cure="start it anew, and go on with --resume"
             ) from None
-        return [None if answered is None else result(answered) for answered in answers]
 
     def _answers(self, name: str, chunks: Sequence[Any]) -> list[Answer | None]:
         futures: Any = self._client.map(partial(_perform, name), chunks, pure=False)
@@ -101,16 +120,22 @@ class DaskCluster:
                 return self._client.gather(futures)
             return [_taken(future) for future in futures]
         finally:
-            self._client.cancel(futures)
+            with suppress(ClosedClientError):  # the scheduler is gone
+                self._client.cancel(futures)
 
     def _wait(self, futures: Any) -> None:
+        reminded = time.monotonic()
         while True:
             try:
-                wait(futures, timeout=REMIND)
+                wait(futures, timeout=LOOK)
                 return
             except TimeoutError:
-                if not self._client.nthreads():
-                    _log.warning("the Dask scheduler has no workers; waiting for some")
+                if self._client.status in ("closing", "closed"):
+                    raise ClosedClientError("no answer") from None
+                if time.monotonic() > reminded + REMIND:
+                    reminded = time.monotonic()
+                    if not self._client.nthreads():
+                        _log.warning("the Dask scheduler has no workers; waiting for some")
 
     def _keep(self, work: Work[Any, Any]) -> str:
         """Give the work to all workers, those to come included; return its name there."""
@@ -181,7 +206,7 @@ def _slurm(settings: ClusterSettings) -> Any:
         walltime=settings.walltime,
         queue=settings.queue,
         log_directory="runs/slurm",
-        scheduler_options={"dashboard": False},
+        scheduler_options={"dashboard": False, "dashboard_address": ":0"},  # no port that others want
     )
     cluster.adapt(minimum_jobs=settings.jobs, maximum_jobs=settings.jobs)  # a job that ends is replaced
     return cluster

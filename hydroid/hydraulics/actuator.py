@@ -12,8 +12,6 @@ damping is the plugin's: MuJoCo's dof_damping must be 0, and its dof_armature th
 How it works and why it is stable: `hydroid.hydraulics.kernel`.
 """
 
-import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +21,7 @@ from hydroid.hydraulics import kernel
 from hydroid.hydraulics.balance import holding_pressures
 from hydroid.hydraulics.cylinder import oil_pressure, triangle, volume
 from hydroid.hydraulics.parameters import LINEAR, NONE, ActuatorParameters, Array, Linkages
-from hydroid.hydraulics.records import COEFFICIENTS, JOINT, WORK, coefficients
+from hydroid.hydraulics.records import JOINT, coefficients
 from hydroid.hydraulics.solenoid import resting_stroke
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -35,8 +33,7 @@ class ActuatorState:
     joints: NDArray[np.void]
     """shape (n, J), of JOINT"""
     commands: Array
-    """ring of recent commands [%], shape (H, J)"""
-    steps: int = 0
+    """the recent ones, newest last [%], shape (H, J)"""
 
 
 @dataclass(frozen=True)
@@ -63,6 +60,9 @@ class Actuator:
         period: MuJoCo's step [s].
         settings: sub-steps, plunger dynamics, start level.
         entries: where M[i, j] stands in a row of `mass`, shape (J, J); by default rows are whole matrices.
+
+    Attributes:
+        plugin: all this as compiled code reads it.
     """
 
     def __init__(
@@ -74,14 +74,22 @@ class Actuator:
         settings: HydraulicSettings,
         entries: NDArray[np.intp] | None = None,
     ) -> None:
-        shape = parameters.area_a.shape
-        self.shape, self.period, self._substeps = shape, period, settings.substeps
+        self.shape = parameters.area_a.shape
+        joints = self.shape[1]
+        driven = linkages.kind != NONE
+        order = np.argsort(driven, stable=True)
+        if entries is None:
+            entries = np.arange(joints**2).reshape(joints, joints)
+        self.plugin = kernel.Plugin(
+            coefficients=coefficients(parameters, linkages, settings),
+            damping=np.array(np.broadcast_to(damping, self.shape), float, order="C"),
+            order=order,
+            entries=entries[np.ix_(order, order)],
+            idle=int(np.sum(~driven)),
+            period=period,
+            substeps=settings.substeps,
+        )
         self._level = 1e5 * settings.start_pressure
-        self._damping = np.array(np.broadcast_to(damping, shape), float)
-        joints = shape[1]
-        self._entries = np.arange(joints**2).reshape(joints, joints) if entries is None else entries
-        self._coefficients = coefficients(parameters, linkages, settings)
-        self._work = np.zeros(joints, WORK)
         self._history = 2 + int(np.ceil(parameters.delay.max() / period))
 
     def start(self, angle: Array, torque: Array) -> ActuatorState:
@@ -91,16 +99,16 @@ class Actuator:
             angle: [rad], shape (n, J).
             torque: what the actuators must hold, g(q) [N·m], shape (n, J).
         """
-        c = self._coefficients
+        c = self.plugin.coefficients
         pressure_a, pressure_b = holding_pressures(
-            torque / self._arm(angle),
+            torque / _arm(c, angle),
             c["area_a"],
             c["area_b"],
             c["supply_pressure"],
             c["tank_pressure"],
             self._level,
         )
-        fill_a, fill_b = self._fills(angle)
+        fill_a, fill_b = _fills(c, angle)
         z = np.zeros(self.shape, JOINT)
         z["oil_a"] = pressure_a + c["bulk_modulus"] * fill_a
         z["oil_b"] = pressure_b + c["bulk_modulus"] * fill_b
@@ -124,26 +132,11 @@ class Actuator:
         Returns:
             Torque [N·m], damping included, and armature [kg·m²] for MuJoCo's step, shape (n, J) each.
         """
-        state.steps += 1
-        newest = state.steps % self._history
-        state.commands[newest] = command
+        state.commands[:-1] = state.commands[1:]
+        state.commands[-1] = command
         torque, armature = np.empty(self.shape), np.empty(self.shape)
-        kernel.advance(
-            self._coefficients,
-            state.joints,
-            self._work,
-            state.commands,
-            newest,
-            np.ascontiguousarray(angle),
-            np.ascontiguousarray(velocity),
-            np.ascontiguousarray(mass),
-            self._entries,
-            self._damping,
-            self.period,
-            self._substeps,
-            torque,
-            armature,
-        )
+        angle, velocity, mass = (np.ascontiguousarray(x) for x in (angle, velocity, mass))
+        kernel.advance(self.plugin, state.joints, state.commands, angle, velocity, mass, torque, armature)
         return torque, armature
 
     def close(self, state: ActuatorState, velocity: Array, mass: Array) -> Array:
@@ -159,14 +152,17 @@ class Actuator:
         """
         angle = np.empty(self.shape)
         velocity, mass = np.ascontiguousarray(velocity), np.ascontiguousarray(mass)
-        kernel.close(state.joints, velocity, mass, self._entries, self.period, angle)
+        kernel.close(self.plugin, state.joints, velocity, mass, angle)
         return angle
 
-    def observe(self, state: ActuatorState, angle: Array) -> Observation:
-        """Return pressures, flows, spool and force at `angle` [rad], shape (n, J)."""
-        c, z = self._coefficients, state.joints
+    def observe(self, state: ActuatorState, angle: Array, members: slice = slice(None)) -> Observation:
+        """Return pressures, flows, spool and force at `angle` [rad], shape (n, J).
+
+        With one member chosen, n may as well be the samples of a record: its states, one after another.
+        """
+        c, z = self.plugin.coefficients[members], state.joints
         driven = c["kind"] != NONE
-        fills = self._fills(angle)
+        fills = _fills(c, angle)
         pressure = [
             np.where(driven, oil_pressure(oil, fill, c["bulk_modulus"], c["vapour_pressure"]), 0.0)
             for oil, fill in zip((z["oil_a"], z["oil_b"]), fills, strict=True)
@@ -175,55 +171,26 @@ class Actuator:
         flow = np.stack([z["flow_a"], -z["flow_b"]], axis=-1)
         return Observation(np.stack(pressure, axis=-1), flow, z["stroke_a"] - z["stroke_b"], force)
 
-    def _arm(self, angle: Array) -> Array:
-        """Moment arm [m]; 1 for a rotary actuator."""
-        return np.where(self._coefficients["kind"] == LINEAR, self._triangle(angle)[1], 1.0)
 
-    def _fills(self, angle: Array) -> tuple[Array, Array]:
-        """Fill of chambers A and B, as `hydroid.hydraulics.cylinder` defines it."""
-        c = self._coefficients
-        travel = self._triangle(angle)[0]
-        linear = [
-            np.log(volume(x, c[area], c["dead_volume"]) / c["dead_volume"])
-            for x, area in ((travel, "area_a"), (c["stroke"] - travel, "area_b"))
-        ]
-        rotary = angle * c["area_a"] / c["dead_volume"], -angle * c["area_b"] / c["dead_volume"]
-        chosen = [np.where(c["kind"] == LINEAR, x, y) for x, y in zip(linear, rotary, strict=True)]
-        return chosen[0], chosen[1]
-
-    def _triangle(self, angle: Array) -> tuple[Array, Array, Array]:
-        c = self._coefficients
-        linear = c["kind"] == LINEAR
-        # joints without a triangle get a harmless one
-        a, b = np.where(linear, c["a"], 2.0), np.where(linear, c["b"], 1.0)
-        return triangle(angle, a, b, c["theta0"], c["shortest"])
+def _arm(c: NDArray[np.void], angle: Array) -> Array:
+    """Moment arm [m]; 1 for a rotary actuator."""
+    return np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
 
 
-def compile_kernels(announce: Callable[[], object]) -> None:
-    """Make the compiled loops ready; call `announce` if that is more than reading them from numba's cache."""
-    timer = threading.Timer(1.0, announce)
-    timer.start()
-    try:
-        one = np.ones((1, 1))
-        record, joint = np.ones((1, 1), COEFFICIENTS), np.zeros((1, 1), JOINT)
-        entry = np.zeros((1, 1), dtype=np.intp)
-        work = np.zeros(1, WORK)
-        kernel.advance(
-            record,
-            joint,
-            work,
-            np.zeros((3, 1)),
-            0,
-            one,
-            one,
-            one,
-            entry,
-            one,
-            0.01,
-            1,
-            one * 0,
-            one * 0,
-        )
-        kernel.close(joint, one, one, entry, 0.01, one * 0)
-    finally:
-        timer.cancel()
+def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:
+    """Fill of chambers A and B, as `hydroid.hydraulics.cylinder` defines it."""
+    travel = _triangle(c, angle)[0]
+    linear = [
+        np.log(volume(x, c[area], c["dead_volume"]) / c["dead_volume"])
+        for x, area in ((travel, "area_a"), (c["stroke"] - travel, "area_b"))
+    ]
+    rotary = angle * c["area_a"] / c["dead_volume"], -angle * c["area_b"] / c["dead_volume"]
+    chosen = [np.where(c["kind"] == LINEAR, x, y) for x, y in zip(linear, rotary, strict=True)]
+    return chosen[0], chosen[1]
+
+
+def _triangle(c: NDArray[np.void], angle: Array) -> tuple[Array, Array, Array]:
+    linear = c["kind"] == LINEAR
+    # joints without a triangle get a harmless one
+    a, b = np.where(linear, c["a"], 2.0), np.where(linear, c["b"], 1.0)
+    return triangle(angle, a, b, c["theta0"], c["shortest"])

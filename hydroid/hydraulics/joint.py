@@ -49,8 +49,8 @@ def command(c: Any, w: Any, commands: Any, newest: int, joint: int, period: floa
     late = np.floor(c.delay / period)
     w.fresh = (c.delay / period - late) * substeps
     place = newest - int(late)
-    w.new_a, w.new_b = drives(c, commands[place % commands.shape[0], joint])
-    w.old_a, w.old_b = drives(c, commands[(place - 1) % commands.shape[0], joint])
+    w.new_a, w.new_b = drives(c, commands[place, joint])
+    w.old_a, w.old_b = drives(c, commands[place - 1, joint])
     w.plunger_share = plunger_share(c.plunger_mass, c.plunger_damping, c.plunger_stiffness, period / substeps)
 
 
@@ -128,7 +128,7 @@ def load(c: Any, w: Any, damping: float, step: float) -> None:
 
 
 @compilable
-def idle(z: Any, w: Any, damping: float, step: float) -> None:
+def coast(z: Any, w: Any, damping: float, step: float) -> None:
     """The load of a joint without actuator, the same in all sub-steps."""
     w.resist, w.stiff, w.push = damping, 0.0, z.hold
     w.share = implicit_share(step * damping / w.inertia)
@@ -149,8 +149,8 @@ def settle(c: Any, z: Any, w: Any, gain: float, step: float) -> None:
         z.oil_b += w.rate_b * mean_b
         w.flow_a += mean_a
         w.flow_b += mean_b
+        w.oil_stiffness += w.stiff / step
     w.torque += w.push - (w.share * w.stiff + w.resist) * mean
     w.resistance += w.resist
-    w.oil_stiffness += w.stiff / step
     w.way += step * mean
     w.speed += gain

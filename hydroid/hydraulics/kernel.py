@@ -26,118 +26,197 @@ Every member is computed from its own numbers in a fixed order: neither threads 
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import begin, command, idle, load, meter, move_spool, settle
+from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
 from hydroid.hydraulics.parameters import NONE
+from hydroid.hydraulics.records import WORK
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
 """means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does to oil and way"""
 
 # numba keys its cache on one file; as a default argument, the text of all these files is part of the key
-_SOURCE = int.from_bytes(
+SOURCE = int.from_bytes(
     hashlib.sha256(b"".join(p.read_bytes() for p in sorted(Path(__file__).parent.glob("*.py")))).digest()[:7]
 )
 
 
 @compilable
-def solve(matrix: Any, vector: Any) -> None:
-    """Replace `vector`, (J,), by matrix⁻¹ vector.
+def eliminate(matrix: Any, start: int, stop: int) -> None:
+    """Eliminate unknowns `start` to `stop` of a symmetric positive matrix, (J, J), in place.
 
-    Of the symmetric positive matrix, (J, J), only diagonal and upper half are read; they are used up.
+    Only diagonal and upper half are read. An eliminated diagonal element becomes its pivot's inverse.
     """
     size = matrix.shape[0]
-    for k in range(size):
+    for k in range(start, stop):
         inverse = 1.0 / matrix[k, k]
         for i in range(k + 1, size):
             factor = matrix[k, i] * inverse
             for j in range(i, size):
                 matrix[i, j] -= factor * matrix[k, j]
-            vector[i] -= factor * vector[k]
         matrix[k, k] = inverse
-    for i in range(size - 1, -1, -1):
-        rest = vector[i]
-        for k in range(i + 1, size):
-            rest -= matrix[i, k] * vector[k]
-        vector[i] = rest * matrix[i, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def advance(
-    coefficients: Any,
+@compilable
+def substitute(matrix: Any, vector: Any) -> None:
+    """Replace `vector`, (J,), by the solution; all unknowns of the matrix are eliminated."""
+    size = matrix.shape[0]
+    for k in range(size):
+        scaled = vector[k] * matrix[k, k]
+        for i in range(k + 1, size):
+            vector[i] -= matrix[k, i] * scaled
+    for k in range(size - 1, -1, -1):
+        vector[k] *= matrix[k, k]
+        for i in range(k):
+            vector[i] -= matrix[i, k] * vector[k]
+
+
+class Plugin(NamedTuple):
+    """What stays the same during a run, of n members' J joints."""
+
+    coefficients: Any
+    """(n, J), of COEFFICIENTS"""
+    damping: Any
+    """of the joints [N·m·s/rad], (n, J)"""
+    order: Any
+    """the joints, those without actuator first, (J,)"""
+    entries: Any
+    """where their M[i, j] stands in a row of masses, in this order, (J, J)"""
+    idle: int
+    """how many have none"""
+    period: float
+    """of a step [s]"""
+    substeps: int
+
+
+class Pad(NamedTuple):
+    """Scratch space of one look-ahead."""
+
+    joints: Any
+    """(J,), of WORK"""
+    common: Any
+    """what the matrices of all sub-steps share, (J, J); joints in the plugin's order"""
+    matrix: Any
+    gain: Any
+
+
+@compilable
+def make_pad(joints: int) -> Pad:
+    """Return scratch space for so many joints."""
+    square = (joints, joints)
+    return Pad(np.zeros(joints, WORK), np.empty(square), np.empty(square), np.empty(joints))
+
+
+@compilable
+def look_ahead(
+    plugin: Plugin,
+    member: int,
     state: Any,
-    work: Any,
+    pad: Pad,
     commands: Any,
     newest: int,
     angle: Any,
     velocity: Any,
     mass: Any,
-    entries: Any,
-    damping: Any,
-    period: float,
-    substeps: int,
     torque: Any,
     armature: Any,
-    source: int = _SOURCE,
 ) -> None:
-    """Look ahead over one step of `period` [s]; arguments as in `hydroid.hydraulics.actuator`."""
-    members, joints = coefficients.shape
-    step = period / substeps
-    matrix, gain = np.empty((joints, joints)), np.empty(joints)
-    for n in range(members):
-        for j in range(joints):
-            c, z, w = coefficients[n, j], state[n, j], work[j]
-            begin(c, z, w, angle[n, j], velocity[n, j])
-            w.inertia = mass[n, entries[j, j]] - z.armature
-            if c.kind == NONE:
-                idle(z, w, damping[n, j], step)
-            else:
-                command(c, w, commands, newest, j, period, substeps)
-        for i in range(substeps):
-            for j in range(joints):
-                c, z, w = coefficients[n, j], state[n, j], work[j]
-                if c.kind != NONE:
-                    meter(c, w, move_spool(c, z, w, i, step))
-                    load(c, w, damping[n, j], step)
-                drag = w.share * w.stiff + w.resist
-                gain[j] = step * (w.push + z.external - drag * w.speed)
-                matrix[j, j] = w.inertia + w.share * step * drag
-                for k in range(j + 1, joints):
-                    matrix[j, k] = mass[n, entries[j, k]]
-            solve(matrix, gain)
-            for j in range(joints):
-                settle(coefficients[n, j], state[n, j], work[j], gain[j], step)
-        for j in range(joints):
-            z, w = state[n, j], work[j]
-            z.way, z.predicted = w.way, w.speed
-            z.flow_a, z.flow_b = w.flow_a / substeps, w.flow_b / substeps
-            kappa = (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance) / substeps
-            z.armature = period * kappa
-            z.torque = w.torque / substeps + kappa * (w.speed - velocity[n, j])
-            torque[n, j], armature[n, j] = z.torque, z.armature
+    """Look ahead over one step of one member: its rows of what `hydroid.hydraulics.actuator` describes.
+
+    `newest` is the row of `commands`, (.., J), that holds now; those before it are its past.
+    """
+    coefficients, damping, order, entries, idle, period, substeps = plugin
+    work, common, matrix, gain = pad
+    joints = state.shape[0]
+    part = 1.0 / substeps
+    step = part * period
+    for a in range(joints):
+        j = order[a]
+        c, z, w = coefficients[member, j], state[j], work[j]
+        begin(c, z, w, angle[j], velocity[j])
+        w.inertia = mass[entries[a, a]] - z.armature
+        matrix[a, a] = w.inertia
+        if a < idle:
+            coast(z, w, damping[member, j], step)
+            matrix[a, a] += w.share * step * w.resist
+        else:
+            command(c, w, commands, newest, j, period, substeps)
+        for b in range(a + 1, joints):
+            matrix[a, b] = mass[entries[a, b]]
+    # joints without actuator bring the same to all sub-steps: they are eliminated once
+    eliminate(matrix, 0, idle)
+    for a in range(idle, joints):
+        for b in range(a, joints):
+            common[a, b] = matrix[a, b]
+    for i in range(substeps):
+        for a in range(joints):
+            j = order[a]
+            c, z, w = coefficients[member, j], state[j], work[j]
+            if a >= idle:
+                meter(c, w, move_spool(c, z, w, i, step))
+                load(c, w, damping[member, j], step)
+            drag = w.share * w.stiff + w.resist
+            gain[a] = step * (w.push + z.external - drag * w.speed)
+            if a >= idle:
+                matrix[a, a] = common[a, a] + w.share * step * drag
+                for b in range(a + 1, joints):
+                    matrix[a, b] = common[a, b]
+        eliminate(matrix, idle, joints)
+        substitute(matrix, gain)
+        for a in range(joints):
+            j = order[a]
+            settle(coefficients[member, j], state[j], work[j], gain[a], step)
+    for j in range(joints):
+        z, w = state[j], work[j]
+        z.way, z.predicted = w.way, w.speed
+        z.flow_a, z.flow_b = part * w.flow_a, part * w.flow_b
+        kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
+        z.armature = period * kappa
+        z.torque = part * w.torque + kappa * (w.speed - velocity[j])
+        torque[j], armature[j] = z.torque, z.armature
+
+
+@compilable
+def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) -> None:
+    """Take over one member's true new velocity [rad/s]; writes the new angle [rad] to `angle`."""
+    order, entries, period = plugin.order, plugin.entries, plugin.period
+    for a in range(order.size):
+        z = state[order[a]]
+        angle[order[a]] = z.angle + z.way + RAMP_WAY * period * (velocity[order[a]] - z.predicted)
+        # (M + h κ) q̈ − torque is what neither oil nor damping did; M is bound with the lent inertia in it
+        momentum = 0.0
+        for b in range(order.size):
+            momentum += mass[entries[a, b]] * (velocity[order[b]] - state[order[b]].velocity)
+        z.external = momentum / period - z.torque
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def close(
+def advance(
+    plugin: Plugin,
     state: Any,
+    commands: Any,
+    angle: Any,
     velocity: Any,
     mass: Any,
-    entries: Any,
-    period: float,
-    angle: Any,
-    source: int = _SOURCE,
+    torque: Any,
+    armature: Any,
+    source: int = SOURCE,
 ) -> None:
-    """Take over the true new velocity [rad/s]; writes the new angle [rad] to `angle`."""
+    """Let all members look ahead over one step under the last of the commands."""
     members, joints = state.shape
+    pad, newest = make_pad(joints), commands.shape[0] - 1
     for n in range(members):
-        for j in range(joints):
-            z = state[n, j]
-            angle[n, j] = z.angle + z.way + RAMP_WAY * period * (velocity[n, j] - z.predicted)
-            # (M + h κ) q̈ − torque is what neither oil nor damping did; M is bound with the lent inertia in it
-            z.external = -z.torque
-            for k in range(joints):
-                z.external += mass[n, entries[j, k]] * (velocity[n, k] - state[n, k].velocity) / period
+        look_ahead(
+            plugin, n, state[n], pad, commands, newest, angle[n], velocity[n], mass[n], torque[n], armature[n]
+        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def close(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any, source: int = SOURCE) -> None:
+    """Let all members take over their true new velocities."""
+    for n in range(state.shape[0]):
+        take_over(plugin, state[n], velocity[n], mass[n], angle[n])

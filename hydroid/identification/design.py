@@ -7,7 +7,7 @@ Far from the truth, design again after the next fit.
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,11 @@ class Design:
     def log(self) -> Log:
         """The commands to run, every angle in the start pose."""
         return self.best.experiment.log(len(self.best.angle), self.period)
+
+    @property
+    def predicted(self) -> Log:
+        """The commands with the motion that the present estimate predicts."""
+        return replace(self.log, angle=self.best.angle)
 
     @property
     def random_deviations(self) -> Array:

@@ -1,5 +1,6 @@
 """A fit: search, the estimates taken from it, the polish, and what moves the response at the end."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.identification.identifiability import Identifiability, identifiability
+from hydroid.identification.journal import Journal
+from hydroid.identification.multistart import Multistart
 from hydroid.identification.polishing import polish_estimate
 from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.identification.search import Checkpoint, Search, SearchState
@@ -16,6 +19,8 @@ from hydroid.parameters import Array
 from hydroid.search import compromise
 from hydroid.search.least_squares import Polish
 from hydroid.search.pareto import non_dominated
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,11 @@ class Estimate:
     overall: float
     rms: float
     responses: tuple[Array, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether it could be simulated: a compromise between sets that could need not."""
+        return bool(np.isfinite(self.rms))
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,7 @@ def fit(
     save: Callable[[SearchState, Memo], None],
     watch: Watcher,
     checkpoint: Checkpoint | None = None,
+    journal: Journal | None = None,
 ) -> Fit:
     """Search, take the estimates, polish.
 
@@ -97,6 +108,7 @@ def fit(
         save: keeps the search's state now and then.
         watch: is told how far the fit is.
         checkpoint: where an interrupted search was.
+        journal: what an interrupted polish has simulated.
 
     Raises:
         RunError: every simulated parameter set diverged.
@@ -105,25 +117,28 @@ def fit(
     memo = Memo(problem)
     if checkpoint is not None:
         memo.restore(*checkpoint.memo)
-    search = Search(problem, settings.search, memo)
+    if settings.search.algorithm == "multistart":
+        search = Multistart(problem, settings.search, memo, watch.polishing, journal)
+    else:
+        search = Search(problem, settings.search, memo)
     state = search.run(checkpoint.state if checkpoint else None, save, watch.generation)
     theta = search.theta(state.population)
     evaluation = memo.evaluate(theta)
     if search.single:
-        found = {"best": compromise.best(theta, evaluation.overall)}
+        found = {"best": compromise.best(theta, state.population.objectives[:, 0])}
     else:
         found = _from_front(theta, evaluation, memo, settings.search.compromise)
-    estimates = _estimates(problem, found)
+    estimates = _usable_first(_estimates(problem, found))
     final, polished, last = next(iter(estimates)), None, problem
     if settings.polish is not None:
-        start = min(estimates.values(), key=lambda e: e.rms if np.isfinite(e.rms) else np.inf)
-        polished = _polish(problem, start, watch)
+        start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
+        polished = _polish(problem, start, watch, journal)
         theta_polished = problem.parameters.from_unit(polished.point[None])
         estimates |= _estimates(problem, {"polished": theta_polished[0]})
         final = "polished"
         if settings.refine:
             last = problem.freed()
-            polished = _polish(last, estimates[final], watch)
+            polished = _polish(last, estimates[final], watch, journal)
             theta_refined = last.parameters.from_unit(polished.point[None])
             estimates |= _estimates(last, {"refined": theta_refined[0]})
             final = "refined"
@@ -156,6 +171,14 @@ def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]
     }
 
 
+def _usable_first(estimates: dict[str, Estimate]) -> dict[str, Estimate]:
+    """The same with those that diverged behind the others; the first is the search's own."""
+    for name, estimate in estimates.items():
+        if not estimate.usable:
+            _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
+    return dict(sorted(estimates.items(), key=lambda item: not item[1].usable))
+
+
 def _from_front(theta: Array, evaluation: Evaluation, memo: Memo, first: str) -> dict[str, Array]:
     """The three ways to one estimate, the one that the settings ask for first.
 
@@ -178,6 +201,6 @@ def _front(theta: Array, evaluation: Evaluation, memo: Memo) -> tuple[Array, Eva
     return theta, memo.evaluate(theta)
 
 
-def _polish(problem: Problem, start: Estimate, watch: Watcher) -> Polish:
+def _polish(problem: Problem, start: Estimate, watch: Watcher, journal: Journal | None) -> Polish:
     assert problem.settings.polish is not None
-    return polish_estimate(problem, start.theta, problem.settings.polish, watch.polishing)
+    return polish_estimate(problem, start.theta, problem.settings.polish, watch.polishing, journal)

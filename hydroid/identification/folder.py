@@ -1,12 +1,10 @@
 """The run folder: what was asked, with what, how far it came, and what came out."""
 
 import hashlib
-import io
 import json
-import platform
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +12,25 @@ import mujoco
 import numpy as np
 import yaml
 
-import hydroid
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
-from hydroid.files import write_atomic
+from hydroid.files import remove_parts, write_atomic
+from hydroid.identification.checkpoint import read_checkpoint, write_checkpoint
 from hydroid.identification.fit import Fit
+from hydroid.identification.identity import (
+    file_hash,
+    identity,
+    model_hash,
+    portable,
+    refuse_other_arm,
+    refuse_other_identity,
+    refuse_other_settings,
+)
+from hydroid.identification.journal import Journal
+from hydroid.identification.lock import LOCK, locked
 from hydroid.identification.problem import Memo, Problem
+from hydroid.identification.run_log import run_log
 from hydroid.identification.search import Checkpoint, SearchState
-from hydroid.search.algorithm import Population
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
@@ -38,36 +47,45 @@ class RunFolder:
         """Whether a run has begun here."""
         return (self.path / "run.json").is_file()
 
+    @contextmanager
+    def owned(self) -> Generator[None]:
+        """Hold the folder against other processes, and write what happens meanwhile to `run.log`.
+
+        Raises:
+            RunError: another process holds it, it holds other files, or it cannot be written.
+        """
+        self._refuse_other_files()
+        with locked(self.path), run_log(self.path / "run.log"):
+            remove_parts(self.path)
+            yield
+
     def begin(self, settings: FitSettings, arm: Arm, logs: Sequence[Path]) -> None:
         """Write what the run is: settings, the arm it is about, versions, seed, hashes of the logs.
 
         Raises:
             RunError: the folder cannot be written, or holds other files.
         """
-        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
-            raise RunError("exists and holds no run", where=str(self.path), cure="choose another --out")
+        self._refuse_other_files()
         self._write_model(load_model(arm.model, arm))
         local = arm.model_copy(update={"model": Path("model/arm.xml"), "meshes": Path("model/meshes")})
         self._write_yaml("arm.yaml", local.model_dump(mode="json"))
-        self._write_yaml("config.yaml", _portable(settings))
-        self.write("run.json", json.dumps(_identity(settings, logs) | {"status": "running"}, indent=2) + "\n")
+        self._write_yaml("config.yaml", portable(settings))
+        files = {"files": self._hashes(), "origin": model_hash(arm), "status": "running"}
+        self.write("run.json", json.dumps(identity(settings, logs) | files, indent=2) + "\n")
 
-    def check(self, settings: FitSettings, logs: Sequence[Path]) -> None:
+    def check(self, settings: FitSettings, arm: Arm, logs: Sequence[Path]) -> None:
         """Refuse to continue a run that was another one.
 
         Raises:
-            RunError: other settings, another log, another version; each with its name.
+            RunError: other settings, another arm, another log, another version; each with its name.
         """
         then = self.identity()
-        now = _identity(settings, logs)
-        for key in ("hydroid", "mujoco", "logs"):
-            if then.get(key) != now[key]:
-                raise RunError(
-                    f"holds a run with other {key}: {then.get(key)}, now {now[key]}",
-                    where=str(self.path),
-                    cure="choose another --out",
-                )
-        self._refuse_other_settings(settings)
+        refuse_other_identity(self.path, then, settings, logs)
+        self._refuse_changed_files(then.get("files", {}))
+        their_settings, their_arm = self.settings()
+        refuse_other_settings(self.path, their_settings, settings)
+        if arm.model.resolve() != (self.path / "model" / "arm.xml").resolve():  # its own is its own
+            refuse_other_arm(self.path, their_arm, arm, then.get("origin"))
 
     def identity(self) -> dict[str, Any]:
         """Read run.json.
@@ -78,14 +96,15 @@ class RunFolder:
         file = self.path / "run.json"
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             cure = "name a folder that `hydroid fit-mech --out` has made"
             raise RunError(
                 f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})",
                 where=str(file),
                 cure=cure,
             ) from None
-        if not isinstance(content, dict):
+        hashes = [content.get(key, {}) for key in ("logs", "files")] if isinstance(content, dict) else [None]
+        if not all(isinstance(h, dict) and all(isinstance(v, str) for v in h.values()) for h in hashes):
             raise RunError("is not a run's description", where=str(file))
         return content
 
@@ -148,58 +167,67 @@ class RunFolder:
         write_atomic(self.path / name, content)
 
     def save(self, state: SearchState, memo: Memo) -> None:
-        """Write the checkpoint, atomically, as npz without pickle."""
-        theta, values = memo.arrays()
-        buffer = io.BytesIO()
-        np.savez(
-            buffer,
-            chromosomes=state.population.chromosomes,
-            objectives=state.population.objectives,
-            history=state.history,
-            memo_theta=theta,
-            memo_values=values,
-            rng=np.frombuffer(json.dumps(state.rng).encode(), dtype=np.uint8),
-        )
-        self.write("checkpoint.npz", buffer.getvalue())
+        """Write the checkpoint; the one before it is kept (see `checkpoint`)."""
+        write_checkpoint(self.path / "checkpoint.npz", state, memo, self._id())
 
     def checkpoint(self) -> Checkpoint | None:
-        """Read the checkpoint; None where the run was stopped before its first.
+        """Read the newest checkpoint that is whole; None where the run was stopped before its first.
 
         Raises:
-            RunError: the file is damaged.
+            RunError: none is whole.
         """
-        file = self.path / "checkpoint.npz"
-        if not file.exists():
-            return None
-        try:
-            with np.load(file, allow_pickle=False) as data:
-                population = Population(data["chromosomes"], data["objectives"])
-                rng = json.loads(data["rng"].tobytes())
-                state = SearchState(population, rng, data["history"])
-                return Checkpoint(state, (data["memo_theta"], data["memo_values"]))
-        except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
-            cure = "remove it to begin again from the seed"
-            raise RunError(f"is damaged ({type(error).__name__})", where=str(file), cure=cure) from None
+        return read_checkpoint(self.path / "checkpoint.npz", self._id())
 
-    def _refuse_other_settings(self, settings: FitSettings) -> None:
-        then, _ = self.settings()
-        old, new = _flat(_portable(then)), _flat(_portable(settings))
-        for key in sorted(old.keys() | new.keys()):
-            # threads and memory change nothing in the result
-            if old.get(key) != new.get(key) and key not in ("simulation.threads", "simulation.chunk_mib"):
-                raise RunError(
-                    f"holds a run with {key} = {old.get(key)}, now {new.get(key)}",
-                    where=str(self.path),
-                    cure="continue it with its own settings, or choose another --out",
-                )
+    def journal(self) -> Journal:
+        """What the polish under way has simulated."""
+        return Journal(self.path / "polish.journal")
+
+    def _id(self) -> str:
+        """What tells this run's checkpoints from those of others."""
+        identity = {key: value for key, value in self.identity().items() if key != "status"}
+        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+    def _hashes(self) -> dict[str, str]:
+        """What the run's own settings and model are, by file."""
+        names = ("config.yaml", "arm.yaml", "model/arm.xml")
+        files = [self.path / name for name in names]
+        files += sorted((self.path / "model" / "meshes").glob("*"))
+        return {f.relative_to(self.path).as_posix(): file_hash(f) for f in files if f.is_file()}
+
+    def _refuse_changed_files(self, then: dict[str, str]) -> None:
+        now = self._hashes()
+        for name, known in then.items():
+            if now.get(name) != known:
+                cure = "put it back as it was, or choose another --out"
+                raise RunError("has changed since the run began", where=str(self.path / name), cure=cure)
+
+    def _refuse_other_files(self) -> None:
+        """A folder is the run's where it is empty, or has the run's description or at least its lock."""
+        if not self.path.exists() or self.exists or (self.path / LOCK).exists():
+            return
+        if not self.path.is_dir() or any(self.path.iterdir()):
+            raise RunError("exists and holds no run", where=str(self.path), cure="choose another --out")
 
     def _write_model(self, spec: mujoco.MjSpec) -> None:
         """Copy the MJCF with its meshes, so that the run can be read where the original is gone."""
-        origin = Path(spec.modelfiledir) / spec.meshdir
-        for mesh in spec.meshes:
-            source = origin / mesh.file
-            mesh.file = source.name
-            self.write(f"model/meshes/{source.name}", source.read_bytes())
+        home, kept = Path(spec.modelfiledir).resolve(), dict[str, bytes]()
+        for number, mesh in enumerate(spec.meshes):
+            if not mesh.file:
+                continue  # its vertices stand in the MJCF
+            source = home / spec.meshdir / mesh.file
+            try:
+                content = source.read_bytes()
+            except OSError as error:
+                raise RunError(f"mesh cannot be read ({error.strerror})", where=str(source)) from None
+            # meshes of different folders may bear one name
+            taken = kept.get(source.name, content) != content
+            mesh.file = f"{number}_{source.name}" if taken else source.name
+            kept[mesh.file] = content
+        for name, content in kept.items():
+            self.write(f"model/meshes/{name}", content)
+        for pictures, folder in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
+            for picture in pictures:
+                picture.file = picture.file and str(home / folder / picture.file)  # these stay where they are
         self._write_xml(spec, "arm.xml")
 
     def _write_xml(self, spec: mujoco.MjSpec, name: str) -> None:
@@ -209,26 +237,3 @@ class RunFolder:
 
     def _write_yaml(self, name: str, content: dict[str, Any]) -> None:
         self.write(name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
-
-
-def _portable(settings: FitSettings) -> dict[str, Any]:
-    return settings.model_copy(update={"arm": "arm.yaml"}).model_dump(mode="json")
-
-
-def _identity(settings: FitSettings, logs: Sequence[Path]) -> dict[str, Any]:
-    return {
-        "hydroid": hydroid.__version__,
-        "mujoco": version("mujoco"),
-        "numpy": version("numpy"),
-        "python": platform.python_version(),
-        "seed": settings.search.seed,
-        "logs": {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in logs},
-    }
-
-
-def _flat(values: Any, prefix: str = "") -> dict[str, Any]:
-    if not isinstance(values, dict):
-        return {prefix: values}
-    return {
-        k: v for key, inner in values.items() for k, v in _flat(inner, f"{prefix}.{key}".lstrip(".")).items()
-    }

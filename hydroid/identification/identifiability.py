@@ -1,9 +1,9 @@
 """Which combinations of the parameters the data determine, and each direction that they do not, by name.
 
-A direction is a set of relative changes made together. Where the response to it drowns in the noise, nothing in the
-data speaks against it, however small the output error is. Known patterns are tried first: a parameter without
-effect, the solenoid's four numbers, the currents' scale, a common scale of all that the arm's equation of motion
-is linear in; what is left over is told by its components.
+A direction is a set of relative changes made together. Where the response to it drowns in the noise, nothing
+in the data speaks against it, however small the output error is. Known patterns are tried first: a parameter
+without effect, the solenoid's four numbers, the currents' scale, a common scale of all that the arm's
+equation of motion is linear in; what is left over is told by its components.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,8 @@ class Direction:
     Attributes:
         name: in words, such as "K, D and S scale together".
         changes: relative changes of the free parameters along each, the largest +1, shape (m, p).
-        relative: standard deviation of the largest relative change along the weakest; inf where nothing is felt.
+        relative: standard deviation of the largest relative change along the weakest; inf where nothing is
+            felt.
     """
 
     name: str
@@ -52,8 +53,8 @@ class Identifiability:
 
     Attributes:
         names: of the p free parameters.
-        singular: singular values of the derivatives in units of the noise, largest first, shape (p,): the inverse of
-            the relative standard deviation of each direction. 0: the data do not feel it.
+        singular: singular values of the derivatives in units of the noise, largest first, shape (p,): the
+            inverse of the relative standard deviation of each direction. 0: the data do not feel it.
         axes: these directions, relative changes of unit length, shape (p, p), one a row.
         weak: the directions whose relative standard deviation is above KNOWN, in words.
     """
@@ -73,15 +74,22 @@ def identifiability(problem: Problem, found: Uncertainty) -> Identifiability:
     """Return what the data tell apart at an estimate."""
     _, singular, axes = np.linalg.svd(found.root)
     axes *= np.where(axes[np.arange(len(axes)), np.argmax(np.abs(axes), axis=1)] < 0, -1.0, 1.0)[:, None]
+    singular = np.where(singular > ZERO * singular.max(initial=0.0), singular, 0.0)
     names = tuple(n for n, free in zip(problem.parameters.names, found.free, strict=True) if free)
     named: list[Direction] = []
     rest = np.eye(len(names))  # a basis of the directions that no pattern has taken
     for pattern in patterns(problem, found):
         new = _new(pattern.changes, rest)
-        unfelt = _weakest_first(found.root, new)
+        # one direction is told whole, what it shares with those before it included: its name says what it is
+        whole = (
+            pattern.changes / np.linalg.norm(pattern.changes)
+            if len(pattern.changes) == len(new) == 1
+            else new
+        )
+        unfelt = _weakest_first(found.root, whole)
         if len(unfelt):
             named.append(_direction(pattern.name, found.root, unfelt))
-            rest = _without(rest, unfelt)
+            rest = _without(rest, new if whole is not new else unfelt)
     left = int(np.sum(singular < 1 / KNOWN)) - (len(names) - len(rest))
     for changes in _weakest_first(found.root, rest)[: max(left, 0)]:
         named.append(_direction(_combination(names, _scaled(changes)), found.root, changes[None]))
@@ -89,14 +97,14 @@ def identifiability(problem: Problem, found: Uncertainty) -> Identifiability:
 
 
 def _new(changes: Array, basis: Array) -> Array:
-    """Orthonormal directions among `changes`, shape (m, p), that lie in the span of a basis, nearly or wholly."""
+    """Orthonormal directions among `changes`, shape (m, p), that lie mostly in the span of a basis."""
     spanned = np.linalg.svd(changes, full_matrices=False)[2]
     _, part, inner = np.linalg.svd(spanned @ basis.T, full_matrices=False)
     return inner[part > MOSTLY] @ basis
 
 
 def _weakest_first(root: Array, basis: Array) -> Array:
-    """Directions in the span of an orthonormal basis, (m, p), whose relative deviation is above KNOWN, (k, p)."""
+    """Directions in the span of an orthonormal basis, (m, p), whose deviation is above KNOWN, (k, p)."""
     if not len(basis):
         return basis
     _, felt, inner = np.linalg.svd(root @ basis.T)
@@ -105,7 +113,7 @@ def _weakest_first(root: Array, basis: Array) -> Array:
 
 
 def _without(basis: Array, taken: Array) -> Array:
-    """Return an orthonormal basis, shape (m, p), without the directions taken (k, p) in its span: (m - k, p)."""
+    """Return an orthonormal basis, (m, p), without the directions taken, (k, p), in its span: (m - k, p)."""
     complement = np.linalg.svd(taken @ basis.T)[2][len(taken) :]
     return complement @ basis
 

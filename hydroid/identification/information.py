@@ -38,7 +38,7 @@ def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise
     """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
     level, memory = float(np.radians(settings.noise_deg)), settings.noise_correlation_s
     reflection = np.array([-np.exp(-period / memory)]) if memory > 0 else np.empty(0)
-    return Noise(samples, level, reflection, estimated=False)
+    return Noise(samples, level, reflection, "settings")
 
 
 def log_information(problem: Problem, theta: Array) -> Array:

@@ -9,7 +9,7 @@ from hydroid.identification.problem import Problem
 from hydroid.parameters import Array, ParameterSet
 
 STEP = 1e-4
-"""relative step of the differences: their error is then about 1e-7 (truncation, and rounding of the simulation)"""
+"""relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""
 WIDER = 10.0
 """how much wider the step is that checks it"""
 DOUBTFUL = 0.02
@@ -26,8 +26,8 @@ class Jacobian:
 
     Attributes:
         residual: weighted output errors there [rad], shape (R,).
-        slopes: their derivatives, shape (P, R); NaN of a fixed parameter, and where simulations diverge on both
-            sides.
+        slopes: their derivatives, shape (P, R); NaN of a fixed parameter, and where simulations diverge on
+            both sides.
         statements: derivatives of the M statements' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
         error: by how much two steps' derivatives differ, shape (P, R).

@@ -1,8 +1,8 @@
 """The noise of a channel: its level and how long it remembers, from a residual or as given.
 
-A residual at 100 Hz is rarely white: a sensor's filter, a quantised signal, and whatever the model lacks leave
-errors that last. It is described by an autoregressive (AR) model, fitted by Burg's method (J. P. Burg,
-"Maximum entropy spectral analysis", 1967), of the order with the lowest AIC.
+A residual at 100 Hz is rarely white: a sensor's filter, a quantised signal, and whatever the model lacks
+leave errors that last. It is described by an autoregressive (AR) model, fitted by Burg's method (J. P. Burg,
+"Maximum entropy spectral analysis", 1967), of the order with the lowest AIC (H. Akaike, 1974).
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,10 @@ from hydroid.settings.objective import ObjectiveSettings
 
 ORDER = 30
 """the highest order that is tried"""
+ROUNDS = 4
+"""times that the noise which a fit has taken up is estimated"""
+HALF = 0.5
+"""of the noise: a fit that took up more leaves nothing to correct with"""
 FLOOR = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
 """the least error that is believed [rad, Pa]: potentiometers, gauges, converters are no better (ours)"""
 
@@ -56,7 +60,7 @@ class Noise:
         """Return rows S rows', shape (n, n), where rows is (n, T) and S the noise's covariance matrix."""
         if not len(self.reflection):
             return self.level**2 * (rows @ rows.T)
-        return rows @ matmul_toeplitz(self.autocovariance, rows.T)
+        return rows @ np.asarray(matmul_toeplitz(self.autocovariance, rows.T), dtype=np.float64)
 
     def whitened(self, rows: Array) -> Array:
         """Return L^-1 rows' of S = L L', shape (n, T): what makes this noise white with unit variance."""
@@ -69,10 +73,10 @@ class Noise:
 
     @property
     def independent_samples(self) -> float:
-        """How many independent samples tell the level as well: T / (1 + 2 sum of squared correlations)."""
-        correlation = self.autocovariance / self.level**2
-        weight = 1 - np.arange(self.samples) / self.samples
-        return self.samples / float(2 * np.sum(weight * correlation**2) - 1)
+        """Effective sample size: how many independent samples would tell the mean as well; at most T."""
+        weight = 2 * (1 - np.arange(self.samples) / self.samples)
+        total = float(weight @ self.autocovariance) - self.level**2
+        return self.samples / max(total / self.level**2, 1.0)
 
     @property
     def memory(self) -> float:
@@ -128,3 +132,47 @@ def fit_noise(residual: Array, most: int = ORDER) -> Noise:
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
     best = int(np.argmin(criterion))
     return Noise(samples, level, np.array(reflection[:best]))
+
+
+def unbiased(noise: Noise, course: Array, spread: Array) -> Noise:
+    """Return the noise of which a least-squares fit left what `noise` was fitted to.
+
+    A fit takes up the part of the noise that looks like its derivatives: slow noise above all. With U
+    (orthonormal rows that span them) the residual's covariance is (1 - U'U) S (1 - U'U); the autocovariances
+    are raised by what that takes, in a few rounds since S is not known beforehand.
+
+    Args:
+        noise: as fitted to a channel's residual.
+        course: the channel's part of U, shape (p, T).
+        spread: U S U' of all channels, shape (p, p).
+    """
+    samples, order = noise.samples, len(noise.reflection)
+    seen, found = noise.autocovariance[: order + 1], noise
+    for _ in range(ROUNDS):
+        felt = np.asarray(matmul_toeplitz(found.autocovariance, course.T), dtype=np.float64).T
+        taken = np.array(
+            [
+                np.sum(course[:, : samples - k] * felt[:, k:])
+                + np.sum(felt[:, : samples - k] * course[:, k:])
+                - np.sum((spread @ course[:, : samples - k]) * course[:, k:])
+                for k in range(order + 1)
+            ]
+        )
+        reflection = _levinson(seen + taken / (samples - np.arange(order + 1)))
+        if reflection is None or taken[0] > HALF * samples * seen[0]:
+            break  # the fit took up so much of the noise that nothing can be said about the rest
+        found = Noise(samples, float(np.sqrt(seen[0] + taken[0] / samples)), reflection)
+    return found
+
+
+def _levinson(known: Array) -> Array | None:
+    """Reflection coefficients from autocovariances at lags 0 to p; None where no process has these."""
+    polynomial, variance, reflection = np.ones(1), known[0], np.empty(0)
+    for m in range(1, len(known)):
+        k = -(polynomial @ known[m:0:-1]) / variance
+        if not abs(k) < 1:
+            return None
+        longer = np.append(polynomial, 0.0)
+        polynomial, variance = longer + k * longer[::-1], variance * (1 - k**2)
+        reflection = np.append(reflection, k)
+    return reflection

@@ -7,7 +7,7 @@ import numpy as np
 
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import Uncertainty
+from hydroid.identification.uncertainty import KNOWN, Uncertainty
 from hydroid.parameters import Array
 from hydroid.settings.fit import MECHANICAL_UNITS
 
@@ -19,7 +19,7 @@ STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Directions to be tried: what they are, in words, and the relative changes of the p free parameters, (m, p)."""
+    """Directions to be tried: in words, and as relative changes of the p free parameters, shape (m, p)."""
 
     name: str
     changes: Array
@@ -28,23 +28,28 @@ class Pattern:
 def patterns(problem: Problem, found: Uncertainty) -> Iterator[Pattern]:
     """Yield what is worth a try, the simplest first."""
     names = [n for n, free in zip(problem.parameters.names, found.free, strict=True) if free]
-    yield from _without_effect(problem, found, names)
+    yield from _alone(problem, found, names)
     yield from _solenoids(problem, found, names)
     yield from _common_scale(problem, found, names)
 
 
-def _without_effect(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+def _alone(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+    """Parameters without effect, and those whose own effect drowns in the noise."""
     where = outputs(problem)
     idle = found.jacobian.without_effect[found.free]
-    for i in np.flatnonzero(idle):
-        yield Pattern(f"{names[i]} has no effect on {where}", np.eye(len(names))[i : i + 1])
+    for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
+        if none:
+            yield Pattern(f"{name} has no effect on {where}", direction[None])
+    for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
+        if not none and np.linalg.norm(found.root @ direction) < 1 / KNOWN:
+            yield Pattern(f"{name} by itself", direction[None])
 
 
 def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
     """The equation of motion (1) is linear in these: one factor on all of them cancels.
 
-    What is fixed (the jaws' mass) does not scale along: the free masses then differ from the common factor by what
-    makes up for it best.
+    What is fixed (the jaws' mass) does not scale along: the free masses then differ from the common factor by
+    what makes up for it best.
     """
     settings, idle = problem.settings.parameters, found.jacobian.without_effect[found.free]
     linear = np.array([settings[name].quantity in MECHANICAL_UNITS for name in names]) & ~idle
@@ -64,7 +69,7 @@ def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) ->
 
 
 def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
-    """F1, F2, x1, x2 act through δ and k i0² alone, and these two with the currents through δ and k i² alone."""
+    """F1, F2, x1, x2 act through δ and k i0² alone; these and the currents through δ and k i²."""
     if problem.settings.stage != "hyd":
         return
     settings = problem.settings.parameters
@@ -84,19 +89,21 @@ def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> It
         if len(free) > len(coil) and len(trade := _null(at, free, [0, 2, 3])):
             known = f"δ = {gap:.3g} mm, k·I_max² = {highest:.3g} and k·I_min² = {lowest:.3g} N·mm²"
             who = " and ".join(mine[q] for q in free[len(coil) :])
-            said = f"a common scale of {who} trades with {listed([mine[q] for q in coil])}, at the same {known}"
+            said = (
+                f"a common scale of {who} trades with {listed([mine[q] for q in coil])}, at the same {known}"
+            )
             yield Pattern(said, _spread(trade, free, mine, names))
 
 
 def _acting(at: Mapping[str, float]) -> tuple[float, float, float, float]:
     """δ [mm], k i0², k I_max², k I_min² [N·mm²]: all through which coil and currents act."""
-    k, gap = force_curve(*(at[q] for q in COIL), at[RATED])
+    k, gap = force_curve(at["force_1"], at["force_2"], at["stroke_1"], at["stroke_2"], at[RATED])
     currents = (RATED, *CURRENTS)
     return (float(gap), *(float(k) * at[q] ** 2 for q in currents))  # pyright: ignore[reportReturnType]
 
 
 def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> Array:
-    """Relative changes of `free` that leave the numbers `held` of what acts as they are, shape (m, len(free))."""
+    """Relative changes of `free` that leave the numbers `held` of what acts as they are, (m, len(free))."""
     if not free:
         return np.empty((0, 0))
     columns = []
@@ -111,7 +118,9 @@ def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> 
     return directions[rank:]
 
 
-def _spread(changes: Array, quantities: Sequence[str], mine: Mapping[str, str], names: Sequence[str]) -> Array:
+def _spread(
+    changes: Array, quantities: Sequence[str], mine: Mapping[str, str], names: Sequence[str]
+) -> Array:
     """Return changes of some quantities, shape (m, k), as changes of all free parameters, shape (m, p)."""
     out = np.zeros((len(changes), len(names)))
     out[:, [names.index(mine[q]) for q in quantities]] = changes
@@ -121,9 +130,11 @@ def _spread(changes: Array, quantities: Sequence[str], mine: Mapping[str, str], 
 def outputs(problem: Problem) -> str:
     """What is compared, in words."""
     joints = [str(joint) for joint in dict.fromkeys(c.joint for c in problem.channels)]
-    angles = f"the angle of joint {joints[0]}" if len(joints) == 1 else f"the angles of joints {listed(joints)}"
+    which = (
+        f"the angle of joint {joints[0]}" if len(joints) == 1 else f"the angles of joints {listed(joints)}"
+    )
     pressed = any(c.quantity != "angle" for c in problem.channels)
-    return f"{angles} and the pressures" if pressed else angles
+    return f"{which} and the pressures" if pressed else which
 
 
 def listed(names: Sequence[str]) -> str:

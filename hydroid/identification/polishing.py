@@ -1,9 +1,11 @@
 """The polish of an estimate: least squares over all channels, with what is known as further measurements."""
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
 
+from hydroid.identification.journal import Journal, question_of
 from hydroid.identification.problem import Problem
 from hydroid.parameters import Array
 from hydroid.search.least_squares import Polish, polish
@@ -14,9 +16,15 @@ ROUNDS = 4
 SETTLED = 0.02
 """relative change of the noise below which another round would change nothing"""
 
+_log = logging.getLogger(__name__)
+
 
 def polish_estimate(
-    problem: Problem, theta: Array, settings: PolishSettings, watch: Callable[[int], None]
+    problem: Problem,
+    theta: Array,
+    settings: PolishSettings,
+    watch: Callable[[int], None],
+    journal: Journal | None = None,
 ) -> Polish:
     """Improve an estimate by bounded least squares.
 
@@ -28,30 +36,62 @@ def polish_estimate(
         theta: where to start, shape (P,).
         settings: when to end.
         watch: is told how many simulations were made so far.
+        journal: what an interrupted run has simulated already.
 
     Returns:
         Its point is one of the unit box of the free parameters.
+
+    Raises:
+        RunError: the journal cannot be written.
     """
+    question = question_of(problem, theta, settings)
+    known = None if journal is None else journal.polished(question)
+    if known is not None:
+        result, simulated = known
+        watch(simulated)
+        return result
+    simulate = problem.residuals if journal is None else journal.residuals(problem)
+    result, simulated = _polish(problem, simulate, theta, settings, watch)
+    _log.info("polish of %d parameters: %s", result.point.size, _words(result, simulated))
+    if journal is not None:
+        journal.end(question, result, simulated)
+    return result
+
+
+def _polish(
+    problem: Problem,
+    simulate: Callable[[Array], Array],
+    theta: Array,
+    settings: PolishSettings,
+    watch: Callable[[int], None],
+) -> tuple[Polish, int]:
+    """The same with the residuals of `simulate`, theta (n, P) -> (n, R), and the number of simulations."""
     simulated, parameters, knowledge = 0, problem.parameters, problem.knowledge
-    noise = _noise(problem, theta) if len(knowledge) else 0.0
+    noise = _noise(simulate, theta) if len(knowledge) else 0.0
 
     def residuals(unit: Array) -> Array:
         nonlocal simulated
         simulated += len(unit)
         watch(simulated)
         points = parameters.from_unit(unit)
-        rows = problem.residuals(points)
+        rows = simulate(points)
         return np.column_stack([rows, noise * knowledge.scores(points)]) if len(knowledge) else rows
 
     result = polish(parameters.to_unit(theta[None])[0], residuals, settings)
     for _ in range(ROUNDS - 1 if len(knowledge) else 0):
-        before, noise = noise, _noise(problem, parameters.from_unit(result.point[None])[0])
+        before, noise = noise, _noise(simulate, parameters.from_unit(result.point[None])[0])
         if not abs(noise - before) > SETTLED * before:
             break
         result = polish(result.point, residuals, settings)
-    return result
+    return result, simulated
 
 
-def _noise(problem: Problem, theta: Array) -> float:
+def _noise(simulate: Callable[[Array], Array], theta: Array) -> float:
     """Rms residual of the logs [rad]."""
-    return float(np.sqrt(np.mean(problem.residuals(theta[None]) ** 2)))
+    return float(np.sqrt(np.mean(simulate(theta[None]) ** 2)))
+
+
+def _words(result: Polish, simulated: int) -> str:
+    """A line for the run's log."""
+    cost = f"half the sum of squares {result.cost_before:.6g} to {result.cost_after:.6g}"
+    return f"{cost} in {simulated} simulations; {result.ending.value}"

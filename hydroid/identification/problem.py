@@ -23,6 +23,7 @@ from hydroid.objective.segments import segment_bounds, segment_objectives
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.objective import SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
 from hydroid.simulation.record import Record
 
@@ -82,6 +83,12 @@ class Problem:
         }
         settings = self.settings.model_copy(update={"parameters": free})
         return Problem(self._arm, settings, self.logs)
+
+    def first(self, seconds: float) -> "Problem":
+        """Return the same problem up to so long after each log's first command, in one segment a channel."""
+        objective = self.settings.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
+        settings = self.settings.model_copy(update={"objective": objective})
+        return Problem(self._arm, settings, [log.first(seconds) for log in self.logs])
 
     def theta(self, unit: Array) -> Array:
         """Return parameter sets, (n, P), from points of the unit box, moved to where what is known holds."""
@@ -188,8 +195,13 @@ class Memo:
 
     def _keep(self, theta: Array) -> None:
         result = self.problem.evaluate(theta)
-        self.infeasible += int(np.sum(~np.isfinite(result.overall)))
-        for row, segments, overall in zip(theta, result.segments, result.overall, strict=True):
+        # what is not finite somewhere is infeasible throughout: no objective of it may win anywhere
+        finite = np.isfinite(np.column_stack([result.segments, result.overall]))
+        failed = np.logical_not(np.all(finite, axis=1))
+        self.infeasible += int(failed.sum())
+        all_segments = np.where(failed[:, None], np.inf, result.segments)
+        all_overall = np.where(failed, np.inf, result.overall)
+        for row, segments, overall in zip(theta, all_segments, all_overall, strict=True):
             self._known[row.tobytes()] = (segments, float(overall))
 
     def arrays(self) -> tuple[Array, Array]:

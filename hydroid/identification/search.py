@@ -1,5 +1,6 @@
 """The search loop: ask, simulate, tell, and a state small enough to keep after every generation."""
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "medi
 
 SAVE_EVERY = 5.0
 """seconds between checkpoints: a lost one costs no more, and writing it is noise beside the search"""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -74,18 +77,18 @@ class Search:
         """
         if state is not None and len(state.history) < self.generations:
             self._replay(state)
-        saved = time.monotonic()
+        saved, kept = time.monotonic(), state
         try:
             while state is None or not self._finished(state):
                 state = self._next(state)  # an interrupt in here leaves the state before it
                 watch(state.history[-1])
                 if time.monotonic() - saved > SAVE_EVERY:
-                    save(state, self._memo)
-                    saved = time.monotonic()
+                    self._save(state, save)
+                    saved, kept = time.monotonic(), state
             return state
         finally:
-            if state is not None:
-                save(state, self._memo)
+            if state is not None and state is not kept:
+                self._save(state, save)
 
     def theta(self, population: Population) -> Array:
         """Return the population's parameter sets, shape (n, P)."""
@@ -100,6 +103,18 @@ class Search:
     def generations(self) -> int:
         """Populations the search evaluates at most, the first, random one included."""
         return 1 + self._algorithm.settings.generations
+
+    def _save(self, state: SearchState, save: Callable[[SearchState, Memo], None]) -> None:
+        save(state, self._memo)
+        now = dict(zip(HISTORY, state.history[-1], strict=True))
+        _log.info(
+            "checkpoint: generation %d of %d, %d simulated, %d diverged, best objective %.6g",
+            now["generation"],
+            self.generations,
+            now["simulated"],
+            now["infeasible"],
+            now["best"],
+        )
 
     def _finished(self, state: SearchState) -> bool:
         return len(state.history) >= self.generations or self._algorithm.reached(state.population)
@@ -144,6 +159,16 @@ class Search:
                 np.median(finite) if finite.size else np.inf,
             ]
         )
+
+
+def check_search(problem: Problem) -> None:
+    """Refuse a search that cannot begin, before anything is written.
+
+    Raises:
+        SettingsError: as `make_algorithm`.
+    """
+    if problem.settings.search.algorithm in ("cmaes", "pymoo"):
+        make_algorithm(problem, problem.settings.search)
 
 
 def make_algorithm(problem: Problem, settings: SearchSettings) -> Algorithm:

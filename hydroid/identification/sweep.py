@@ -19,8 +19,8 @@ class Sweep:
     """Local and global sensitivity of all channels.
 
     free: indices of the F free parameters, shape (F,). slopes: change of each channel per 1 % of each of
-    them [rad or Pa], one array (F, T) a channel; NaN where the changed set diverges. values: of each within its
-    bounds, shape (F, COUNT). responses: each channel at these values [rad or Pa], (F, COUNT, T) a channel.
+    them [rad or Pa], one array (F, T) a channel; NaN where the changed set diverges. values: of each within
+    its bounds, shape (F, COUNT). responses: each channel at these [rad or Pa], (F, COUNT, T) a channel.
     """
 
     free: NDArray[np.intp]

@@ -96,13 +96,18 @@ class Bench:
     def trial(self, experiment: Experiment) -> Trial | None:
         """Return what an experiment would tell, changed to keep the limits; None where it cannot."""
         kept = self.kept(experiment)
-        rows = None if kept is None else self._simulate(kept[0], len(self._members))
-        if kept is None or rows is None:
+        told = None if kept is None else self.told(kept[0])
+        return None if kept is None or told is None else Trial(kept[0], told, kept[1])
+
+    def told(self, experiment: Experiment) -> Array | None:
+        """Return the information of an experiment as it is, shape (F, F); None where it diverges."""
+        rows = self._simulate(experiment, len(self._members))
+        if rows is None:
             return None
         outputs = rows[:, :, self._outputs]
         slopes = (outputs[1:] - outputs[0]) / STEP
-        told = sum((information(slopes[:, :, k], self._noise) for k in range(len(self._outputs))), 0.0)
-        return Trial(kept[0], np.asarray(told), kept[1])
+        parts = [information(slopes[:, :, k], self._noise) for k in range(len(self._outputs))]
+        return np.sum(parts, axis=0)
 
     def _simulate(self, experiment: Experiment, members: int) -> Array | None:
         """Angles of all joints [rad], shape (members, T, J); None where a member diverged."""

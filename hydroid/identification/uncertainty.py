@@ -1,19 +1,21 @@
 """How well the data determine each parameter: covariance, intervals, flags.
 
-The estimate minimises the weighted squares of the residuals, and of the statements' scores times the residual's
-level; the noise need not be white nor the weights match it. With J the derivatives of all that (per relative
-change), and S the covariance of the noise, the covariance of such an estimate is the *sandwich*
+The estimate minimises the weighted squares of the residuals, and of the statements' scores times the
+residual's level; the noise need not be white, nor the weights match it. With J the derivatives of all that
+per relative change, shape (p, R), and S the covariance of the noise, that of the estimate is the *sandwich*
 
-    C = (J J')^-1 J S J' (J J')^-1        (J of shape (p, R); P. J. Huber, 1967; G. A. F. Seber and C. J. Wild, 1989)
+    C = (J J')^-1 J S J' (J J')^-1        (P. J. Huber, 1967; G. A. F. Seber and C. J. Wild, 1989)
 
 which for white noise of one level is the usual s² (J J')^-1. All of it goes through one singular value
 decomposition J = V D U, C^-1 = G' G with G = (U S U')^-1/2 D V': directions that the data do not feel keep a
 singular value of exactly zero, and nothing is squared on the way.
 
-It is a first-order, local look, and holds as far as the model does: an error of the model that shifts an estimate is
-in no interval. An estimate on a bound is treated as if the bound were not there, and gets no interval.
+It is a first-order, local look, and holds as far as the model does: an error of the model that shifts an
+estimate is in no interval. An estimate on a bound is treated as if the bound were not there, and gets no
+interval.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from hydroid.identification.jacobian import Jacobian, jacobian
-from hydroid.identification.noise import FLOOR, Noise, channel_noise
+from hydroid.identification.noise import FLOOR, Noise, channel_noise, unbiased
 from hydroid.identification.problem import Problem
 from hydroid.parameters import Array, Parameter
 
@@ -60,10 +62,10 @@ class Uncertainty:
         free: which parameters are free, shape (P,).
         root: G of C^-1 = G' G, shape (p, p): a relative change v of the free parameters is |G v| standard
             deviations away from the estimate.
-        relative: relative standard deviation of each parameter, shape (P,); inf where it is not determined, NaN
-            where it is fixed.
-        interval: of 95 %, from Student's t, shape (P, 2); infinite where not determined, NaN where fixed or at a
-            bound.
+        relative: relative standard deviation of each parameter, shape (P,); inf where it is not determined,
+            NaN where it is fixed.
+        interval: of 95 %, from Student's t, shape (P, 2); infinite where not determined, NaN where fixed or
+            at a bound.
         correlation: of the free parameters' estimates, shape (p, p); NaN where not determined.
         freedom: degrees of freedom of the noise's level.
         flags: by parameter, what is to be known about its estimate.
@@ -97,15 +99,18 @@ def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
 
 
 def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, ...]) -> Uncertainty:
-    """Return the uncertainty from derivatives and noise: `uncertainty` without its simulations."""
+    """Return the uncertainty from derivatives and the residual's noise: `uncertainty` without simulations."""
     free = problem.parameters.free
-    root, freedom = _root(problem, slopes, noise)
+    root, noise, freedom = _root(problem, slopes, noise)
     covariance, lost = covariance_of(root)
     relative = np.full(len(theta), np.nan)
     relative[free] = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
     unknown = relative > LOST
     relative[unknown] = np.inf
-    bound = [next((s for s, at in at_bounds(p, v) if at), "") for p, v in zip(problem.parameters.parameters, theta)]
+    bound = [
+        next((side for side, at in at_bounds(parameter, value) if at), "")
+        for parameter, value in zip(problem.parameters.parameters, theta, strict=True)
+    ]
     half = student.ppf(0.5 + COVERED / 2, freedom) * relative * slopes.scale
     interval = np.stack([theta - half, theta + half], axis=1)
     interval[[side != "" for side in bound] & ~unknown] = np.nan
@@ -128,7 +133,7 @@ def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, 
 
 
 def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return (G' G)^-1 over the directions that are felt, shape (p, p), and who has a part in the others, (p,)."""
+    """Return (G' G)^-1 over the felt directions, (p, p), and who has a part in the others, (p,)."""
     _, values, directions = np.linalg.svd(root)
     felt = values > ZERO * values.max(initial=0.0)
     known = directions[felt] / values[felt, None]
@@ -144,33 +149,54 @@ def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, ND
     )
 
 
-def _statement_unit(slopes: Jacobian) -> float:
+def statement_unit(slopes: Jacobian) -> float:
     """What a statement's score counts in the polish, in units of the residual [rad]."""
     return float(np.fmax(np.sqrt(np.mean(slopes.residual**2)), FLOOR["angle"]))
 
 
-def _root(problem: Problem, slopes: Jacobian, noise: tuple[Noise, ...]) -> tuple[Array, float]:
-    """Return G, shape (p, p), and the degrees of freedom of the noise's level."""
-    free, unit = problem.parameters.free, _statement_unit(slopes)
-    felt = np.nan_to_num(np.hstack([slopes.slopes, unit * slopes.statements])[free])
-    error = np.nan_to_num(slopes.error[free])
+def decompose(free: NDArray[np.bool_], slopes: Jacobian) -> tuple[Array, Array, Array]:
+    """Return V, D, U of J = V D U: directions (p, p), strengths (p,), what they do to residuals (p, R + M).
+
+    A strength that is not beyond what two steps of the differences differ by is 0.
+    """
+    felt = np.nan_to_num(np.hstack([slopes.slopes, statement_unit(slopes) * slopes.statements])[free])
     directions, values, course = np.linalg.svd(felt, full_matrices=False)
-    resolved = np.maximum(np.linalg.norm(directions.T @ error, axis=1), ZERO * values[0])
-    values[values <= resolved] = 0.0
+    error = np.linalg.norm(directions.T @ np.nan_to_num(slopes.error[free]), axis=1)
+    values[values <= np.maximum(error, ZERO * values[0])] = 0.0
+    return directions, values, course
+
+
+def _root(
+    problem: Problem, slopes: Jacobian, noise: tuple[Noise, ...]
+) -> tuple[Array, tuple[Noise, ...], float]:
+    """Return G, shape (p, p), the noise with what the fit took up, its degrees of freedom."""
+    directions, values, course = decompose(problem.parameters.free, slopes)
+    unit = statement_unit(slopes)
     count = len(slopes.residual)
-    scatter = unit**2 * course[:, count:] @ course[:, count:].T
-    samples = 0.0
-    for channel, process in zip(problem.channels, noise, strict=True):
-        own = process.covariance_of(course[:, channel.rows])
-        if process.source == "residual":
-            # the fit has taken up a share of the noise: what is left over shows less than there was
-            share = np.trace(own[values > 0][:, values > 0]) / (process.samples * process.level**2)
-            own = own / (1 - min(share, 0.9))
-        scatter += own
-        samples += process.independent_samples
+    statements = unit**2 * course[:, count:] @ course[:, count:].T
+    parts = [course[:, channel.rows] for channel in problem.channels]
+    scatter = statements + _sum(
+        process.covariance_of(part) for process, part in zip(noise, parts, strict=True)
+    )
+    taken = values > 0
+    noise = tuple(
+        unbiased(process, part[taken], scatter[np.ix_(taken, taken)])
+        if process.source == "residual"
+        else process
+        for process, part in zip(noise, parts, strict=True)
+    )
+    scatter = statements + _sum(
+        process.covariance_of(part) for process, part in zip(noise, parts, strict=True)
+    )
     strength, axes = np.linalg.eigh(scatter)
     inverse = (axes / np.sqrt(np.maximum(strength, np.finfo(float).tiny))) @ axes.T
-    return inverse @ (values[:, None] * directions.T), max(samples - np.count_nonzero(values), 1.0)
+    # the strength of slow noise is known as from half its effective samples: AR(1), delta method at 0 Hz
+    freedom = 0.5 * sum(process.independent_samples for process in noise) - np.count_nonzero(values)
+    return inverse @ (values[:, None] * directions.T), noise, max(freedom, 1.0)
+
+
+def _sum(matrices: Iterable[Array]) -> Array:
+    return np.sum(list(matrices), axis=0)
 
 
 def _flags(relative: float, slopes: Jacobian, i: int, bound: str) -> Flags:

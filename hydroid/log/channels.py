@@ -15,6 +15,7 @@ from hydroid.log.table import Cells, Table
 from hydroid.settings.log import LogSettings
 
 _LISTED = 40  # column names in a message
+_LACKING = 4  # of which the missing ones
 _PRESSURES = (-5e5, 2e8)  # [Pa]: a sensor may be off by its offset, and no hydraulic hose holds more
 
 
@@ -142,7 +143,9 @@ def missing_columns(table: Table, wanted: Sequence[Channel]) -> list[Finding]:
     lacking = [channel for channel in wanted if channel.name not in table.names]
     if lacking:
         free = sorted(set(table.names).difference(channel.name for channel in wanted))
-        names = ", ".join(f"{channel.name!r} ({channel}{_hint(channel.name, free)})" for channel in lacking)
+        first = lacking[:_LACKING]
+        names = ", ".join(f"{channel.name!r} ({channel}{_hint(channel.name, free)})" for channel in first)
+        names += f" and {len(lacking) - _LACKING} more" if len(lacking) > _LACKING else ""
         have = [name for name in table.names if name]
         more = f" and {len(have) - _LISTED} more" if len(have) > _LISTED else ""
         cure = (

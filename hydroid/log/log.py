@@ -1,11 +1,14 @@
 """The log as the rest of the program sees it: commands and angles at one period."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+LONGEST_REST = 2.0
+"""of a rest before the first command, what counts for the start pose [s]: a leaking valve lets an arm sink"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,30 @@ class Log:
         return ~np.isnan(self.angle[0])
 
     @property
+    def start(self) -> Floats:
+        """The start pose [rad], shape (J,): the mean of the angles while the arm still rests.
+
+        A simulation starts there, and an error of its start stays in the whole response. A command moves
+        nothing before the sample after it; of a log that begins with a command the first sample must do.
+        """
+        moving = np.any(self.command != 0, axis=1)
+        rest = int(np.argmax(moving)) if moving.any() else 0
+        resting = self.angle[: min(rest, round(LONGEST_REST / self.period)) + 1]
+        return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal angles to the last bit
+
+    @property
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
+
+    def first(self, seconds: float) -> "Log":
+        """Return the record from its start to `seconds` after its first command."""
+        begins = int(np.argmax(np.any(self.command != 0, axis=1)))
+        part = slice(begins + 1 + max(round(seconds / self.period), 1))
+        return replace(
+            self,
+            time=self.time[part],
+            command=self.command[part],
+            angle=self.angle[part],
+            pressure=None if self.pressure is None else self.pressure[part],
+        )

@@ -14,6 +14,7 @@ from hydroid.log.log import Floats, Log
 from hydroid.log.repair import fill, unwrap
 from hydroid.log.resample import is_on_grid, resample
 from hydroid.log.table import open_table, read_cells
+from hydroid.log.units import check_units
 from hydroid.settings.log import LogSettings
 
 
@@ -81,7 +82,7 @@ def check_log(
         if repair:
             record, repairs = fill(record, settings.repair_s)
             notes += repairs
-        findings += [*notes, *check_record(record, settings, outputs)]
+        findings += [*notes, *check_record(record, settings, outputs), *check_units(record)]
         if all(finding.level != "error" for finding in findings):
             log, more = _to_log(record, settings, len(ranges))
             findings += more

@@ -153,13 +153,14 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _numbers(cells: Sequence[str], separator: str) -> list[float]:
+    if separator != ",":
+        cells = [cell.replace(",", ".") for cell in cells]
     try:
         if any("_" in cell for cell in cells):
             raise ValueError
         return [*map(float, cells)]
     except ValueError:
-        decimal = "," if separator != "," else "."
-        return [_number(cell.replace(decimal, ".")) for cell in cells]
+        return [_number(cell) for cell in cells]
 
 
 def _number(cell: str) -> float:

@@ -1,7 +1,6 @@
 """What a fit's logs determine, for a reader: directions, noise, and their section of a report."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -10,13 +9,17 @@ from hydroid.identification.problem import Problem
 from hydroid.identification.uncertainty import KNOWN, Uncertainty
 from hydroid.report.channels import log_names
 from hydroid.report.html import Picture, Section
-from hydroid.report.table import Cell, Table, number
+from hydroid.report.table import Cell, Table
 
 FIGURES = {
-    "singular_values": "How strongly each direction is felt, in units of the noise: the inverse of its relative standard "
-    "deviation. Below the line nothing is determined to 30 %; a hollow mark at the foot: not felt at all.",
+    "singular_values": "How strongly each direction is felt, in units of the noise: the inverse of its "
+    "relative standard deviation. Below the line it is not determined to 30 %; a hollow mark at the foot: "
+    "not felt at all.",
     "directions": "The directions themselves, best determined first: relative changes that belong together.",
-    "correlation": "Correlation of the estimates: near ±1 only a combination of the two is known. Blank: not determined.",
+    "profiles": "Profile likelihood: the rise of the error, in units of the noise, where a parameter is held "
+    "and the others are fitted anew. Below the line is its interval; dashed: the linear approximation.",
+    "correlation": "Correlation of the estimates: near ±1 only a combination of the two is known. Blank: not "
+    "determined.",
 }
 _SHOWN = 0.1
 
@@ -56,8 +59,20 @@ def noise_table(problem: Problem, found: Uncertainty) -> Table:
                 noise.source,
             )
         )
-    header = ("log", "joint", "signal", "rms left over", "noise", "memory [s]", "independent samples", "taken from")
-    note = "memory: time after which the noise's autocorrelation is below 1/e; independent samples: what it leaves of the log."
+    header = (
+        "log",
+        "joint",
+        "signal",
+        "rms left over",
+        "noise",
+        "memory [s]",
+        "independent samples",
+        "taken from",
+    )
+    note = (
+        "memory: time after which the noise's autocorrelation is below 1/e; independent samples: "
+        "without memory as many would tell its level as well."
+    )
     return Table("Noise", header, tuple(rows), note)
 
 
@@ -69,6 +84,8 @@ def told_section(
         "What the data determine",
         text,
         tables=(direction_table(told), noise_table(problem, found)),
-        pictures=tuple(Picture(figures[name], caption) for name, caption in FIGURES.items() if name in figures),
+        pictures=tuple(
+            Picture(figures[name], caption) for name, caption in FIGURES.items() if name in figures
+        ),
         points=tuple(direction.words for direction in told.weak),
     )

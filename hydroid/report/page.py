@@ -6,8 +6,8 @@ from typing import Any
 from hydroid.identification.fit import Fit
 from hydroid.identification.problem import Problem
 from hydroid.report.channels import channels
-from hydroid.report.identifiability import told_section
 from hydroid.report.html import Picture, Section, report_html
+from hydroid.report.identifiability import told_section
 from hydroid.report.table import Table, number
 from hydroid.report.words import cautions, norm_label, summary, told
 
@@ -15,10 +15,11 @@ _ALGORITHMS = {
     "ga": "simple genetic algorithm",
     "nsga2": "NSGA-II, a multi-objective genetic algorithm",
     "cmaes": "CMA-ES, an evolution strategy",
+    "multistart": "bounded least squares from random starts",
 }
 _PARETO = {
-    "single": "The search minimises the error over the whole record and does not look for this set: these are "
-    "merely the sets of its last population that no other beats in every segment.",
+    "single": "The search minimises the error over the whole record and does not look for this set: these "
+    "are merely the sets of its last population that no other beats in every segment.",
     "several": "What the search was after: to fit one segment better than one of these does costs another.",
 }
 _CAPTIONS = {
@@ -100,7 +101,7 @@ def _facts(arm: str, identity: Mapping[str, Any], problem: Problem) -> tuple[tup
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
         ("other joints", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
-        ("search", _ALGORITHMS.get(settings.search.name, settings.search.name)),
+        ("search", _ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
         ("seed", str(settings.search.seed)),
     )
 

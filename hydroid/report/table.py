@@ -144,6 +144,11 @@ def exact(cell: Cell) -> str:
     return repr(float(cell)) if isinstance(cell, float) else str(cell)
 
 
+def known(value: float) -> float | None:
+    """A number, or nothing where it is NaN; one without limit stays."""
+    return None if math.isnan(value) else float(value)
+
+
 def number(value: float) -> str:
     """Four significant digits, no exponent between 0.0001 and ten million; a dash where it is not finite."""
     if not math.isfinite(value):

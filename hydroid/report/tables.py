@@ -11,7 +11,7 @@ from hydroid.identification.problem import Problem
 from hydroid.identification.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.parameters import Array, Parameter, ParameterSet, relative_error
 from hydroid.report.channels import channels
-from hydroid.report.table import Cell, Given, Table
+from hydroid.report.table import Cell, Given, Table, known
 from hydroid.report.words import (
     estimate_label,
     estimate_words,
@@ -52,13 +52,11 @@ def parameter_table(problem: Problem, fit: Fit, truth: Mapping[str, float] | Non
         if truth:
             true = truth.get(parameter.name)
             row += [Given(true) if true is not None else None, *(_relative(e.theta[i], true) for e in judged)]
-        rows.append((*row, _known(half[i]), _known(degrees(fit.effects[i])), said[i]))
+        rows.append((*row, known(half[i]), known(degrees(fit.effects[i])), said[i]))
     if truth:
         without = [n for n, flag in zip(problem.parameters.names, said, strict=True) if "no effect" in flag]
         rows += _sum_rows(problem.parameters, [e.theta for e in judged], truth, without, 5 + len(names))
-    note = (
-        f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(fit)}"
-    )
+    note = f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(fit)}"
     return Table("Parameters", tuple(header), tuple(rows), note)
 
 
@@ -169,11 +167,6 @@ def _named(parameter: Parameter) -> tuple[Cell, ...]:
     bounded = parameter.lower < parameter.upper
     limits = (Given(parameter.lower), Given(parameter.upper)) if bounded else (None, None)
     return (parameter.name, parameter.unit, *limits)
-
-
-def _known(value: float) -> float | None:
-    """A number, or nothing where there is none; what has no limit stays so."""
-    return None if np.isnan(value) else float(value)
 
 
 def _short(estimate: Estimate, fit: Fit) -> str:

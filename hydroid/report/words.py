@@ -1,14 +1,13 @@
 """What the numbers of a fit mean, in words and in a reader's units."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.identification.fit import Fit
-from hydroid.identification.problem import Problem
 from hydroid.identification.patterns import listed
+from hydroid.identification.problem import Problem
 from hydroid.identification.uncertainty import KNOWN, NOT_DETERMINED, WEAK, at_bounds
 from hydroid.parameters import Array, Parameter
 from hydroid.report.table import number, plain
@@ -70,10 +69,10 @@ def told(fit: Fit) -> str:
     """How much these logs tell, in a sentence or two."""
     names, rank = fit.identifiability.names, fit.identifiability.rank
     return (
-        f"These logs determine {rank} independent combination{'' if rank == 1 else 's'} of the {len(names)} free "
-        f"parameters to {100 * KNOWN:.0f} % or better. ±: 95 % interval for noise as these logs show it; it holds "
-        "as far as the model does. A parameter that is not determined has none: a small output error does not "
-        "prove it."
+        f"These logs determine {rank} independent combination{'' if rank == 1 else 's'} of the {len(names)} "
+        f"free parameters to {100 * KNOWN:.0f} % or better. ±: 95 % interval for noise as these logs show "
+        "it, as far as the model holds. A parameter that is not determined has none: a small output error "
+        "does not prove it."
     )
 
 
@@ -111,6 +110,11 @@ def _search_cautions(problem: Problem, fit: Fit) -> list[str]:
             f"{infeasible} of {int(fit.history[-1, 2])} simulated parameter sets diverged; "
             "they were ranked behind all others."
         )
+    said += [
+        f"The estimate {name} diverged when it was simulated, and was not used."
+        for name, estimate in fit.estimates.items()
+        if not math.isfinite(estimate.rms)
+    ]
     if fit.polish is not None:
         if not fit.polish.ending.converged:
             said.append(f"The polish ended early: {fit.polish.ending.value}.")

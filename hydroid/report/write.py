@@ -1,6 +1,6 @@
 """Results to files: the report of a fit, of several runs, of a validation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,7 +13,7 @@ from hydroid.identification.problem import Problem
 from hydroid.identification.search import HISTORY
 from hydroid.identification.validation import ErrorIndices
 from hydroid.log import Log
-from hydroid.parameters import Array
+from hydroid.parameters import Array, ParameterSet
 from hydroid.report.channels import Channel, channel, channels, file_name, log_names, short_name, unique
 from hydroid.report.identifiability import direction_table, noise_table
 from hydroid.report.table import Table
@@ -82,8 +82,8 @@ def write_report(
     }
     vector = {name: plots.svg(figure) for name, figure in drawn.items()}
     page = fit_page(folder.settings()[1].name, folder.identity(), problem, fit, tables, vector)
-    written = [_write_table(folder.path, name, table) for name, table in tables.items()]
-    written += [_write_figure(folder.path, name, figure, vector[name]) for name, figure in drawn.items()]
+    written = [write_table(folder.path, name, table) for name, table in tables.items()]
+    written += [write_figure(folder.path, name, figure, vector[name]) for name, figure in drawn.items()]
     files = {
         "tables/pareto.csv": pareto_table(problem, fit).csv(),
         "history.csv": _history(fit),
@@ -99,8 +99,6 @@ def write_runs(
     out: Path, results: Sequence[tuple[int, Problem, Fit]], truth: Mapping[str, float] | None = None
 ) -> Table:
     """Write the spread over several runs with their seeds; return the table of their final estimates."""
-    from hydroid.report import plots
-
     parameters = results[0][1].parameters
     said = [flags(fit) for _, _, fit in results]
     ignore = [
@@ -111,11 +109,32 @@ def write_runs(
     found = {"search": [SeedResult(seed, fit.searched.theta, fit.searched.rms) for seed, _, fit in results]}
     if any(fit.polish is not None for _, _, fit in results):
         found["polished"] = [SeedResult(seed, fit.best.theta, fit.best.rms) for seed, _, fit in results]
+    return write_spread(out, parameters, found, ignore, truth)
+
+
+def write_spread(
+    out: Path,
+    parameters: ParameterSet,
+    found: Mapping[str, Sequence[SeedResult]],
+    ignore: Collection[str],
+    truth: Mapping[str, float] | None = None,
+) -> Table:
+    """Write tables and a figure of the spread over runs; return the table of the last estimate.
+
+    Args:
+        out: folder to write.
+        parameters: of all runs.
+        found: one result a run, by the name of the estimate: `search`, and `polished` where there is one.
+        ignore: parameters without effect in any run.
+        truth: true values by name.
+    """
+    from hydroid.report import plots
+
     tables = {name: runs_table(parameters, runs, truth, ignore, name) for name, runs in found.items()}
     for name, table in tables.items():
-        _write_table(out, f"runs_{name}", table)
+        write_table(out, f"runs_{name}", table)
     figure = plots.runs(parameters, found, truth, ignore)
-    _write_figure(out, "runs", figure, plots.svg(figure))
+    write_figure(out, "runs", figure, plots.svg(figure))
     return list(tables.values())[-1]
 
 
@@ -141,9 +160,9 @@ def write_validation(out: Path, results: Sequence[Validated]) -> Table:
         figure = plots.validation(record, overlay)
         name = file_name(f"validation_{Path(record.log).stem}_joint_{record.joint}", taken)
         taken.add(name.lower())
-        _write_figure(out, name, figure, plots.svg(figure))
+        write_figure(out, name, figure, plots.svg(figure))
     table = validation_table(rows)
-    _write_table(out, "validation", table)
+    write_table(out, "validation", table)
     return table
 
 
@@ -163,14 +182,16 @@ def _responses(problem: Problem, fit: Fit) -> "dict[str, Figure]":
     }
 
 
-def _write_table(out: Path, name: str, table: Table) -> list[Path]:
+def write_table(out: Path, name: str, table: Table) -> list[Path]:
+    """Write a table as CSV, Markdown and LaTeX under `tables`; return the files."""
     faces = {"csv": table.csv(), "md": table.markdown(), "tex": table.latex()}
     for ending, content in faces.items():
         write_atomic(out / "tables" / f"{name}.{ending}", content)
     return [out / "tables" / f"{name}.{ending}" for ending in faces]
 
 
-def _write_figure(out: Path, name: str, figure: "Figure", vector: bytes) -> list[Path]:
+def write_figure(out: Path, name: str, figure: "Figure", vector: bytes) -> list[Path]:
+    """Write a figure, whose SVG is made already, as PNG and SVG under `figures`; return the files."""
     from hydroid.report import plots
 
     faces = {"png": plots.png(figure), "svg": vector}

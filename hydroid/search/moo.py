@@ -60,7 +60,9 @@ def pymoo(settings: PymooSettings, parameters: int, objectives: int) -> LibraryA
             cure="ask for more with objective.segments, or choose DE, PSO or cmaes",
         )
     count = 1 if single else objectives
-    return LibraryAlgorithm(settings, lambda rng: _Pymoo(kind, settings, parameters, count, rng), single=single)
+    return LibraryAlgorithm(
+        settings, lambda rng: _Pymoo(kind, settings, parameters, count, rng), single=single
+    )
 
 
 def available() -> dict[str, tuple[type[Any], bool]]:

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hydroid.settings.cluster import ClusterSettings
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
 from hydroid.settings.knowledge import KnownSettings
@@ -14,6 +15,7 @@ from hydroid.settings.objective import ObjectiveSettings
 from hydroid.settings.search import (
     CmaesSettings,
     GaSettings,
+    MultistartSettings,
     Nsga2Settings,
     PolishSettings,
     PymooSettings,
@@ -84,6 +86,7 @@ class SearchSettings(Settings):
     nsga2: Nsga2Settings = Nsga2Settings()
     cmaes: CmaesSettings = CmaesSettings()
     pymoo: PymooSettings = PymooSettings()
+    multistart: MultistartSettings = MultistartSettings()
 
     @property
     def name(self) -> str:
@@ -118,6 +121,8 @@ class FitSettings(Settings):
     """then polish all parameters that have bounds together, those held fixed included"""
     design: DesignSettings = DesignSettings()
     """of `hydroid design`; a fit does not use it"""
+    cluster: ClusterSettings = ClusterSettings()
+    """of `--dask slurm`; no result depends on it"""
 
     @model_validator(mode="before")
     @classmethod

@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from hydroid.errors import SettingsError
+from hydroid.settings.document import read_document, read_value
+from hydroid.settings.words import explain
 
 
 class Settings(BaseModel):
@@ -16,6 +17,7 @@ class Settings(BaseModel):
 
 
 S = TypeVar("S", bound=Settings)
+MAX_BYTES = 2**18
 
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
@@ -28,21 +30,17 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
         SettingsError: unreadable, not UTF-8, not YAML, not a mapping, or a key that stands there twice.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingsError(f"cannot be read ({_reason(error)})", where=str(path)) from None
-    try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        values = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        problem = getattr(error, "problem", None) or type(error).__name__
-        raise SettingsError(f"is not YAML ({problem})", where=where) from None
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        text = data.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise SettingsError(f"cannot be read ({reason})", where=str(path)) from None
+    if len(data) > MAX_BYTES:
+        raise SettingsError(f"is larger than {MAX_BYTES >> 10} KiB, too large for settings", where=str(path))
+    values, lines = read_document(text, str(path))
     if not isinstance(values, dict):
         raise SettingsError("must be a mapping of settings", where=str(path), cure="write `key: value` lines")
-    lines: dict[tuple[str, ...], int] = {}
-    _collect_lines(node, (), lines, str(path))
     return values, lines
 
 
@@ -72,21 +70,46 @@ def validate(
 ) -> S:
     """Check a mapping against `kind`; report the first fault with its place."""
     try:
-        return kind.model_validate(values)
+        taken = kind.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         loc = tuple(str(part) for part in first["loc"])
-        where = f"{source}{_line(loc, lines or {})}"
-        key = ".".join(loc)
-        # the fault may lie in the override, below it, or in what it is a part of
-        guilty = [
-            o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")
-        ]
-        if guilty:
-            where = f"--set {guilty[0]}"
         more = error.error_count() - 1
         cure = f"and {more} more fault{'s' if more > 1 else ''} in this file" if more else ""
-        raise SettingsError(_explain(key, first, kind), where=where, cure=cure) from None
+        what = explain(".".join(loc), first, kind)
+        raise SettingsError(what, where=_where(loc, source, lines, overridden), cure=cure) from None
+    if loc := _truth_for_number(values, taken):
+        what = f"{'.'.join(loc)}: true and false are no numbers"
+        raise SettingsError(what, where=_where(loc, source, lines, overridden))
+    return taken
+
+
+def _truth_for_number(given: Any, taken: Any) -> tuple[str, ...]:
+    """Path to where a true or false was taken for 1 or 0, which pydantic does without a word."""
+    if isinstance(given, bool):
+        return () if isinstance(taken, bool) else ("",)
+    if isinstance(given, list):
+        inner, parts = given, taken if isinstance(taken, list | tuple) else ()
+        pairs = [(str(i), *pair) for i, pair in enumerate(zip(inner, parts, strict=False))]
+    elif isinstance(given, dict):
+        parts = dict(taken) if isinstance(taken, dict | BaseModel) else {}
+        by_name = {str(key): part for key, part in parts.items()}
+        pairs = [(str(key), one, by_name[str(key)]) for key, one in given.items() if str(key) in by_name]
+    else:
+        return ()
+    for name, one, part in pairs:
+        if loc := _truth_for_number(one, part):
+            return (name, *(piece for piece in loc if piece))
+    return ()
+
+
+def _where(
+    loc: tuple[str, ...], source: str, lines: dict[tuple[str, ...], int] | None, overridden: set[str] | None
+) -> str:
+    key = ".".join(loc)
+    # the fault may lie in the override, below it, or in what it is a part of
+    guilty = [o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")]
+    return f"--set {guilty[0]}" if guilty else f"{source}{_line(loc, lines or {})}"
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -98,10 +121,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise SettingsError("needs key=value", where=f"--set {text}", cure="for example --set search.seed=3")
-    try:
-        return key.strip(), yaml.safe_load(value)
-    except yaml.YAMLError:
-        raise SettingsError(f"value {value!r} is not YAML", where=f"--set {text}") from None
+    return key.strip(), read_value(value, f"--set {text}")
 
 
 def _set(values: dict[str, Any], key: str, value: Any) -> None:
@@ -114,52 +134,9 @@ def _set(values: dict[str, Any], key: str, value: Any) -> None:
     values[last] = value
 
 
-def _explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
-    """One fault of pydantic's in the words of this program."""
-    if fault["type"] == "extra_forbidden":
-        allowed = _allowed(kind, fault["loc"][:-1])
-        return f"unknown setting {key!r}" + (f", allowed here: {allowed}" if allowed else "")
-    if fault["type"] == "missing":
-        return f"setting {key!r} is missing"
-    message = str(fault["msg"]).removeprefix("Value error, ")
-    shown = repr(fault["input"])
-    given = f" (given: {shown if len(shown) < 60 else shown[:57] + '...'})"
-    return f"{key or 'settings'}: {message[:1].lower()}{message[1:]}{given}"
-
-
-def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> str:
-    """Names of the settings at `loc`, where the path can be followed through nested classes."""
-    for part in loc:
-        field = kind.model_fields.get(str(part))
-        inner = field.annotation if field else None
-        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
-            return ""
-        kind = inner
-    return ", ".join(kind.model_fields)
-
-
-def _collect_lines(node: Any, path: tuple[str, ...], lines: dict[tuple[str, ...], int], source: str) -> None:
-    lines[path] = node.start_mark.line + 1
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            here = (*path, str(key.value))
-            if here in lines:
-                where = f"{source}, line {key.start_mark.line + 1}"
-                raise SettingsError(f"{'.'.join(here)} stands there twice", where=where)
-            _collect_lines(value, here, lines, source)
-            lines[here] = key.start_mark.line + 1
-    elif isinstance(node, yaml.SequenceNode):
-        for index, value in enumerate(node.value):
-            _collect_lines(value, (*path, str(index)), lines, source)
-
-
 def _line(loc: tuple[str, ...], lines: dict[tuple[str, ...], int]) -> str:
     """The line of the deepest part of `loc` that the file contains."""
     for end in range(len(loc), 0, -1):
         if loc[:end] in lines:
             return f", line {lines[loc[:end]]}"
     return ""
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or "it is not UTF-8 text"

@@ -20,9 +20,9 @@ Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
 class SegmentSettings(Settings):
     """How the record is cut into segments, one objective each: exactly one of the first three is given."""
 
-    equal: Annotated[int, Field(ge=1)] | None = None
+    equal: Annotated[int, Field(ge=1, le=10_000)] | None = None
     """Number of segments of equal length."""
-    turning_points: Annotated[int, Field(ge=1)] | None = None
+    turning_points: Annotated[int, Field(ge=1, le=10_000)] | None = None
     """Number of segments, cut at the most prominent peaks and troughs of the measured output."""
     times: tuple[Annotated[float, Field(gt=0)], ...] | None = None
     """Inner cuts [s from the start of the record], increasing."""
@@ -56,7 +56,7 @@ class ObjectiveSettings(Settings):
     pressure_weight: Annotated[float, Field(ge=0)] = 0.0
     """What a chamber pressure's error counts in stage 2 [deg/bar]; 0: pressures are not compared."""
     noise_deg: Positive | dict[Annotated[int, Field(ge=1)], Positive] | None = None
-    """Standard deviation of the measured angles' (white) noise, for all joints or joint by joint, where it is known;
-    by default it is estimated from what the fit leaves over, with its autocorrelation."""
+    """Standard deviation of the measured angles' (white) noise, for all joints or by joint, where known; by
+    default it is estimated from what the fit leaves over, with its autocorrelation."""
     noise_bar: Positive | None = None
     """The same of chamber pressures."""

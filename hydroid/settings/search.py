@@ -12,7 +12,7 @@ Rate = Annotated[float, Field(ge=0, le=1)]
 class PopulationSettings(Settings):
     """What all searches by populations share: their size and how long they run."""
 
-    population: Annotated[int, Field(ge=2)]
+    population: Annotated[int, Field(ge=2, le=100_000)]
     generations: Annotated[int, Field(ge=0)]
     """Populations bred after the first one. Ours: all defaults cost about 2,800 simulations."""
 
@@ -34,7 +34,7 @@ class GeneticSettings(PopulationSettings):
 class GaSettings(GeneticSettings):
     """The simple genetic algorithm, article 4.1."""
 
-    population: Annotated[int, Field(ge=2)] = 70
+    population: Annotated[int, Field(ge=2, le=100_000)] = 70
     generations: Annotated[int, Field(ge=0)] = 40
     crossover_rate: Rate = 0.8
     mutation_rate: Rate = 0.05
@@ -57,7 +57,7 @@ class Nsga2Settings(GeneticSettings):
     fitness to be proportional to, and the article names NSGA-II: parents come from its crowded tournament.
     """
 
-    population: Annotated[int, Field(ge=2)] = 20
+    population: Annotated[int, Field(ge=2, le=100_000)] = 20
     generations: Annotated[int, Field(ge=0)] = 140
     crossover_rate: Rate = 0.4
     mutation_rate: Rate = 0.2
@@ -66,7 +66,7 @@ class Nsga2Settings(GeneticSettings):
 class CmaesSettings(PopulationSettings):
     """CMA-ES (Hansen), of the library cma: one objective, the error over the whole record."""
 
-    population: Annotated[int, Field(ge=6)] = 20
+    population: Annotated[int, Field(ge=6, le=100_000)] = 20
     generations: Annotated[int, Field(ge=0)] = 140
     """The search ends before, where cma finds that it has converged."""
     sigma: Annotated[float, Field(gt=0, le=1)] = 0.3
@@ -79,8 +79,25 @@ class PymooSettings(PopulationSettings):
     algorithm: str = "NSGA3"
     """Its class there: NSGA3, MOEAD, RVEA, AGEMOEA, SMSEMOA, ... with the segments as objectives; DE, PSO,
     GA, ... with the error over the whole record."""
-    population: Annotated[int, Field(ge=4)] = 40
+    population: Annotated[int, Field(ge=4, le=100_000)] = 40
     generations: Annotated[int, Field(ge=0)] = 70
+
+
+class MultistartSettings(Settings):
+    """Bounded least squares from several random starts (ours; not in the article)."""
+
+    starts: Annotated[int, Field(ge=1, le=100_000)] = 10
+    horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0)
+    """Seconds of every log, from its first command on, that a start is fitted to before the whole logs."""
+    iterations: Annotated[int, Field(ge=1)] = 40
+    """Steps at most, of each of these fits."""
+    step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+    """As the polish's; coarser, since the polish follows from the best point found."""
+
+    @property
+    def generations(self) -> int:
+        """Starts after the first: what other searches call generations."""
+        return self.starts - 1
 
 
 class PolishSettings(Settings):

@@ -4,8 +4,7 @@ Every member starts at rest in the log's first pose, in static balance with grav
 slack there, and a constant torque tau0 = g(q0), computed anew for every member, holds it.
 """
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import mujoco
@@ -14,6 +13,7 @@ from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
+from hydroid.arm.quiet import quiet_mujoco
 from hydroid.hydraulics.parameters import ActuatorParameters
 from hydroid.simulation.prescribed import Prescribed
 
@@ -79,20 +79,6 @@ def in_chunks(simulate: Callable[[Members], Response], members: Members, size: i
     )
 
 
-@contextmanager
-def quiet_mujoco() -> Generator[None]:
-    """Keep MuJoCo from printing a warning for every diverged member, and from writing MUJOCO_LOG.TXT."""
-    before = mujoco.MjLogConfig.get()
-    silent = mujoco.MjLogConfig.get()
-    silent.logto_console = False
-    silent.logto_file = False
-    mujoco.MjLogConfig.set(silent)
-    try:
-        yield
-    finally:
-        mujoco.MjLogConfig.set(before)
-
-
 class Population:
     """Up to `size` members of one arm, stepped together on a thread pool.
 
@@ -103,9 +89,7 @@ class Population:
         prescribed: joints that follow a log; they keep no damper and spring of their own.
 
     Attributes, live arrays over the members:
-        position [rad], velocity [rad/s], applied torque [N·m], damping [N·m·s/rad], armature [kg·m²]:
-            shape (size, V).
-        mass_matrix: MuJoCo's sparse M of the last call, shape (size, nC).
+        position [rad], velocity [rad/s], applied torque [N·m], damping [N·m·s/rad]: shape (size, V).
     """
 
     def __init__(self, arm: LockedArm, size: int, threads: int, prescribed: Prescribed | None = None) -> None:
@@ -116,9 +100,10 @@ class Population:
         self._mass, self._inertia = expand("body_mass"), expand("body_inertia")
         self._centre, self._axes = expand("body_ipos"), expand("body_iquat")
         self._stiffness, self._friction = expand("jnt_stiffness"), expand("dof_frictionloss")
-        self.damping, self.armature = expand("dof_damping"), expand("dof_armature")
-        # bound before the first call: a derived field bound between calls reads zero
-        self._bias, self.mass_matrix = bind("qfrc_bias"), bind("M")
+        self.damping = expand("dof_damping")
+        self._bias = bind(
+            "qfrc_bias"
+        )  # before the first call: a derived field bound between calls reads zero
         self.position, self.velocity, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
 
     def start(self, parameters: ArmParameters, joints: NDArray[np.intp], pose: Array) -> Array:
@@ -154,12 +139,12 @@ class Population:
         self._batch.warning[:n], self._failed[:n] = 0, False
         return self._bias[:n].copy()
 
-    def step(self) -> None:
-        """Step every member once, as it stands; call it within `quiet_mujoco`."""
-        try:
-            self._batch.step()
-        except SimulationError as error:
-            self._failed[error.ids] = True
+    def copy(self, member: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Write a member into a copy of the arm's model and its data; M is that of its pose."""
+        self._batch.get_model(member, model)
+        self._batch.get_data(member, data)
+        data.warning.number[:] = 0
+        mujoco.mj_fwdPosition(model, data)
 
     @property
     def healthy(self) -> NDArray[np.bool_]:

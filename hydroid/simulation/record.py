@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Record:
-    """A log made ready for simulation: its commands drive, its first angles are the start pose.
+    """A log made ready for simulation: its commands drive, from the pose in which it rests before them.
 
     Joints that the log drives or that are compared are *active*; what the others do is a setting.
 
@@ -43,8 +43,8 @@ class Record:
         self.active = active
         self.joints: NDArray[np.intp] = np.flatnonzero(active | (settings.other_joints != "locked"))
         self.outputs = np.searchsorted(self.joints, outputs)
-        self.pose = log.angle[0, self.joints]
-        self.arm: LockedArm = lock(spec, arm, [arm.joint_names[j] for j in self.joints], log.angle[0])
+        self.pose = log.start[self.joints]
+        self.arm: LockedArm = lock(spec, arm, [arm.joint_names[j] for j in self.joints], log.start)
         self.arm.model.opt.timestep = log.period / settings.steps_per_sample
         self.arm.model.qpos_spring[:] = self.pose  # slack at the start
         self.command = np.repeat(log.command[:-1, self.joints], settings.steps_per_sample, axis=0)

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from hydroid.identification.identifiability import Identifiability
+from hydroid.identification.intervals import THRESHOLD, Profile
 from hydroid.identification.uncertainty import KNOWN, Uncertainty
 from hydroid.parameters import Array
-from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled
+from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled, tick
 from hydroid.report.table import plain
 
 _CELL = 0.36  # [in]
@@ -43,14 +45,24 @@ def singular_values(found: Identifiability) -> Figure:
         color = SEARCH if strong else POLISHED
         axes.plot([i, i], [foot / 3, max(value, foot)], color=color, linewidth=1.0, alpha=0.5)
         mark = "o" if strong else "D"
-        axes.plot(i, max(value, foot), mark, color=color, markerfacecolor=color if felt else "white", markersize=6)
+        axes.plot(
+            i, max(value, foot), mark, color=color, markerfacecolor=color if felt else "white", markersize=6
+        )
     axes.axhline(1 / KNOWN, color=GREY, linestyle="--", linewidth=1.0)
     axes.text(
-        len(values) + 0.45, 1.2 / KNOWN, f"±{100 * KNOWN:.0f} %", color=GREY, fontsize=8, ha="right", va="bottom"
+        len(values) + 0.45,
+        1.2 / KNOWN,
+        f"±{100 * KNOWN:.0f} %",
+        color=GREY,
+        fontsize=8,
+        ha="right",
+        va="bottom",
     )
     axes.set_xlim(0.5, len(values) + 0.5)
     axes.set_xticks(range(1, len(values) + 1))
     axes.grid(axis="x", visible=False)
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(tick))
     axes.set_title("What the data feel")
     axes.set_xlabel("direction")
     axes.set_ylabel("singular value [noise]")
@@ -82,6 +94,25 @@ def correlation(uncertainty: Uncertainty, found: Identifiability) -> Figure:
     return drawing
 
 
+@styled
+def profiles(found: Sequence[Profile], told_: Uncertainty, names: Sequence[str]) -> Figure:
+    """Deviance of each profiled parameter against its values, the 95 % threshold and the linear parabola."""
+    drawing = figure(2.6 * len(found) + 0.4)
+    for axes, one in zip(np.atleast_1d(drawing.subplots(len(found), 1)), found, strict=True):
+        i = names.index(one.name)
+        centre, deviation = told_.theta[i], told_.standard_deviation[i]
+        axes.plot(one.values, one.deviance, "o-", color=SEARCH, markersize=4)
+        if np.isfinite(deviation) and deviation > 0:
+            fine = np.linspace(one.values[0], one.values[-1], 101)
+            axes.plot(fine, ((fine - centre) / deviation) ** 2, "--", color=GREY, linewidth=1.0)
+        axes.axhline(THRESHOLD, color=POLISHED, linewidth=1.0)
+        axes.set_ylim(-0.2, max(2.5 * THRESHOLD, 0.5))
+        axes.set_xlabel(one.name)
+        axes.set_ylabel("deviance")
+    drawing.suptitle("Profile likelihood")
+    return drawing
+
+
 def _map(drawing: Figure, axes: Axes, values: Array, rows: Sequence[str], columns: Sequence[str]) -> None:
     """Numbers between -1 and 1 as colours, with the numbers where there is room."""
     image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
@@ -94,6 +125,6 @@ def _map(drawing: Figure, axes: Axes, values: Array, rows: Sequence[str], column
         for (i, j), value in np.ndenumerate(values):
             if np.isfinite(value):
                 color = "white" if abs(value) > 0.6 else MEASURED
-                text = f"{value:.2f}".replace("-", "−")
+                text = f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
                 axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
     drawing.colorbar(image, ax=axes, shrink=0.8, pad=0.02)

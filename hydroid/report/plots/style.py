@@ -134,13 +134,14 @@ def value_axis(axis: Axis, values: Array) -> None:
         few = known.max() < 1000 * known.min()
         axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
         axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(FuncFormatter(_tick))
+        axis.set_major_formatter(FuncFormatter(tick))
     elif known.size:
         top = 1.05 * float(known.max()) if known.max() > 0 else 1.0
         (axis.axes.set_ylim if vertical else axis.axes.set_xlim)(min(0.0, 1.05 * float(known.min())), top)
 
 
-def _tick(value: float, _: int | None) -> str:
+def tick(value: float, _: int | None) -> str:
+    """Write a number at an axis."""
     return plain(value)
 
 

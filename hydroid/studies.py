@@ -1,0 +1,191 @@
+"""Studies of a model at an estimate, as plain functions: sensitivity, error surfaces, the next experiment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hydroid.errors import RunError, SettingsError
+from hydroid.identification.design import Tell, design
+from hydroid.identification.folder import RunFolder
+from hydroid.identification.identifiability import identifiability
+from hydroid.identification.intervals import Profile, bootstrap, profile
+from hydroid.identification.problem import Problem
+from hydroid.identification.stage import Stage
+from hydroid.identification.surface import surface
+from hydroid.identification.sweep import sweep
+from hydroid.identification.uncertainty import uncertainty
+from hydroid.jobs import Warn, load_settings, read_logs, read_parameters
+from hydroid.log import write_log
+from hydroid.parameters import Array
+from hydroid.report.studies import surface_table, write_design, write_sensitivity, write_surface
+from hydroid.report.table import Table
+from hydroid.report.told import Told, write_told
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A model at an estimate: theta, shape (P,), and where it came from."""
+
+    settings: FitSettings
+    arm: Arm
+    theta: Array
+    source: str
+
+
+def load_subject(
+    config: str | None, fit: Path | None, params: Path | None, overrides: dict[str, Any]
+) -> Subject:
+    """Read the model and the estimate that a study is about.
+
+    Args:
+        config: settings; left out, those of the fit, those beside the parameters, or fit-mech.
+        fit: a run folder.
+        params: a YAML file of values by name, or an estimate.yaml; instead of `fit`.
+        overrides: settings to replace, by key.
+
+    Raises:
+        SettingsError: neither or both of `fit` and `params`, or values that do not fit the settings.
+        RunError: a run without an estimate.
+    """
+    if (fit is None) == (params is None):
+        what = "needs an estimate" if fit is None else "has two estimates"
+        raise SettingsError(what, cure="give either --fit DIR or --params P.yaml")
+    if fit is not None:
+        source, values = str(fit / "estimate.yaml"), RunFolder(fit).estimate()
+        settings, arm = load_settings(config, overrides) if config else RunFolder(fit).settings(overrides)
+    else:
+        assert params is not None
+        beside = params.parent / "config.yaml"
+        chosen = config or (str(beside) if beside.is_file() else "fit-mech")
+        settings, arm = load_settings(chosen, overrides)
+        source, values = str(params), read_parameters(params)
+    return Subject(settings, arm, Stage(arm, settings).parameters.vector(values, source), source)
+
+
+def study_sensitivity(subject: Subject, logs: Sequence[Path], out: Path, warn: Warn, tell: Tell) -> Table:
+    """Write how every output depends on every free parameter against time (article, figure 10).
+
+    Raises:
+        HydroidError: what the user can mend.
+    """
+    problem = _problem(subject, logs, warn)
+    return write_sensitivity(out, problem, subject.theta, sweep(problem, subject.theta, tell))
+
+
+def study_surface(
+    subject: Subject,
+    logs: Sequence[Path],
+    out: Path,
+    over: Sequence[str],
+    points: int,
+    around: float | None,
+    warn: Warn,
+    tell: Tell,
+) -> Table:
+    """Write the error over pairs of parameters (article, figure 11).
+
+    Args:
+        subject: the model and the estimate.
+        logs: the logs that it is compared with.
+        out: folder to write.
+        over: pairs of parameters, each "K,D".
+        points: of the grid, each way.
+        around: relative reach of the grid around the estimate; None: the parameters' bounds.
+        warn: takes what is odd about the logs.
+        tell: is told how far the study is.
+
+    Raises:
+        HydroidError: what the user can mend.
+    """
+    pairs = [tuple(name.strip() for name in text.split(",")) for text in over]
+    wrong = next((text for text, pair in zip(over, pairs, strict=True) if len(pair) != 2), None)
+    if wrong is not None:
+        raise SettingsError("names no pair of parameters", where=f"--over {wrong}", cure="write --over K,D")
+    problem = _problem(subject, logs, warn)
+    how = subject.settings.objective
+    found = [surface(problem, subject.theta, (a, b), points, around, tell) for a, b in pairs]
+    return surface_table(out, [write_surface(out, one, how) for one in found], how)
+
+
+def study_design(
+    subject: Subject, logs: Sequence[Path], out: Path, seed: int, warn: Warn, tell: Tell
+) -> Table:
+    """Design the next experiment; write its commands, the predicted motion and the predicted precision.
+
+    `commands.csv` holds the commands with every angle in the start pose, in the columns of the settings' log;
+    `predicted.csv` the same with the simulated motion. It is no measurement.
+
+    Args:
+        subject: the model and the present estimate.
+        logs: records whose information is there already; may be empty.
+        out: folder to write.
+        seed: of the search.
+        warn: takes what is odd about the logs.
+        tell: is told how far the search is.
+
+    Raises:
+        HydroidError: what the user can mend.
+    """
+    settings, arm = subject.settings, subject.arm
+    found = design(arm, settings, subject.theta, read_logs(logs, settings, arm, warn), seed, tell)
+    write_log(out / "commands.csv", found.log, settings.log)
+    write_log(out / "predicted.csv", found.predicted, settings.log)
+    values = Stage(arm, settings).parameters.mapping(subject.theta)
+    return write_design(out, arm, settings.design, found, values)
+
+
+def study_identifiability(
+    subject: Subject,
+    logs: Sequence[Path],
+    out: Path,
+    profiled: Sequence[str],
+    refits: int,
+    seed: int,
+    warn: Warn,
+    tell: Tell,
+) -> Told:
+    """Write what logs determine at a parameter set, with profiles and a bootstrap where they are asked for.
+
+    Args:
+        subject: the model and the parameter set.
+        logs: the logs.
+        out: folder to write.
+        profiled: names of parameters whose profile likelihood is wanted.
+        refits: of the bootstrap; 0: none.
+        seed: of the bootstrap.
+        warn: takes what is odd about the logs.
+        tell: is told how far the study is.
+
+    Raises:
+        HydroidError: what the user can mend.
+    """
+    problem = _problem(subject, logs, warn)
+    if not np.isfinite(problem.residuals(subject.theta[None])).all():
+        raise RunError("the simulation diverged with these parameters", where=subject.source)
+    found = uncertainty(problem, subject.theta)
+    profiles: list[Profile] = []
+    for done, name in enumerate(profiled):
+        tell("profiles", done, len(profiled))
+        profiles.append(profile(problem, found, name))
+    drawn = bootstrap(problem, found, refits, seed, tell) if refits else None
+    told = Told(problem, subject.source, found, identifiability(problem, found), tuple(profiles), drawn)
+    write_told(out, told)
+    return told
+
+
+def middle_subject(config: str, overrides: dict[str, Any]) -> Subject:
+    """The model of some settings, every free parameter in the middle of its bounds."""
+    settings, arm = load_settings(config, overrides)
+    parameters = Stage(arm, settings).parameters
+    theta = parameters.from_unit(np.full((1, int(parameters.free.sum())), 0.5))[0]
+    return Subject(settings, arm, theta, "the middle of the bounds")
+
+
+def _problem(subject: Subject, logs: Sequence[Path], warn: Warn) -> Problem:
+    settings, arm = subject.settings, subject.arm
+    return Problem(arm, settings, read_logs(logs, settings, arm, warn))

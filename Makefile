@@ -50,7 +50,7 @@ coverage: setup  ## whether the intervals hold the truth as often as they say (d
 fuzz: setup  ## 12,000 damaged files of every kind; a quarter of an hour
 	$(BIN)/python benchmarks/fuzz.py
 
-kill-resume: setup  ## 100 runs killed at random moments, resumed, and compared bit for bit; 10 minutes
+kill-resume: setup  ## 100 runs killed at random moments, resumed, and compared bit for bit; 20 minutes at most
 	$(BIN)/python benchmarks/kill_resume.py
 
 wheel: setup  ## the wheel in an empty environment, run from an empty folder

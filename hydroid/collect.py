@@ -2,6 +2,7 @@
 
 import glob
 import math
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,8 @@ def collect(names: Sequence[str], out: Path, tell: Callable[[str], None]) -> Col
 
 def _folders(names: Sequence[str]) -> list[Path]:
     """The folders that names and patterns stand for, each once; a name that stands for nothing stays."""
-    paths = [Path(path) for name in names for path in glob.glob(name) or [name]]
+    found = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
+    paths = [Path(path) for group in found for path in group]
     return sorted({path.resolve(): path for path in reversed(paths)}.values())
 
 
@@ -92,7 +94,7 @@ def _read(path: Path) -> _Run:
         what = f"is not finished ({identity.get('status')})"
         raise RunError(what, where=str(path), cure="finish it with --resume")
     for name in ("config.yaml", "arm.yaml"):
-        if not (path / name).is_file() or file_hash(path / name) != identity["files"].get(name):
+        if not (path / name).is_file() or file_hash(path / name) != identity.get("files", {}).get(name):
             raise RunError("is gone, or has changed since the run began", where=str(path / name))
     settings, arm = folder.settings()
     parameters = Stage(arm, settings).parameters
@@ -107,7 +109,7 @@ def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
         searched = next(iter(estimates))
         first, last = (_estimate(estimates[name], seed, parameters, str(file)) for name in (searched, final))
         return RunResult(path, first, last, final != searched, frozenset(content["without_effect"]))
-    except (AttributeError, KeyError, StopIteration, TypeError, ValueError):
+    except (AttributeError, LookupError, OverflowError, StopIteration, TypeError, ValueError):
         raise RunError("is not an estimate that a run has written", where=str(file)) from None
 
 
@@ -144,9 +146,9 @@ def _difference(first: _Run, run: _Run) -> str:
 
 def _logs(run: _Run) -> list[tuple[str, str]]:
     """Names and hashes: the same log may lie elsewhere."""
-    return [(Path(path).name, known) for path, known in run.identity["logs"].items()]
+    return [(Path(path).name, known) for path, known in run.identity.get("logs", {}).items()]
 
 
 def _model(run: _Run) -> dict[str, str]:
     """Hashes of the arm, its model and its meshes, by file."""
-    return {name: known for name, known in run.identity["files"].items() if name != "config.yaml"}
+    return {name: known for name, known in run.identity.get("files", {}).items() if name != "config.yaml"}

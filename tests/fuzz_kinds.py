@@ -129,10 +129,7 @@ def read_a_log(room: Path, data: bytes, deep: bool) -> None:
             for finding in findings:
                 silent(finding)
             expect(log is None or np.isfinite(log.angle).all(), "a repaired log is not finite")
-        try:
-            read_commands(path, settings, arm, "home", silent)
-        finally:
-            read_logs([path], settings, arm, silent)
+        read_commands(path, settings, arm, "home", silent)
     read_logs([path], settings, arm, silent)
 
 

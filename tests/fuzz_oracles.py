@@ -129,7 +129,9 @@ def same(text: Any, value: Any) -> bool:
         return False
     if isinstance(value, bool):
         return text.lower() in (
-            ("true", "yes", "on", "y", "t", "1") if value else ("false", "no", "off", "n", "f", "0")
+            ("true", "yes", "on", "y", "t", "1", "+1")
+            if value
+            else ("false", "no", "off", "n", "f", "0", "-0", "+0")
         )
     if value is None:
         return text in ("", "~", "null", "Null", "NULL")

@@ -78,13 +78,12 @@ class Actuator:
         joints = self.shape[1]
         driven = linkages.kind != NONE
         order = np.argsort(driven, stable=True)
-        if entries is None:
-            entries = np.arange(joints**2).reshape(joints, joints)
+        places = np.arange(joints**2).reshape(joints, joints) if entries is None else entries
         self.plugin = kernel.Plugin(
             coefficients=coefficients(parameters, linkages, settings),
             damping=np.array(np.broadcast_to(damping, self.shape), float, order="C"),
             order=order,
-            entries=entries[np.ix_(order, order)],
+            entries=places[np.ix_(order, order)],
             idle=int(np.sum(~driven)),
             period=period,
             substeps=settings.substeps,

@@ -33,7 +33,6 @@ from numba import njit
 
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
-from hydroid.hydraulics.parameters import NONE
 from hydroid.hydraulics.records import WORK
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
@@ -47,9 +46,9 @@ SOURCE = int.from_bytes(
 
 @compilable
 def eliminate(matrix: Any, start: int, stop: int) -> None:
-    """Eliminate unknowns `start` to `stop` of a symmetric positive matrix, (J, J), in place.
+    """Factorise rows `start` to `stop` of a symmetric positive matrix, (J, J), in place as L D Lᵀ.
 
-    Only diagonal and upper half are read. An eliminated diagonal element becomes its pivot's inverse.
+    Only diagonal and upper half are used: they come to hold D⁻¹ and Lᵀ, and from `stop` on what is left.
     """
     size = matrix.shape[0]
     for k in range(start, stop):
@@ -58,19 +57,20 @@ def eliminate(matrix: Any, start: int, stop: int) -> None:
             factor = matrix[k, i] * inverse
             for j in range(i, size):
                 matrix[i, j] -= factor * matrix[k, j]
+            matrix[k, i] = factor
         matrix[k, k] = inverse
 
 
 @compilable
 def substitute(matrix: Any, vector: Any) -> None:
-    """Replace `vector`, (J,), by the solution; all unknowns of the matrix are eliminated."""
+    """Replace `vector`, (J,), by the solution of a system that is factorised throughout."""
     size = matrix.shape[0]
     for k in range(size):
-        scaled = vector[k] * matrix[k, k]
         for i in range(k + 1, size):
-            vector[i] -= matrix[k, i] * scaled
-    for k in range(size - 1, -1, -1):
+            vector[i] -= matrix[k, i] * vector[k]
+    for k in range(size):
         vector[k] *= matrix[k, k]
+    for k in range(size - 1, 0, -1):
         for i in range(k):
             vector[i] -= matrix[i, k] * vector[k]
 

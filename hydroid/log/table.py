@@ -9,6 +9,7 @@ import csv
 import re
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -100,9 +101,11 @@ def read_cells(table: Table, columns: Sequence[int]) -> Cells:
         line = table.lines[number]
         if not _is_content(line, separator):
             continue
+        if separator != ",":
+            line = line.replace(",", ".")  # decimal commas
         cells = _split(line, separator)
         torn = len(cells) < width or (len(cells) > width and any(map(str.strip, cells[width:])))
-        values.extend(hole if torn else _numbers([cells[column] for column in columns], separator))
+        values.extend(hole if torn else _numbers([cells[column] for column in columns], "_" in line))
         lines.append(number + 1)
         ragged.append(torn)
     shape = (len(lines), len(columns))
@@ -152,15 +155,12 @@ def _split(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
-def _numbers(cells: Sequence[str], separator: str) -> list[float]:
-    if separator != ",":
-        cells = [cell.replace(",", ".") for cell in cells]
-    try:
-        if any("_" in cell for cell in cells):
-            raise ValueError
-        return [*map(float, cells)]
-    except ValueError:
-        return [_number(cell) for cell in cells]
+def _numbers(cells: Sequence[str], grouped: bool) -> list[float]:
+    """All at once, or one by one where any may be none."""
+    if not grouped:
+        with suppress(ValueError):
+            return [*map(float, cells)]
+    return [_number(cell) for cell in cells]
 
 
 def _number(cell: str) -> float:

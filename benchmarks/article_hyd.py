@@ -15,10 +15,10 @@ from article_mech import Silent
 from pseudo_random import pseudo_random_log
 
 from hydroid.identification.fit import fit
-from hydroid.identification.problem import Problem
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.log import Log
 from hydroid.parameters import relative_error
+from hydroid.problem.problem import Problem
 
 TRUTH = {  # table 7
     "A_A": 1000.0,

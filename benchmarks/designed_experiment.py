@@ -21,14 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.identification.design import design, start_poses
-from hydroid.identification.experiment import Draw, pose_limits
-from hydroid.identification.information import statement_information
+from hydroid.design.design import design, start_poses
+from hydroid.design.experiment import Draw, pose_limits
+from hydroid.design.information import statement_information
+from hydroid.design.trial import Bench, violation
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Problem
-from hydroid.identification.trial import Bench, violation
 from hydroid.jobs import load_settings, read_parameters, simulate_log
 from hydroid.log import Log
+from hydroid.problem.problem import Problem
 from hydroid.settings.search import PolishSettings
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"

@@ -17,13 +17,13 @@ from dataclasses import replace
 import numpy as np
 from pseudo_random import pseudo_random_log
 
-from hydroid.identification.jacobian import jacobian
-from hydroid.identification.noise import Noise
+from hydroid.identifiability.jacobian import jacobian
+from hydroid.identifiability.noise import Noise
+from hydroid.identifiability.uncertainty import uncertainty
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import uncertainty
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.log import Log
+from hydroid.problem.problem import Problem
 
 LEVEL = np.deg2rad(0.1)
 MEMORY = 0.15  # [s]

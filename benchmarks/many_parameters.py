@@ -23,12 +23,12 @@ from pseudo_random import pseudo_random_log
 from scipy.stats import norm
 from sysid_peer import Peer
 
+from hydroid.identifiability.uncertainty import KNOWN
 from hydroid.identification.fit import Fit, fit
 from hydroid.identification.multistart import random_start
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import KNOWN
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.log import Log
+from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 

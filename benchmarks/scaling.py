@@ -25,9 +25,9 @@ from pseudo_random import pseudo_random_log
 
 from hydroid.execution import Executor, Work, open_executor
 from hydroid.execution.local import LocalPool
-from hydroid.identification.problem import Problem
-from hydroid.identification.spread import SpreadProblem
 from hydroid.jobs import load_settings
+from hydroid.problem.problem import Problem
+from hydroid.problem.spread import SpreadProblem
 from hydroid.settings.cluster import ClusterSettings
 
 POPULATIONS, WORKERS = (70, 20), (1, 2, 4)

@@ -10,8 +10,8 @@ import numpy as np
 from mujoco import sysid
 
 from hydroid.arm.model import load_model
-from hydroid.identification.problem import Problem
 from hydroid.log import Log
+from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 
 CODES = {"K": "gain", "D": "damping", "S": "stiffness", "M": "mass"}

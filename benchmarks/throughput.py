@@ -18,9 +18,9 @@ from pseudo_random import pseudo_random_log
 
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.identification.problem import Memo, Problem
 from hydroid.identification.search import Search
 from hydroid.jobs import load_settings, read_parameters, simulate_log
+from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"

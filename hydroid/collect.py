@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from hydroid.errors import HydroidError, RunError
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.identity import file_hash, other_settings
-from hydroid.identification.stage import Stage
 from hydroid.parameters import ParameterSet
+from hydroid.problem.stage import Stage
 from hydroid.report.collected import RunResult, write_collected
 from hydroid.report.table import Table
 from hydroid.report.tables import SeedResult
+from hydroid.run.folder import RunFolder
+from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import read_yaml
 

@@ -19,16 +19,16 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.execution import Executor
 from hydroid.files import write_atomic
 from hydroid.identification.fit import Fit, Watcher, fit
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.problem import Problem, make_simulation
-from hydroid.identification.run_log import log_end, log_start
 from hydroid.identification.search import check_search
-from hydroid.identification.spread import SpreadProblem
-from hydroid.identification.stage import Stage
 from hydroid.identification.validation import ErrorIndices, error_indices
 from hydroid.log import Finding, Log, check_log, read_log, write_log
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem, make_simulation
+from hydroid.problem.spread import SpreadProblem
+from hydroid.problem.stage import Stage
 from hydroid.report.write import write_report
+from hydroid.run.folder import RunFolder
+from hydroid.run.run_log import log_end, log_start
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 from hydroid.settings.load import load, read_yaml

@@ -7,22 +7,22 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.design.design import Tell, design
 from hydroid.errors import RunError, SettingsError
-from hydroid.identification.design import Tell, design
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.identifiability import identifiability
-from hydroid.identification.intervals import Profile, bootstrap, profile
-from hydroid.identification.problem import Problem
-from hydroid.identification.stage import Stage
-from hydroid.identification.surface import surface
-from hydroid.identification.sweep import sweep
-from hydroid.identification.uncertainty import uncertainty
+from hydroid.identifiability.identifiability import identifiability
+from hydroid.identifiability.intervals import Profile, bootstrap, profile
+from hydroid.identifiability.surface import surface
+from hydroid.identifiability.sweep import sweep
+from hydroid.identifiability.uncertainty import uncertainty
 from hydroid.jobs import Warn, load_settings, read_logs, read_parameters
 from hydroid.log import write_log
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
+from hydroid.problem.stage import Stage
 from hydroid.report.studies import surface_table, write_design, write_sensitivity, write_surface
 from hydroid.report.table import Table
 from hydroid.report.told import Told, write_told
+from hydroid.run.folder import RunFolder
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 

@@ -27,10 +27,7 @@ from hydroid.arm.model import load_model, write_model
 from hydroid.assets import assets, find_config
 from hydroid.cli.options import overrides
 from hydroid.cli.running import _continued
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.problem import Memo, Problem
 from hydroid.identification.search import Search, make_algorithm
-from hydroid.identification.stage import Stage
 from hydroid.jobs import (
     check_logs,
     load_settings,
@@ -39,8 +36,11 @@ from hydroid.jobs import (
     read_logs,
     read_parameters,
 )
+from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.stage import Stage
 from hydroid.report.html import Section, report_html
 from hydroid.report.table import Table
+from hydroid.run.folder import RunFolder
 from hydroid.search.algorithm import Population
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import FitSettings

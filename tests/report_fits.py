@@ -5,19 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.identification.channels import make_channels
+from hydroid.identifiability.identifiability import identifiability
+from hydroid.identifiability.jacobian import Jacobian, relative_scale
+from hydroid.identifiability.noise import channel_noise
+from hydroid.identifiability.uncertainty import Uncertainty, judge
 from hydroid.identification.fit import Estimate, Fit
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.identifiability import identifiability
-from hydroid.identification.jacobian import Jacobian, relative_scale
-from hydroid.identification.knowledge import Knowledge
-from hydroid.identification.noise import channel_noise
-from hydroid.identification.problem import Evaluation, Problem
-from hydroid.identification.uncertainty import Uncertainty, judge
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
 from hydroid.objective.segments import segment_objectives
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.problem.channels import make_channels
+from hydroid.problem.knowledge import Knowledge
+from hydroid.problem.problem import Evaluation, Problem
+from hydroid.run.folder import RunFolder
 from hydroid.search.least_squares import Ending, Polish
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import FitSettings, ParameterSettings

@@ -8,8 +8,8 @@ from conftest import step_log
 from execution_work import die
 
 from hydroid.execution import Executor, Work
-from hydroid.identification.problem import Problem
 from hydroid.jobs import load_settings
+from hydroid.problem.problem import Problem
 
 POISON = 1e-3
 """of the first parameter"""

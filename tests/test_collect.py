@@ -175,7 +175,7 @@ def test_a_seed_counts_once(runs):
 
 
 def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, fitted, tmp_path: Path):
-    from hydroid.identification.folder import RunFolder
+    from hydroid.run.folder import RunFolder
 
     def begun(name: str, **changes: object) -> None:
         """The run of seed 3 with the same estimate under other settings."""

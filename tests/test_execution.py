@@ -15,8 +15,8 @@ from spread_problem import POISON, Poisoned, arguments, assert_same, some_sets
 from hydroid.errors import ModelError, SettingsError
 from hydroid.execution import TRIES, Executor, Work, open_executor
 from hydroid.execution.local import LocalPool
-from hydroid.identification.problem import Memo, Problem
-from hydroid.identification.spread import SpreadProblem
+from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.spread import SpreadProblem
 from hydroid.settings.cluster import ClusterSettings
 
 ROOT = Path(__file__).parents[1]

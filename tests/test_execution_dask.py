@@ -16,8 +16,8 @@ from spread_problem import arguments, assert_same, some_sets
 
 from hydroid.errors import ModelError, RunError, SettingsError
 from hydroid.execution import Work, open_executor
-from hydroid.identification.problem import Problem
-from hydroid.identification.spread import SpreadProblem
+from hydroid.problem.problem import Problem
+from hydroid.problem.spread import SpreadProblem
 from hydroid.settings.cluster import ClusterSettings
 
 pytest.importorskip("distributed")

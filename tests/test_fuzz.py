@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 from hydroid.arm.model import load_model
 from hydroid.assets import assets
 from hydroid.errors import HydroidError, SettingsError
-from hydroid.identification.folder import RunFolder
+from hydroid.run.folder import RunFolder
 from hydroid.settings.document import read_document
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import validate

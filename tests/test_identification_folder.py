@@ -17,14 +17,14 @@ from conftest import step_log
 from hydroid import jobs
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
-from hydroid.identification import lock
-from hydroid.identification.checkpoint import DAMAGED, PREVIOUS
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.lock import locked
-from hydroid.identification.problem import Memo, Problem
 from hydroid.identification.search import SearchState
 from hydroid.jobs import fit_logs, load_settings, simulate_log
 from hydroid.log import write_log
+from hydroid.problem.problem import Memo, Problem
+from hydroid.run import lock
+from hydroid.run.checkpoint import DAMAGED, PREVIOUS
+from hydroid.run.folder import RunFolder
+from hydroid.run.lock import locked
 from hydroid.search.algorithm import Population
 
 SMALL = {
@@ -278,7 +278,7 @@ def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
 def test_a_killed_process_leaves_no_lock(tmp_path):
     code = f"""
 import pathlib, time
-from hydroid.identification.lock import locked
+from hydroid.run.lock import locked
 with locked(pathlib.Path({str(tmp_path)!r})):
     print("held", flush=True)
     time.sleep(60)

@@ -12,8 +12,8 @@ from hydroid.identification import journal as room
 from hydroid.identification.journal import Journal
 from hydroid.identification.multistart import Multistart
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Memo, Problem
 from hydroid.jobs import load_settings, simulate_log
+from hydroid.problem.problem import Memo, Problem
 from hydroid.search.least_squares import Ending, Polish
 from hydroid.settings.search import PolishSettings
 

@@ -7,11 +7,11 @@ import pytest
 from conftest import step_log
 
 from hydroid.errors import SettingsError
-from hydroid.identification.knowledge import REACH, Knowledge
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Problem
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.problem.knowledge import REACH, Knowledge
+from hydroid.problem.problem import Problem
 from hydroid.settings.knowledge import KnownSettings
 from hydroid.settings.search import PolishSettings
 

@@ -6,8 +6,8 @@ from conftest import step_log
 
 from hydroid.errors import HydroidError
 from hydroid.identification.fit import fit
-from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.jobs import load_settings, simulate_log
+from hydroid.problem.problem import Evaluation, Memo, Problem
 from hydroid.report.tables import objective_table, parameter_table
 from hydroid.report.words import cautions
 

@@ -7,13 +7,13 @@ import pytest
 from scipy.linalg import toeplitz
 
 from hydroid.errors import SettingsError
-from hydroid.identification.channels import Channel
-from hydroid.identification.intervals import REACH, THRESHOLD, bootstrap, profile
-from hydroid.identification.jacobian import jacobian
-from hydroid.identification.knowledge import Knowledge
-from hydroid.identification.noise import FLOOR, Noise, channel_noise, fit_noise
-from hydroid.identification.uncertainty import judge, uncertainty
+from hydroid.identifiability.intervals import REACH, THRESHOLD, bootstrap, profile
+from hydroid.identifiability.jacobian import jacobian
+from hydroid.identifiability.noise import FLOOR, Noise, channel_noise, fit_noise
+from hydroid.identifiability.uncertainty import judge, uncertainty
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.problem.channels import Channel
+from hydroid.problem.knowledge import Knowledge
 from hydroid.settings.fit import FitSettings, ParameterSettings
 from hydroid.settings.knowledge import KnownSettings
 

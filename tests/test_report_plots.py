@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from report_fits import make_fit, make_problem
 
-from hydroid.identification.problem import Evaluation
+from hydroid.problem.problem import Evaluation
 from hydroid.report import plots
 from hydroid.report.channels import channels
 from hydroid.report.tables import SeedResult

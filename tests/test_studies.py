@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hydroid.design.design import Design, design
+from hydroid.design.information import Judge, log_information, sensor_noise
+from hydroid.design.trial import Bench, violation
 from hydroid.errors import SettingsError
-from hydroid.identification.design import Design, design
-from hydroid.identification.information import Judge, log_information, sensor_noise
-from hydroid.identification.problem import Problem
-from hydroid.identification.surface import surface
-from hydroid.identification.sweep import COUNT, sweep
-from hydroid.identification.trial import Bench, violation
+from hydroid.identifiability.surface import surface
+from hydroid.identifiability.sweep import COUNT, sweep
 from hydroid.jobs import load_settings, simulate_log
 from hydroid.log import Log
+from hydroid.problem.problem import Problem
 from hydroid.report.plots.surface import contours
 from hydroid.report.studies import design_table, write_sensitivity
 from hydroid.settings.arm import Arm

@@ -7,8 +7,8 @@ import pytest
 
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
-from hydroid.identification.problem import make_simulation
 from hydroid.log import Log
+from hydroid.problem.problem import make_simulation
 from hydroid.settings.arm import Arm
 from hydroid.viewer.choice import Chosen, choose
 from hydroid.viewer.player import Player

@@ -13,11 +13,11 @@ from hydroid.cli.terminal import shown
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution import open_executor
 from hydroid.identification.fit import Fit
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.problem import Problem
 from hydroid.jobs import Warn, fit_logs, load_settings, mechanical_values
+from hydroid.problem.problem import Problem
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
+from hydroid.run.folder import RunFolder
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 

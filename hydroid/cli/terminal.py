@@ -13,7 +13,7 @@ def shown(verbose: bool, quiet: bool) -> Generator[None]:
 
     An error is not among them: it ends the command, which says it.
     """
-    from hydroid.identification.run_log import LINE
+    from hydroid.run.run_log import LINE
 
     handler = _Terminal()
     handler.setFormatter(LINE if verbose else logging.Formatter("hydroid: %(message)s"))

@@ -1,1 +1,1 @@
-"""TODO."""
+"""A fit: search, polish, what the estimate is worth; and how it does on logs it has not seen."""

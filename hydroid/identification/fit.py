@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.identification.identifiability import Identifiability, identifiability
+from hydroid.identifiability.identifiability import Identifiability, identifiability
+from hydroid.identifiability.uncertainty import Uncertainty, uncertainty
 from hydroid.identification.journal import Journal
 from hydroid.identification.multistart import Multistart
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Evaluation, Memo, Problem
 from hydroid.identification.search import Checkpoint, Search, SearchState
-from hydroid.identification.uncertainty import Uncertainty, uncertainty
 from hydroid.parameters import Array
+from hydroid.problem.problem import Evaluation, Memo, Problem
 from hydroid.search import compromise
 from hydroid.search.least_squares import Polish
 from hydroid.search.pareto import non_dominated

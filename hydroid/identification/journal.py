@@ -17,8 +17,8 @@ from typing import IO
 import numpy as np
 
 from hydroid.files import write_atomic
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import Ending, Polish
 from hydroid.settings.search import PolishSettings
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from hydroid.identification.journal import Journal
 from hydroid.identification.polishing import polish_estimate
-from hydroid.identification.problem import Memo, Problem
 from hydroid.identification.search import HISTORY, SearchState
 from hydroid.parameters import Array
+from hydroid.problem.problem import Memo, Problem
 from hydroid.search.algorithm import Population
 from hydroid.settings.fit import SearchSettings
 from hydroid.settings.search import PolishSettings

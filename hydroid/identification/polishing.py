@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from hydroid.identification.journal import Journal, question_of
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import Polish, polish
 from hydroid.settings.search import PolishSettings
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from hydroid.identification.problem import Problem
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 
 _LONGEST_NAME = 40
 

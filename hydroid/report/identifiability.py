@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydroid.identification.identifiability import Identifiability
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import KNOWN, Uncertainty
+from hydroid.identifiability.identifiability import Identifiability
+from hydroid.identifiability.uncertainty import KNOWN, Uncertainty
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import log_names
 from hydroid.report.html import Picture, Section
 from hydroid.report.table import Cell, Table

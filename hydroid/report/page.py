@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hydroid.identification.fit import Fit
-from hydroid.identification.problem import Problem
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import channels
 from hydroid.report.html import Picture, Section, report_html
 from hydroid.report.identifiability import told_section

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid.design.design import Design
 from hydroid.files import write_atomic
-from hydroid.identification.design import Design
-from hydroid.identification.problem import Problem
-from hydroid.identification.surface import Surface
-from hydroid.identification.sweep import Sweep
-from hydroid.identification.uncertainty import KNOWN
+from hydroid.identifiability.surface import Surface
+from hydroid.identifiability.sweep import Sweep
+from hydroid.identifiability.uncertainty import KNOWN
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import file_name, log_names
 from hydroid.report.table import Cell, Table, number
 from hydroid.report.words import in_reader_units, norm_label

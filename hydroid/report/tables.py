@@ -7,9 +7,9 @@ from math import degrees
 import numpy as np
 
 from hydroid.identification.fit import Estimate, Fit
-from hydroid.identification.problem import Problem
 from hydroid.identification.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.parameters import Array, Parameter, ParameterSet, relative_error
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import channels
 from hydroid.report.table import Cell, Given, Table, known
 from hydroid.report.words import (

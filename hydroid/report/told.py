@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.files import write_atomic
-from hydroid.identification.identifiability import Identifiability
-from hydroid.identification.intervals import Profile
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import Uncertainty
+from hydroid.identifiability.identifiability import Identifiability
+from hydroid.identifiability.intervals import Profile
+from hydroid.identifiability.uncertainty import Uncertainty
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.report.html import Section
 from hydroid.report.identifiability import direction_table, noise_table, told_section
 from hydroid.report.table import Cell, Table, known

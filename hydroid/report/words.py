@@ -5,11 +5,11 @@ from collections.abc import Collection
 
 import numpy as np
 
+from hydroid.identifiability.patterns import listed
+from hydroid.identifiability.uncertainty import KNOWN, NOT_DETERMINED, WEAK, at_bounds
 from hydroid.identification.fit import Fit
-from hydroid.identification.patterns import listed
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import KNOWN, NOT_DETERMINED, WEAK, at_bounds
 from hydroid.parameters import Array, Parameter
+from hydroid.problem.problem import Problem
 from hydroid.report.table import number, plain
 from hydroid.settings.objective import ObjectiveSettings
 

@@ -8,12 +8,11 @@ import numpy as np
 
 from hydroid.files import write_atomic
 from hydroid.identification.fit import Fit
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.problem import Problem
 from hydroid.identification.search import HISTORY
 from hydroid.identification.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array, ParameterSet
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import Channel, channel, channels, file_name, log_names, short_name, unique
 from hydroid.report.identifiability import direction_table, noise_table
 from hydroid.report.table import Table
@@ -27,6 +26,7 @@ from hydroid.report.tables import (
     validation_table,
 )
 from hydroid.report.words import flags
+from hydroid.run.folder import RunFolder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,9 +8,9 @@ import numpy as np
 
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.parameters import ActuatorParameters, nominal_parameters
-from hydroid.identification.folder import RunFolder
-from hydroid.identification.stage import Stage
 from hydroid.jobs import load_settings, read_parameters
+from hydroid.problem.stage import Stage
+from hydroid.run.folder import RunFolder
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import ArmParameters, Members

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from hydroid.identification.identifiability import Identifiability
-from hydroid.identification.intervals import THRESHOLD, Profile
-from hydroid.identification.uncertainty import KNOWN, Uncertainty
+from hydroid.identifiability.identifiability import Identifiability
+from hydroid.identifiability.intervals import THRESHOLD, Profile
+from hydroid.identifiability.uncertainty import KNOWN, Uncertainty
 from hydroid.parameters import Array
 from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled, tick
 from hydroid.report.table import plain

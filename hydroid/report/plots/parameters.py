@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hydroid.identification.fit import Fit
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array, Parameter, ParameterSet
+from hydroid.problem.problem import Problem
 from hydroid.report.plots.style import (
     GREY,
     MEASURED,

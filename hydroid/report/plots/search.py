@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
 from hydroid.identification.fit import Fit
-from hydroid.identification.problem import Problem
+from hydroid.problem.problem import Problem
 from hydroid.report.plots.style import (
     GREY,
     POLISHED,

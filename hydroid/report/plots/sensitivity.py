@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hydroid.identification.jacobian import NO_EFFECT
+from hydroid.identifiability.jacobian import NO_EFFECT
 from hydroid.parameters import Array
 from hydroid.report.plots.style import GREY, MEASURED, POLISHED, figure, finite, styled
 from hydroid.report.table import number, plain

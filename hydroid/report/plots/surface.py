@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from hydroid.identification.surface import Surface
+from hydroid.identifiability.surface import Surface
 from hydroid.parameters import Parameter
 from hydroid.report.plots.style import GREY, PALE, POLISHED, figure, styled
 from hydroid.report.table import number, plain

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hydroid.identification.fit import Fit
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.report.channels import Channel
 from hydroid.report.plots.style import (
     GREY,

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from hydroid.identification.jacobian import STEP, jacobian, relative_scale
-from hydroid.identification.knowledge import Knowledge
-from hydroid.identification.noise import Noise, channel_noise
-from hydroid.identification.problem import Problem
+from hydroid.identifiability.jacobian import STEP, jacobian, relative_scale
+from hydroid.identifiability.noise import Noise, channel_noise
 from hydroid.parameters import Array, ParameterSet
+from hydroid.problem.knowledge import Knowledge
+from hydroid.problem.problem import Problem
 from hydroid.settings.design import DesignSettings
 
 PRIOR = 1.0

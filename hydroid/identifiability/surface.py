@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.errors import SettingsError
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array, Parameter
+from hydroid.problem.problem import Problem
 
 BATCH = 256
 """points evaluated together; in between, progress is told"""

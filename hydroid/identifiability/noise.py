@@ -12,8 +12,8 @@ import numpy as np
 from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter, lfiltic
 
-from hydroid.identification.channels import Channel
 from hydroid.parameters import Array
+from hydroid.problem.channels import Channel
 from hydroid.settings.objective import ObjectiveSettings
 
 ORDER = 30

@@ -15,9 +15,12 @@ import yaml
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.files import remove_parts, write_atomic
-from hydroid.identification.checkpoint import read_checkpoint, write_checkpoint
 from hydroid.identification.fit import Fit
-from hydroid.identification.identity import (
+from hydroid.identification.journal import Journal
+from hydroid.identification.search import Checkpoint, SearchState
+from hydroid.problem.problem import Memo, Problem
+from hydroid.run.checkpoint import read_checkpoint, write_checkpoint
+from hydroid.run.identity import (
     file_hash,
     identity,
     model_hash,
@@ -26,11 +29,8 @@ from hydroid.identification.identity import (
     refuse_other_identity,
     refuse_other_settings,
 )
-from hydroid.identification.journal import Journal
-from hydroid.identification.lock import LOCK, locked
-from hydroid.identification.problem import Memo, Problem
-from hydroid.identification.run_log import run_log
-from hydroid.identification.search import Checkpoint, SearchState
+from hydroid.run.lock import LOCK, locked
+from hydroid.run.run_log import run_log
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml

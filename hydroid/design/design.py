@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hydroid.design.experiment import Draw, pose_limits
+from hydroid.design.information import Judge, log_information, statement_information
+from hydroid.design.trial import Bench, Trial
 from hydroid.errors import SettingsError
-from hydroid.identification.experiment import Draw, pose_limits
-from hydroid.identification.information import Judge, log_information, statement_information
-from hydroid.identification.knowledge import Knowledge
-from hydroid.identification.problem import Problem
-from hydroid.identification.stage import Stage
-from hydroid.identification.trial import Bench, Trial
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.knowledge import Knowledge
+from hydroid.problem.problem import Problem
+from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 

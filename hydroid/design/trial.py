@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.identification.experiment import Experiment
-from hydroid.identification.information import information, sensor_noise
-from hydroid.identification.jacobian import STEP, relative_scale
-from hydroid.identification.problem import make_simulation
-from hydroid.identification.stage import Stage
+from hydroid.design.experiment import Experiment
+from hydroid.design.information import information, sensor_noise
+from hydroid.identifiability.jacobian import STEP, relative_scale
 from hydroid.parameters import Array
+from hydroid.problem.problem import make_simulation
+from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.fit import FitSettings

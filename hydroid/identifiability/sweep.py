@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.identification.jacobian import jacobian
-from hydroid.identification.problem import Problem
+from hydroid.identifiability.jacobian import jacobian
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 
 COUNT = 20
 """values of each parameter within its bounds, as in the article"""

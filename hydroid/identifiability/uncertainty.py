@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from hydroid.identification.jacobian import Jacobian, jacobian
-from hydroid.identification.noise import FLOOR, Noise, channel_noise, unbiased
-from hydroid.identification.problem import Problem
+from hydroid.identifiability.jacobian import Jacobian, jacobian
+from hydroid.identifiability.noise import FLOOR, Noise, channel_noise, unbiased
 from hydroid.parameters import Array, Parameter
+from hydroid.problem.problem import Problem
 
 KNOWN = 0.3
 """a parameter or direction is determined when its relative standard deviation is at most this, else weak"""

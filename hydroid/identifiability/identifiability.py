@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.identification.patterns import patterns
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import KNOWN, LOST, ZERO, Uncertainty
+from hydroid.identifiability.patterns import patterns
+from hydroid.identifiability.uncertainty import KNOWN, LOST, ZERO, Uncertainty
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 
 SHOWN = 0.1
 """components below this part of the largest are left out of a direction's name"""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.identification.problem import Problem
 from hydroid.parameters import Array, ParameterSet
+from hydroid.problem.problem import Problem
 
 STEP = 1e-4
 """relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""

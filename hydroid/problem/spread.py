@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from hydroid.execution import Executor, Work
-from hydroid.identification.problem import Evaluation, Problem
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.problem import Evaluation, Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 

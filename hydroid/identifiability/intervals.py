@@ -7,9 +7,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import COVERED, Uncertainty, decompose, statement_unit
+from hydroid.identifiability.uncertainty import COVERED, Uncertainty, decompose, statement_unit
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import polish
 from hydroid.settings.search import PolishSettings
 

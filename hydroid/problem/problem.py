@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from hydroid.arm.model import load_model
 from hydroid.arm.payload import add_payload
-from hydroid.identification.channels import Channel, make_channels
-from hydroid.identification.knowledge import Knowledge
-from hydroid.identification.stage import Stage
 from hydroid.log import Log
 from hydroid.objective.norms import overall_objective
 from hydroid.objective.segments import segment_bounds, segment_objectives
 from hydroid.parameters import Array
+from hydroid.problem.channels import Channel, make_channels
+from hydroid.problem.knowledge import Knowledge
+from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.objective import SegmentSettings

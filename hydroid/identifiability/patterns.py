@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
-from hydroid.identification.problem import Problem
-from hydroid.identification.uncertainty import KNOWN, Uncertainty
+from hydroid.identifiability.uncertainty import KNOWN, Uncertainty
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.settings.fit import MECHANICAL_UNITS
 
 COIL = ("force_1", "force_2", "stroke_1", "stroke_2")

@@ -1,0 +1,1 @@
+"""The next experiment: the one that tells most about what is known least."""

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test demo bench article article-hyd many-parameters design-study coverage kill-resume wheel meshes model clean fuzz
+.PHONY: setup check test demo bench article article-hyd accuracy many-parameters design-study coverage fuzz kill-resume slurm wheel meshes model clean
 
 setup: .venv/.ready
 
@@ -37,6 +37,9 @@ article: setup  ## the article's simulated study over ten seeds (README, "Accura
 article-hyd: setup  ## the same for stage 2
 	$(BIN)/python benchmarks/article_hyd.py
 
+accuracy: setup  ## the hydraulics against a stiff reference solver, and 1,000 random sets on all joints
+	$(BIN)/python benchmarks/hydraulic_accuracy.py
+
 many-parameters: setup  ## 27 parameters from far-off starts, beside mujoco.sysid; half an hour
 	$(BIN)/pip install --quiet --disable-pip-version-check 'mujoco[sysid]'
 	$(BIN)/python benchmarks/many_parameters.py
@@ -52,6 +55,9 @@ fuzz: setup  ## 12,000 damaged files of every kind; a quarter of an hour
 
 kill-resume: setup  ## 100 runs killed at random moments, resumed, and compared bit for bit; 20 minutes at most
 	$(BIN)/python benchmarks/kill_resume.py
+
+slurm: setup  ## the cluster scripts on a real Slurm on this machine (Debian, root); says so where there can be none
+	.ci/slurm $(BIN)/pytest tests/test_cluster_slurm.py
 
 wheel: setup  ## the wheel in an empty environment, run from an empty folder
 	PYTHON=$(BIN)/python sh .ci/wheel

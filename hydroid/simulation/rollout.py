@@ -67,9 +67,10 @@ class Machine:
     ) -> None:
         self._model, self._data = copy(model), mujoco.MjData(model)
         m, d = self._model, self._data
+        model_address, data_address = _addresses(m, d)
         self.arm = Arm(
-            model=m._address,
-            data=d._address,
+            model=model_address,
+            data=data_address,
             angle=d.qpos,
             velocity=d.qvel,
             mass=d.M,
@@ -91,6 +92,22 @@ class Machine:
         """Whether the member is finite and drew no warning of MuJoCo's."""
         arm = self.arm
         return np.isfinite([arm.angle, arm.velocity]).all() & ~arm.warnings.any()
+
+
+def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
+    """Where MuJoCo keeps a model and its data: it tells every physics callback."""
+    told: dict[int, tuple[int, int]] = {}
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+    def passive(m: int, d: int) -> None:
+        told[threading.get_ident()] = (m, d)  # other threads may be stepping
+
+    mujoco.set_mjcb_passive(passive)
+    try:
+        mujoco.mj_forward(model, data)
+    finally:
+        mujoco.set_mjcb_passive(None)
+    return told[threading.get_ident()]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -27,11 +27,11 @@ demo: setup  ## both stages on one log of the virtual rig, and the other log to 
 	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
 		--fit runs/demo/ga --fit runs/demo/nsga2 --fit runs/demo/hyd --out runs/demo/validation
 
-bench: setup  ## what a simulation costs, and what hydroid adds to it (README, "Speed")
+bench: setup  ## what a simulation costs, and what hydroid adds to it (docs/measured.md)
 	$(BIN)/python benchmarks/throughput.py
 	$(BIN)/python benchmarks/scaling.py --dask
 
-article: setup  ## the article's simulated study over ten seeds (README, "Accuracy"); half an hour
+article: setup  ## the article's simulated study over ten seeds (docs/measured.md); half an hour
 	$(BIN)/python benchmarks/article_mech.py
 
 article-hyd: setup  ## the same for stage 2

@@ -15,10 +15,11 @@ from article_mech import Silent
 from pseudo_random import pseudo_random_log
 
 from hydroid.identification.fit import fit
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
 
 TRUTH = {  # table 7
     "A_A": 1000.0,

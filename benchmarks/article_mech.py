@@ -15,9 +15,10 @@ import numpy as np
 from pseudo_random import pseudo_random_log
 
 from hydroid.identification.fit import Fit, fit
-from hydroid.jobs import load_settings, read_parameters, simulate_log
+from hydroid.jobs import load_settings, read_parameters
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 

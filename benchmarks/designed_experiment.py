@@ -26,10 +26,11 @@ from hydroid.design.experiment import Draw, pose_limits
 from hydroid.design.information import statement_information
 from hydroid.design.trial import Bench, violation
 from hydroid.identification.polishing import polish_estimate
-from hydroid.jobs import load_settings, read_parameters, simulate_log
+from hydroid.jobs import load_settings, read_parameters
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import PolishSettings
+from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 MASSES = [f"M{i}" for i in range(1, 7)]

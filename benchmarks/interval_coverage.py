@@ -21,9 +21,10 @@ from hydroid.identifiability.jacobian import jacobian
 from hydroid.identifiability.noise import Noise
 from hydroid.identifiability.uncertainty import uncertainty
 from hydroid.identification.polishing import polish_estimate
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
 
 LEVEL = np.deg2rad(0.1)
 MEMORY = 0.15  # [s]

@@ -26,11 +26,12 @@ from sysid_peer import Peer
 from hydroid.identifiability.uncertainty import KNOWN
 from hydroid.identification.fit import Fit, fit
 from hydroid.identification.multistart import random_start
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.simulating import simulate_log
 
 JOINTS = range(1, 8)
 MASSES = {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}

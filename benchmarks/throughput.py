@@ -19,9 +19,10 @@ from pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.identification.search import Search
-from hydroid.jobs import load_settings, read_parameters, simulate_log
+from hydroid.jobs import load_settings, read_parameters
 from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm
+from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 MEMBERS, REPEATS = 70, 9

@@ -14,8 +14,8 @@ from hydroid.identifiability.intervals import Profile, bootstrap, profile
 from hydroid.identifiability.surface import surface
 from hydroid.identifiability.sweep import sweep
 from hydroid.identifiability.uncertainty import uncertainty
-from hydroid.jobs import Warn, load_settings, read_logs, read_parameters
-from hydroid.log import write_log
+from hydroid.jobs import load_settings, read_logs, read_parameters
+from hydroid.log import Warn, write_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.problem.stage import Stage

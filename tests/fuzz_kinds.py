@@ -28,14 +28,7 @@ from hydroid.assets import assets, find_config
 from hydroid.cli.options import overrides
 from hydroid.cli.running import _continued
 from hydroid.identification.search import Search, make_algorithm
-from hydroid.jobs import (
-    check_logs,
-    load_settings,
-    mechanical_values,
-    read_commands,
-    read_logs,
-    read_parameters,
-)
+from hydroid.jobs import check_logs, load_settings, mechanical_values, read_logs, read_parameters
 from hydroid.problem.problem import Memo, Problem
 from hydroid.problem.stage import Stage
 from hydroid.report.html import Section, report_html
@@ -44,6 +37,7 @@ from hydroid.run.folder import RunFolder
 from hydroid.search.algorithm import Population
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import FitSettings
+from hydroid.simulating import read_commands
 
 ROOT = Path(__file__).parents[1]
 LOGS = ROOT / "examples" / "logs"

@@ -15,9 +15,10 @@ from hydroid import jobs
 from hydroid.cli.app import app
 from hydroid.collect import collect
 from hydroid.errors import RunError
-from hydroid.jobs import fit_logs, load_settings, simulate_log
+from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
 from hydroid.report.write import write_runs
+from hydroid.simulating import simulate_log
 
 SMALL = {
     "search.algorithm": "ga",

@@ -9,12 +9,13 @@ from conftest import step_log
 from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.identification.fit import fit
 from hydroid.identification.validation import error_indices
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.log import write_log
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Memo, Problem
 from hydroid.problem.stage import Stage
 from hydroid.run.folder import RunFolder
+from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SMALL = {

@@ -9,9 +9,10 @@ from conftest import step_log
 
 from hydroid.arm.payload import add_payload
 from hydroid.errors import SettingsError
-from hydroid.jobs import fit_logs, load_settings, simulate_log
+from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import read_log, write_log
 from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
 
 MECHANICAL = {"D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 HYDRAULIC = MECHANICAL | {

@@ -18,7 +18,7 @@ from hydroid import jobs
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
 from hydroid.identification.search import SearchState
-from hydroid.jobs import fit_logs, load_settings, simulate_log
+from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run import lock
@@ -26,6 +26,7 @@ from hydroid.run.checkpoint import DAMAGED, PREVIOUS
 from hydroid.run.folder import RunFolder
 from hydroid.run.lock import locked
 from hydroid.search.algorithm import Population
+from hydroid.simulating import simulate_log
 
 SMALL = {
     "search.algorithm": "ga",

@@ -9,8 +9,9 @@ from conftest import step_log
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.identifiability.identifiability import Identifiability, identifiability
 from hydroid.identifiability.uncertainty import KNOWN, Uncertainty, uncertainty
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
 
 MECH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 HYD = {"A_A": 1e3, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}

@@ -12,10 +12,11 @@ from hydroid.identification import journal as room
 from hydroid.identification.journal import Journal
 from hydroid.identification.multistart import Multistart
 from hydroid.identification.polishing import polish_estimate
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.problem.problem import Memo, Problem
 from hydroid.search.least_squares import Ending, Polish
 from hydroid.settings.search import PolishSettings
+from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 HOW = PolishSettings(iterations=4)

@@ -8,12 +8,13 @@ from conftest import step_log
 
 from hydroid.errors import SettingsError
 from hydroid.identification.polishing import polish_estimate
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.knowledge import REACH, Knowledge
 from hydroid.problem.problem import Problem
 from hydroid.settings.knowledge import KnownSettings
 from hydroid.settings.search import PolishSettings
+from hydroid.simulating import simulate_log
 
 PARAMETERS = ParameterSet(
     (

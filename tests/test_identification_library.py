@@ -9,10 +9,11 @@ from conftest import step_log
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.identification.fit import Fit, fit
-from hydroid.jobs import fit_logs, load_settings, simulate_log
+from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
+from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SMALL = {"objective.segments": {"equal": 3}, "simulation.other_joints": "locked", "polish": None}

@@ -6,10 +6,11 @@ from conftest import step_log
 
 from hydroid.errors import HydroidError
 from hydroid.identification.fit import fit
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.problem.problem import Evaluation, Memo, Problem
 from hydroid.report.tables import objective_table, parameter_table
 from hydroid.report.words import cautions
+from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 STEPS = 2**16 - 1

@@ -18,6 +18,7 @@ LAYERS = [
     {"identification", "design"},
     {"run"},
     {"report"},
+    {"simulating"},
     {"jobs"},
     {"studies", "collect"},
     {"viewer"},

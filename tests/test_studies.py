@@ -12,7 +12,7 @@ from hydroid.design.trial import Bench, violation
 from hydroid.errors import SettingsError
 from hydroid.identifiability.surface import surface
 from hydroid.identifiability.sweep import COUNT, sweep
-from hydroid.jobs import load_settings, simulate_log
+from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.report.plots.surface import contours
@@ -20,6 +20,7 @@ from hydroid.report.studies import design_table, write_sensitivity
 from hydroid.settings.arm import Arm
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.fit import FitSettings
+from hydroid.simulating import simulate_log
 
 TRUTH = {
     "K": 0.2,

@@ -13,7 +13,8 @@ from hydroid.cli.terminal import shown
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution import open_executor
 from hydroid.identification.fit import Fit
-from hydroid.jobs import Warn, fit_logs, load_settings, mechanical_values
+from hydroid.jobs import fit_logs, load_settings, mechanical_values
+from hydroid.log import Warn
 from hydroid.problem.problem import Problem
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs

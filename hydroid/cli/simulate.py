@@ -34,7 +34,8 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Simulate commands with given parameters and write a log: a prediction, or data to test a fit with."""
-    from hydroid.jobs import load_settings, read_parameters, simulate_file
+    from hydroid.jobs import load_settings, read_parameters
+    from hydroid.simulating import simulate_file
 
     beside = params.parent / "config.yaml"
     chosen = config or (str(beside) if beside.is_file() else "fit-mech")

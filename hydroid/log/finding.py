@@ -1,5 +1,6 @@
 """One thing that a reader noticed in a log."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,3 +39,7 @@ class Finding:
 
     def __str__(self) -> str:
         return str(self.error())
+
+
+Warn = Callable[[Finding], None]
+"""takes what is odd about a log"""

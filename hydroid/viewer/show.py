@@ -7,10 +7,10 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
-from hydroid.jobs import Warn, read_commands
-from hydroid.log import Log
+from hydroid.log import Log, Warn
 from hydroid.problem.problem import make_simulation
 from hydroid.report.actuator import actuator_card, write_actuator
+from hydroid.simulating import read_commands
 from hydroid.simulation import HydraulicSimulation
 from hydroid.viewer.choice import Chosen
 from hydroid.viewer.player import Player

@@ -163,7 +163,7 @@ def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    values = RunFolder(path).estimate() if path.is_dir() else read_parameters(path)
+    values = read_parameters(path)
     wanted = [name for name, p in settings.parameters.items() if p.quantity in MECHANICAL_UNITS]
     missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
     if missing:
@@ -201,11 +201,13 @@ def validate_fits(
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
-    """Read parameter values by name: a mapping, or an `estimate.yaml`.
+    """Read parameter values by name: a mapping, an `estimate.yaml`, or the run folder that holds one.
 
     Raises:
         SettingsError: not a mapping.
     """
+    if path.is_dir():
+        return RunFolder(path).estimate()
     values, _ = read_yaml(path)
     inner = values.get("parameters", values)
     if not isinstance(inner, dict):

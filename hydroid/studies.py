@@ -17,7 +17,7 @@ from hydroid.identifiability.uncertainty import uncertainty
 from hydroid.jobs import load_settings, read_logs, read_parameters
 from hydroid.log import Warn, write_log
 from hydroid.parameters import Array
-from hydroid.problem.problem import Problem
+from hydroid.problem.problem import Problem, freed_settings
 from hydroid.problem.stage import Stage
 from hydroid.report.studies import surface_table, write_design, write_sensitivity, write_surface
 from hydroid.report.table import Table
@@ -58,9 +58,11 @@ def load_subject(
     if fit is not None:
         source, values = str(fit / "estimate.yaml"), RunFolder(fit).estimate()
         settings, arm = load_settings(config, overrides) if config else RunFolder(fit).settings(overrides)
+        if config is None and RunFolder(fit).refined:
+            settings = freed_settings(settings)
     else:
         assert params is not None
-        beside = params.parent / "config.yaml"
+        beside = (params if params.is_dir() else params.parent) / "config.yaml"
         chosen = config or (str(beside) if beside.is_file() else "fit-mech")
         settings, arm = load_settings(chosen, overrides)
         source, values = str(params), read_parameters(params)

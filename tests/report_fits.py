@@ -137,6 +137,7 @@ def make_uncertainty(
         np.zeros((len(theta), 0)),
         relative_scale(problem.parameters, theta),
         np.zeros_like(slopes),
+        unit=1.0,
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
     return judge(problem, theta, at, noise)

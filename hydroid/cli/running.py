@@ -16,6 +16,7 @@ from hydroid.identification.fit import Fit
 from hydroid.jobs import fit_logs, load_settings, mechanical_values
 from hydroid.log import Warn
 from hydroid.problem.problem import Problem
+from hydroid.report import words
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
 from hydroid.run.folder import RunFolder
@@ -64,6 +65,8 @@ def run_fits(
         typer.echo(jsonlib.dumps({"out": str(out), "runs": found}))
     elif not quiet:
         table.show()
+        if runs == 1:
+            typer.echo(words.summary(results[0][2]))
         typer.echo(f"{out / ('tables' if runs > 1 else 'report.html')}")
 
 

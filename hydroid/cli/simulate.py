@@ -37,7 +37,7 @@ def simulate(
     from hydroid.jobs import load_settings, read_parameters
     from hydroid.simulating import simulate_file
 
-    beside = params.parent / "config.yaml"
+    beside = (params if params.is_dir() else params.parent) / "config.yaml"
     chosen = config or (str(beside) if beside.is_file() else "fit-mech")
     settings, arm = load_settings(chosen, overrides(setting))
     values = read_parameters(params)

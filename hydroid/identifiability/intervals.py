@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
-from hydroid.identifiability.uncertainty import COVERED, Uncertainty, decompose, statement_unit
+from hydroid.identifiability.uncertainty import COVERED, Uncertainty, decompose
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import polish
@@ -133,7 +133,7 @@ def _redrawn(problem: Problem, found: Uncertainty, count: int, rng: np.random.Ge
 
 def _with_statements(problem: Problem, found: Uncertainty) -> Callable[[Array], Array]:
     """Residuals with the statements' scores below them, as the polish has them, (n, P) -> (n, R + M)."""
-    unit, knowledge = statement_unit(found.jacobian), problem.knowledge
+    unit, knowledge = found.jacobian.unit, problem.knowledge
 
     def residuals(theta: Array) -> Array:
         return np.hstack([problem.residuals(theta), unit * knowledge.scores(theta)])

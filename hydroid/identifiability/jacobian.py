@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.identifiability.noise import statement_unit
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.problem import Problem
 
@@ -31,6 +32,7 @@ class Jacobian:
         statements: derivatives of the M statements' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
         error: by how much two steps' derivatives differ, shape (P, R).
+        unit: what a statement's score counts in the polish, in units of the residual [rad].
     """
 
     residual: Array
@@ -38,6 +40,7 @@ class Jacobian:
     statements: Array
     scale: Array
     error: Array
+    unit: float
 
     @property
     def effects(self) -> Array:
@@ -73,7 +76,8 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     statements = (scores[: len(theta)] - scores[len(theta) :]) / (2 * STEP)
     slopes, errors = np.full((2, len(theta), at.size), np.nan)
     slopes[free], errors[free] = np.where(disagree[:, None], wide, fine), error
-    return Jacobian(at, slopes, statements, scale, errors)
+    unit = statement_unit(problem.channels, at, problem.settings.objective)
+    return Jacobian(at, slopes, statements, scale, errors, unit)
 
 
 def relative_scale(parameters: ParameterSet, theta: Array) -> Array:

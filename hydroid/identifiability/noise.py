@@ -5,6 +5,7 @@ leave errors that last. It is described by an autoregressive (AR) model, fitted 
 "Maximum entropy spectral analysis", 1967), of the order with the lowest AIC (H. Akaike, 1974).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -93,6 +94,17 @@ class Noise:
             polynomial, variance = longer + k * longer[::-1], variance * (1 - k**2)
             found.append((polynomial, variance))
         return found
+
+
+def statement_unit(channels: Sequence[Channel], residual: Array, how: ObjectiveSettings) -> float:
+    """What a statement's score counts beside a row of residuals, shape (R,), in least squares [rad].
+
+    As many residuals as there are samples, of noise that lasts, tell no more than the independent ones among
+    them. So a score counts the noise's level times the root of how many samples make one that is independent.
+    """
+    noise = [channel_noise(channel, residual[channel.rows], how) for channel in channels]
+    square = sum(n.samples * n.level**2 for n in noise)
+    return float(np.sqrt(square / sum(n.independent_samples for n in noise)))
 
 
 def channel_noise(channel: Channel, residual: Array, how: ObjectiveSettings) -> Noise:

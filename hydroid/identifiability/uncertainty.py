@@ -20,10 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from hydroid.identifiability.jacobian import Jacobian, jacobian
-from hydroid.identifiability.noise import FLOOR, Noise, channel_noise, unbiased
+from hydroid.identifiability.noise import Noise, channel_noise, unbiased
 from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 
@@ -105,7 +106,9 @@ def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, 
     covariance, lost = covariance_of(root)
     relative = np.full(len(theta), np.nan)
     relative[free] = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
-    unknown = relative > LOST
+    # with few independent samples Student's t is wide: so wide must a flag's limits be taken
+    widening = float(student.ppf(0.5 + COVERED / 2, freedom) / normal.ppf(0.5 + COVERED / 2))
+    unknown = widening * relative > LOST
     relative[unknown] = np.inf
     bound = [
         next((side for side, at in at_bounds(parameter, value) if at), "")
@@ -115,7 +118,8 @@ def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, 
     interval = np.stack([theta - half, theta + half], axis=1)
     interval[[side != "" for side in bound] & ~unknown] = np.nan
     flags = tuple(
-        _flags(float(relative[i]), slopes, i, bound[i]) if free[i] else (FIXED,) for i in range(len(theta))
+        _flags(widening * float(relative[i]), slopes, i, bound[i]) if free[i] else (FIXED,)
+        for i in range(len(theta))
     )
     deviation = np.where(unknown[free], np.nan, relative[free])
     return Uncertainty(
@@ -149,17 +153,12 @@ def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, ND
     )
 
 
-def statement_unit(slopes: Jacobian) -> float:
-    """What a statement's score counts in the polish, in units of the residual [rad]."""
-    return float(np.fmax(np.sqrt(np.mean(slopes.residual**2)), FLOOR["angle"]))
-
-
 def decompose(free: NDArray[np.bool_], slopes: Jacobian) -> tuple[Array, Array, Array]:
     """Return V, D, U of J = V D U: directions (p, p), strengths (p,), what they do to residuals (p, R + M).
 
     A strength that is not beyond what two steps of the differences differ by is 0.
     """
-    felt = np.nan_to_num(np.hstack([slopes.slopes, statement_unit(slopes) * slopes.statements])[free])
+    felt = np.nan_to_num(np.hstack([slopes.slopes, slopes.unit * slopes.statements])[free])
     directions, values, course = np.linalg.svd(felt, full_matrices=False)
     error = np.linalg.norm(directions.T @ np.nan_to_num(slopes.error[free]), axis=1)
     values[values <= np.maximum(error, ZERO * values[0])] = 0.0
@@ -171,7 +170,7 @@ def _root(
 ) -> tuple[Array, tuple[Noise, ...], float]:
     """Return G, shape (p, p), the noise with what the fit took up, its degrees of freedom."""
     directions, values, course = decompose(problem.parameters.free, slopes)
-    unit = statement_unit(slopes)
+    unit = slopes.unit
     count = len(slopes.residual)
     statements = unit**2 * course[:, count:] @ course[:, count:].T
     parts = [course[:, channel.rows] for channel in problem.channels]

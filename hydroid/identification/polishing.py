@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hydroid.identifiability.noise import statement_unit
 from hydroid.identification.journal import Journal, question_of
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
@@ -28,8 +29,9 @@ def polish_estimate(
 ) -> Polish:
     """Improve an estimate by bounded least squares.
 
-    Statements of `problem.knowledge` join as residuals of (value - known) / sd times the rms residual of the
-    logs. That noise is taken at the start, and again at the result, until it settles.
+    Statements of `problem.knowledge` join as residuals of (value - known) / sd times what a score counts
+    beside the logs' noise (`statement_unit`), which is taken at the start, and again at the result, until it
+    settles.
 
     Args:
         problem: the problem.
@@ -67,7 +69,7 @@ def _polish(
 ) -> tuple[Polish, int]:
     """The same with the residuals of `simulate`, theta (n, P) -> (n, R), and the number of simulations."""
     simulated, parameters, knowledge = 0, problem.parameters, problem.knowledge
-    noise = _noise(simulate, theta) if len(knowledge) else 0.0
+    noise = _noise(problem, simulate, theta) if len(knowledge) else 0.0
 
     def residuals(unit: Array) -> Array:
         nonlocal simulated
@@ -79,16 +81,15 @@ def _polish(
 
     result = polish(parameters.to_unit(theta[None])[0], residuals, settings)
     for _ in range(ROUNDS - 1 if len(knowledge) else 0):
-        before, noise = noise, _noise(simulate, parameters.from_unit(result.point[None])[0])
+        before, noise = noise, _noise(problem, simulate, parameters.from_unit(result.point[None])[0])
         if not abs(noise - before) > SETTLED * before:
             break
         result = polish(result.point, residuals, settings)
     return result, simulated
 
 
-def _noise(simulate: Callable[[Array], Array], theta: Array) -> float:
-    """Rms residual of the logs [rad]."""
-    return float(np.sqrt(np.mean(simulate(theta[None]) ** 2)))
+def _noise(problem: Problem, simulate: Callable[[Array], Array], theta: Array) -> float:
+    return statement_unit(problem.channels, simulate(theta[None])[0], problem.settings.objective)
 
 
 def _words(result: Polish, simulated: int) -> str:

@@ -77,12 +77,7 @@ class Problem:
 
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
-        free = {
-            name: p if p.bounds is None else p.model_copy(update={"fixed": None})
-            for name, p in self.settings.parameters.items()
-        }
-        settings = self.settings.model_copy(update={"parameters": free})
-        return Problem(self._arm, settings, self.logs)
+        return Problem(self._arm, freed_settings(self.settings), self.logs)
 
     def first(self, seconds: float) -> "Problem":
         """Return the same problem up to so long after each log's first command, in one segment a channel."""
@@ -130,6 +125,15 @@ class Problem:
     def _chunks(self, n: int) -> Iterator[slice]:
         size = min(simulation.record.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
+
+
+def freed_settings(settings: FitSettings) -> FitSettings:
+    """Return the settings with every parameter free that has bounds, as a refinement has them."""
+    free = {
+        name: p if p.bounds is None else p.model_copy(update={"fixed": None})
+        for name, p in settings.parameters.items()
+    }
+    return settings.model_copy(update={"parameters": free})
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:

@@ -10,12 +10,17 @@ from hydroid.report.html import Picture, Section, report_html
 from hydroid.report.identifiability import told_section
 from hydroid.report.table import Table, number
 from hydroid.report.words import cautions, norm_label, summary, told
+from hydroid.settings.knowledge import KnownSettings
 
 _ALGORITHMS = {
     "ga": "simple genetic algorithm",
     "nsga2": "NSGA-II, a multi-objective genetic algorithm",
     "cmaes": "CMA-ES, an evolution strategy",
     "multistart": "bounded least squares from random starts",
+}
+_STAGES = {
+    "mech": "1, the arm: a gain stands for the hydraulics",
+    "hyd": "2, the hydraulic actuator",
 }
 _PARETO = {
     "single": "The search minimises the error over the whole record and does not look for this set: these "
@@ -97,12 +102,27 @@ def _facts(arm: str, identity: Mapping[str, Any], problem: Problem) -> tuple[tup
             logs.append((label, f"{channel.log}, {number(seconds)} s, {len(channel.time)} samples{digest}"))
     return (
         ("arm", arm),
+        ("stage", _STAGES[settings.stage]),
         *logs,
+        *((f"in the gripper, {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
+        *((f"known: {name}", _statement(s)) for name, s in settings.known.items()),
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
         ("other joints", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
         ("search", _ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
         ("seed", str(settings.search.seed)),
+    )
+
+
+def _statement(known: KnownSettings) -> str:
+    """A statement in words."""
+    if known.ratio is not None:
+        what = " / ".join(known.ratio)
+    else:
+        terms = (n if f == 1 else f"{number(f)} {n}" for n, f in known.factors.items())
+        what = " + ".join(terms).replace("+ -", "- ")
+    return f"{what} = {number(known.value)}" + (
+        ", exact" if known.sd is None else f" ± {number(known.sd)} (sd)"
     )
 
 

@@ -113,6 +113,12 @@ class RunFolder:
         self.identity()  # says what is wrong where the folder holds no run
         return load(self.path / "config.yaml", FitSettings, overrides), load_arm(self.path / "arm.yaml")
 
+    @property
+    def refined(self) -> bool:
+        """Whether the final estimate is that of a refinement, which frees what was held fixed."""
+        file = self.path / "estimate.yaml"
+        return file.exists() and read_yaml(file)[0].get("final") == "refined"
+
     def estimate(self) -> dict[str, Any]:
         """Read the final parameters by name.
 

@@ -10,7 +10,6 @@ from hydroid.errors import SettingsError
 from hydroid.hydraulics.parameters import ActuatorParameters, nominal_parameters
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.problem.stage import Stage
-from hydroid.run.folder import RunFolder
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import ArmParameters, Members
@@ -55,7 +54,7 @@ def choose(config: str | None, params: Path | None, changes: dict[str, Any] | No
         raise SettingsError("stage mech has no actuators", where=named, cure="use --config fit-hyd")
     values: dict[str, Any] = {}
     if params is not None:
-        values = RunFolder(params).estimate() if params.is_dir() else read_parameters(params)
+        values = read_parameters(params)
     source = str(params or named)
     stage = Stage(arm, settings)
     known = stage.parameters.parameters

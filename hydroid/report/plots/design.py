@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from hydroid.log import Log
 from hydroid.parameters import Array
@@ -82,9 +82,14 @@ def precision(names: Sequence[str], before: Array, random: Array, designed: Arra
         axes.plot(100 * values, at, mark, color=color, markersize=8, label=label)
     axes.axvline(100 * known, color=MEASURED, linewidth=1.0, linestyle=(0, (5, 3)))
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(_tick))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_yticks(at, names)
-    axes.set_xlabel("predicted relative standard deviation [%]; left of the dashed line: determined")
+    axes.set_xlabel(
+        "predicted relative standard deviation [%], from ±100 % without any log\n"
+        "left of the dashed line: determined"
+    )
     axes.set_title("What the experiment would tell")
     drawing.legend(loc="outside lower center", ncols=3)
     return drawing

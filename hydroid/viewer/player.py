@@ -81,7 +81,7 @@ class Player:
                     self.data.ctrl[self._motors] = self._simulation.command[self._taken]
                 self._run.step(self.data.ctrl[self._motors])
                 self._taken += 1
-            if not self._run.healthy.all():
+            if not self._run.healthy:
                 raise RunError(f"the simulation diverged before {self.time:.2f} s")
             self._take_over()
 
@@ -101,7 +101,7 @@ class Player:
         return f"  (log {np.degrees(angle[round(self.time / self._log.period)]):.2f})"
 
     def _take_over(self) -> None:
-        self.data.qpos[:] = self._log.angle[0]
+        self.data.qpos[:] = self._log.start
         self.data.qpos[self._simulation.record.joints] = self._run.position[0]
         self.data.time = self.time
         mujoco.mj_forward(self.model, self.data)

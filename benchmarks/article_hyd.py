@@ -14,7 +14,7 @@ import numpy as np
 from article_mech import Silent
 from pseudo_random import pseudo_random_log
 
-from hydroid.identification.fit import fit
+from hydroid.fitting.fit import fit
 from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.parameters import relative_error
@@ -45,33 +45,33 @@ def main() -> None:
     arguments = parser.parse_args()
     counted = SEVEN + list(PINS) if arguments.unpinned else SEVEN
     print(f"{arguments.algorithm}: summed relative error of {len(counted)} parameters, rms of the response")
-    print("| seed | search | polished | rms [deg] | simulations | seconds |")
+    print("| seed | search | refined | rms [deg] | simulations | seconds |")
     print("| --- | --- | --- | --- | --- | --- |")
     for seed in range(1, arguments.seeds + 1):
         changes = {"search.algorithm": arguments.algorithm, "search.seed": seed}
         if arguments.unpinned:
             changes |= {f"parameters.{name}.fixed": None for name in PINS}
-        settings, arm = load_settings("article-hyd", changes)
+        settings = load_settings("article-hyd", changes)
 
         def off_the_stops(log: Log) -> bool:
-            angle = np.rad2deg(simulate_log(settings, arm, log, TRUTH, "truth").angle[:, 1])  # noqa: B023
+            angle = np.rad2deg(simulate_log(settings, log, TRUTH, "truth").angle[:, 1])  # noqa: B023
             return angle.min() > -20 and angle.max() < 80
 
-        log = pseudo_random_log(arm.pose("study"), [2], allowed=off_the_stops)
-        problem = Problem(arm, settings, [simulate_log(settings, arm, log, TRUTH, "truth")])
+        log = pseudo_random_log(settings.arm.pose("study"), [2], allowed=off_the_stops)
+        problem = Problem(settings, [simulate_log(settings, log, TRUTH, "truth")])
         started = time.perf_counter()
         found = fit(problem, lambda state, memo: None, Silent())
         seconds = time.perf_counter() - started
         truth = problem.parameters.vector(TRUTH, "truth")
         columns = [problem.parameters.names.index(name) for name in counted]
-        searched, polished = (
+        searched, refined = (
             relative_error(e.theta, truth)[columns].sum() for e in (found.searched, found.best)
         )
-        assert found.polish is not None
-        simulated = int(found.history[-1, 2]) + found.polish.evaluations
+        assert found.refinement is not None
+        simulated = int(found.history[-1, 2]) + found.refinement.evaluations
         rms = np.rad2deg(found.best.rms)
         print(
-            f"| {seed} | {searched:.2f} | {polished:.2g} | {rms:.2g} | {simulated} | {seconds:.0f} |",
+            f"| {seed} | {searched:.2f} | {refined:.2g} | {rms:.2g} | {simulated} | {seconds:.0f} |",
             flush=True,
         )
 

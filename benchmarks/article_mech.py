@@ -4,7 +4,7 @@
 
 The shoulder moves under pseudo-random commands in the study pose, the other joints are passive, all share D
 and S. Printed for every seed: the summed relative error of the search's estimate, as it comes, over all nine
-parameters (the number of the article) and over the eight other than M1, which has no effect; then polished.
+parameters (the number of the article) and over the eight other than M1, which has no effect; then refined.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from pseudo_random import pseudo_random_log
 
-from hydroid.identification.fit import Fit, fit
+from hydroid.fitting.fit import Fit, fit
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Problem
@@ -29,16 +29,16 @@ class Silent:
     def generation(self, row: np.ndarray) -> None:
         """Ignore a generation."""
 
-    def polishing(self, simulated: int) -> None:
-        """Ignore the polish."""
+    def refining(self, simulated: int) -> None:
+        """Ignore the refinement."""
 
 
 def study(algorithm: str, seed: int) -> tuple[Problem, Fit, np.ndarray, float]:
     """Fit one seed; return the problem, the fit, the true parameters and the wall time [s]."""
-    settings, arm = load_settings("article-mech", {"search.algorithm": algorithm, "search.seed": seed})
+    settings = load_settings("article-mech", {"search.algorithm": algorithm, "search.seed": seed})
     values = read_parameters(TRUTH)
-    log = simulate_log(settings, arm, pseudo_random_log(arm.pose("study"), [2]), values, str(TRUTH))
-    problem = Problem(arm, settings, [log])
+    log = simulate_log(settings, pseudo_random_log(settings.arm.pose("study"), [2]), values, str(TRUTH))
+    problem = Problem(settings, [log])
     started = time.perf_counter()
     result = fit(problem, lambda state, memo: None, Silent())
     return problem, result, problem.parameters.vector(values, str(TRUTH)), time.perf_counter() - started
@@ -51,7 +51,7 @@ def main() -> None:
     arguments = parser.parse_args()
     for algorithm in arguments.algorithms:
         print(f"\n{algorithm}: summed relative error by seed")
-        print("| seed | search, nine | search, eight | polished, eight | no effect | simulations | seconds |")
+        print("| seed | search, nine | search, eight | refined, eight | no effect | simulations | seconds |")
         print("| --- | --- | --- | --- | --- | --- | --- |")
         rows: list[np.ndarray] = []
         worst = 0.0
@@ -60,15 +60,15 @@ def main() -> None:
             names = np.array(problem.parameters.names)
             eight = names != "M1"
             searched = relative_error(result.searched.theta, truth)
-            polished = relative_error(result.best.theta, truth)
-            assert result.polish is not None
-            simulated = int(result.history[-1, 2]) + result.polish.evaluations
+            refined = relative_error(result.best.theta, truth)
+            assert result.refinement is not None
+            simulated = int(result.history[-1, 2]) + result.refinement.evaluations
             none = ", ".join(names[result.without_effect])
-            sums = f"{searched.sum():.2f} | {searched[eight].sum():.2f} | {polished[eight].sum():.2g}"
+            sums = f"{searched.sum():.2f} | {searched[eight].sum():.2f} | {refined[eight].sum():.2g}"
             print(f"| {seed} | {sums} | {none} | {simulated} | {seconds:.0f} |", flush=True)
             rows.append(searched)
-            worst = max(worst, float(polished[eight].sum()))
-        print(f"worst after the polish: {worst:.2g}; median relative errors of the search's estimate:")
+            worst = max(worst, float(refined[eight].sum()))
+        print(f"worst after the refinement: {worst:.2g}; median relative errors of the search's estimate:")
         print("  " + ", ".join(f"{n} {e:.2f}" for n, e in zip(names, np.median(rows, axis=0), strict=True)))
 
 

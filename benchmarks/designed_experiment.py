@@ -21,15 +21,15 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.design.design import design, start_poses
-from hydroid.design.experiment import Draw, pose_limits
-from hydroid.design.information import statement_information
-from hydroid.design.trial import Bench, violation
-from hydroid.identification.polishing import polish_estimate
+from hydroid.experiment.commands import Draw, pose_limits
+from hydroid.experiment.design import design, start_poses
+from hydroid.experiment.information import statement_information
+from hydroid.experiment.trial import Bench, violation
+from hydroid.fitting.refinement import refine
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.settings.search import PolishSettings
+from hydroid.settings.search import RefinementSettings
 from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
@@ -44,7 +44,7 @@ def make_settings(values: dict, arguments: argparse.Namespace):
         "outputs": [1, 2, 3, 4, 5, 6],
         "simulation.other_joints": "locked",
         "objective.noise_deg": NOISE_DEG,
-        "known": {"total mass": {"of": MASSES, "value": TOTAL, "sd": TOTAL_SD}},
+        "priors": {"total mass": {"of": MASSES, "value": TOTAL, "sd": TOTAL_SD}},
         "design": {
             "duration_s": arguments.duration,
             "poses": "any",
@@ -55,7 +55,8 @@ def make_settings(values: dict, arguments: argparse.Namespace):
         },
     }
     changes |= {f"parameters.{name}.bounds": [v / 20, 20 * v] for name, v in values.items()}
-    return load_settings("article-mech", changes)
+    settings = load_settings("article-mech", changes)
+    return settings, settings.arm
 
 
 def random_experiments(arm, settings, bench: Bench, count: int) -> list:
@@ -63,7 +64,7 @@ def random_experiments(arm, settings, bench: Bench, count: int) -> list:
     how, rng = settings.design, np.random.default_rng(SEED + 1)
     low, high = pose_limits(arm, np.radians(how.margin_deg))
     joints = [j - 1 for j in settings.outputs]
-    draw = Draw(how, joints, start_poses(arm, settings), low, high, settings.log.period_s, rng)
+    draw = Draw(how, joints, start_poses(settings), low, high, settings.log.period_s, rng)
     found = []
     while len(found) < count:
         experiment = draw.new()
@@ -79,12 +80,12 @@ def refit(arm, settings, log: Log, truth: np.ndarray, count: int) -> np.ndarray:
     for _ in range(count):
         noise = rng.normal(0.0, np.radians(NOISE_DEG), log.angle.shape)
         noise[0] = 0.0
-        total = settings.known["total mass"].model_copy(update={"value": rng.normal(TOTAL, TOTAL_SD)})
-        known = settings.model_copy(update={"known": {"total mass": total}})
-        problem = Problem(arm, known, [replace(log, angle=log.angle + noise)])
+        total = settings.priors["total mass"].model_copy(update={"value": rng.normal(TOTAL, TOTAL_SD)})
+        known = settings.model_copy(update={"priors": {"total mass": total}})
+        problem = Problem(known, [replace(log, angle=log.angle + noise)])
         start = truth * np.exp(rng.uniform(-0.05, 0.05, len(truth)))
-        how = PolishSettings(iterations=30, step_tolerance=1e-6)
-        point = polish_estimate(problem, start, how, lambda simulated: None).point
+        how = RefinementSettings(iterations=30, step_tolerance=1e-6)
+        point = refine(problem, start, how, lambda simulated: None).point
         errors.append(problem.parameters.from_unit(point[None])[0] / truth - 1)
     return np.array(errors)
 
@@ -102,13 +103,13 @@ def main() -> None:
     truth = np.array([values[n] for n in names])
     estimate = truth * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(truth)))
     began = time.perf_counter()
-    found = design(arm, settings, estimate, [], SEED, lambda what, done, of: None)
+    found = design(settings, estimate, [], SEED, lambda what, done, of: None)
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
     period, samples = settings.log.period_s, len(found.best.angle)
-    blind, seeing = (Bench(arm, settings, theta, period, samples) for theta in (estimate, truth))
+    blind, seeing = (Bench(settings, theta, period, samples) for theta in (estimate, truth))
     randoms = random_experiments(arm, settings, blind, arguments.random)
-    stage = Problem(arm, settings, [found.log])
-    known = statement_information(stage.knowledge, stage.parameters, truth)
+    stage = Problem(settings, [found.log])
+    known = statement_information(stage.priors, stage.parameters, truth)
 
     def predicted(experiment) -> np.ndarray:
         told = seeing.told(experiment)
@@ -120,7 +121,7 @@ def main() -> None:
     middle = order[(len(order) - 1) // 2]  # the better of the two in the middle
     typical = np.median(drawn, axis=0)
     logs = [e.log(samples, period) for e in (randoms[middle], found.best.experiment)]
-    logs = [simulate_log(settings, arm, log, values, str(TRUTH)) for log in logs]
+    logs = [simulate_log(settings, log, values, str(TRUTH)) for log in logs]
     for what, log in (("random", logs[0]), ("designed", logs[1])):
         left = violation(log.angle, period, arm, settings.design)
         said = "keeps the limits" if left is None else f"leaves the limits at {left.sample * period:.1f} s"

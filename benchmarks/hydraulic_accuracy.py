@@ -2,7 +2,7 @@
 
 1. One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25
    to 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
-2. The seven-joint arm, all joints driven at once, every actuator with its own random set: 1,000 members.
+2. The seven-joint arm, all joints driven at once, every actuator with its own random set: 1,000 candidates.
 
     python benchmarks/hydraulic_accuracy.py [SETS] [MEMBERS]    ("0 1000": stability alone)
 """
@@ -28,9 +28,9 @@ STEPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (2, 4), (4, 4)]
 def accuracy(sets: int) -> None:
     rng = np.random.default_rng(1)
     command = pulses(rng, 3000)
-    members = parameters(HydraulicSettings(), **draw(rng, sets))
+    candidates = parameters(HydraulicSettings(), **draw(rng, sets))
     began = time.perf_counter()
-    exact, pressure = zip(*(reference(members[i : i + 1], command) for i in range(sets)), strict=True)
+    exact, pressure = zip(*(reference(candidates[i : i + 1], command) for i in range(sets)), strict=True)
     took = time.perf_counter() - began
     angle, bar = np.degrees(exact), 1e-5 * np.array(pressure)
     print(
@@ -39,7 +39,7 @@ def accuracy(sets: int) -> None:
     print("MuJoCo steps | sub-steps | median rms | worst rms | median max | worst max [deg] | p rms [bar]")
     for steps, substeps in STEPS:
         seen: list = []
-        out = simulate(members, command, HydraulicSettings(substeps=substeps), steps, seen)
+        out = simulate(candidates, command, HydraulicSettings(substeps=substeps), steps, seen)
         error = np.degrees(out) - angle
         rms, worst = np.sqrt((error**2).mean(axis=1)), abs(error).max(axis=1)
         p = 1e-5 * np.stack([o.pressure[:, 0] for o, _ in seen], axis=1)
@@ -48,14 +48,14 @@ def accuracy(sets: int) -> None:
         print(f"{steps:12d} | {substeps:9d} | " + " | ".join(f"{value:10.4f}" for value in row))
 
 
-def stability(members: int) -> None:
+def stability(candidates: int) -> None:
     arm, settings, rng = load_arm("hydrolek"), HydraulicSettings(), np.random.default_rng(2)
     joints = list(range(7))
     command = np.stack([pulses(rng, 3000) for _ in joints], axis=1)
     command[-200:] = 0.0
     diverged, fastest, last = 0, np.zeros(7), np.zeros(7)
-    for first in range(0, members, 100):
-        count = min(100, members - first)
+    for first in range(0, candidates, 100):
+        count = min(100, candidates - first)
         driven = DrivenArm(
             arm,
             scatter(nominal_parameters(arm, settings, joints, count), rng),
@@ -67,13 +67,13 @@ def stability(members: int) -> None:
         diverged += int((driven.failed | ~np.isfinite(speed).all(axis=(1, 2))).sum())
         fastest = np.maximum(fastest, np.nanmax(speed, axis=(0, 1)))
         last = np.maximum(last, np.nanmax(speed[:, -50:], axis=(0, 1)))
-    print(f"{members} random parameter sets, seven joints driven at once, 30 s: {diverged} diverged")
+    print(f"{candidates} random parameter sets, seven joints driven at once, 30 s: {diverged} diverged")
     print(f"fastest [rad/s] {fastest.round(2)}, after 1.5 s of rest {last.round(3)}")
 
 
 if __name__ == "__main__":
-    sets, members = (int(number) for number in (sys.argv[1:] + ["24", "1000"][len(sys.argv) - 1 :]))
+    sets, candidates = (int(number) for number in (sys.argv[1:] + ["24", "1000"][len(sys.argv) - 1 :]))
     if sets:
         accuracy(sets)
-    if members:
-        stability(members)
+    if candidates:
+        stability(candidates)

@@ -5,7 +5,7 @@
 Shoulder and elbow are driven and measured, the other joints locked; K, D, S (shared by both), M2 and M6 are
 free, M1, M3, M4 and M5 held as if weighed: from these angles all five are determined. The noise of 0.1 deg is
 white, or a first-order autoregression with a correlation time of 0.15 s; each fit estimates it from its own
-residual. The polish starts at the truth times random factors within 5 %: this is a study of the intervals,
+residual. The refinement starts at the truth times random factors within 5 %: this is a study of the intervals,
 not of the search. The first sample is the start pose and has no noise, unless --noisy-start. The Cramér-Rao
 bound is that of the true noise at the true parameters.
 """
@@ -17,14 +17,14 @@ from dataclasses import replace
 import numpy as np
 from pseudo_random import pseudo_random_log
 
-from hydroid.identifiability.jacobian import jacobian
-from hydroid.identifiability.noise import Noise
-from hydroid.identifiability.uncertainty import uncertainty
-from hydroid.identification.polishing import polish_estimate
+from hydroid.fitting.refinement import refine
 from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.simulating import simulate_log
+from hydroid.uncertainty.covariance import uncertainty
+from hydroid.uncertainty.jacobian import jacobian
+from hydroid.uncertainty.noise import Noise
 
 LEVEL = np.deg2rad(0.1)
 MEMORY = 0.15  # [s]
@@ -36,7 +36,7 @@ CHANGES = {
     "simulation.other_joints": "locked",
     **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
     **{f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M3", "M4", "M5")},
-    "polish.step_tolerance": 1e-6,
+    "refinement.step_tolerance": 1e-6,
 }
 
 
@@ -63,25 +63,27 @@ def bound(problem: Problem, truth: np.ndarray, phi: float) -> np.ndarray:
 
 def study(phi: float, logs: int, seconds: float, *, start: bool) -> None:
     """Fit every log, and print how often each parameter's interval holds the truth."""
-    settings, arm = load_settings("article-mech", CHANGES)
+    settings = load_settings("article-mech", CHANGES)
 
     def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, arm, log, TRUTH, "truth").angle
-        return bool(np.all(angle > arm.lower + 0.05) and np.all(angle < arm.upper - 0.05))
+        angle = simulate_log(settings, log, TRUTH, "truth").angle
+        return bool(np.all(angle > settings.arm.lower + 0.05) and np.all(angle < settings.arm.upper - 0.05))
 
-    drive = pseudo_random_log(arm.pose("study"), JOINTS, duration=seconds, seed=3, allowed=off_the_stops)
-    clean = simulate_log(settings, arm, drive, TRUTH, "truth")
-    problem = Problem(arm, settings, [clean])
+    drive = pseudo_random_log(
+        settings.arm.pose("study"), JOINTS, duration=seconds, seed=3, allowed=off_the_stops
+    )
+    clean = simulate_log(settings, drive, TRUTH, "truth")
+    problem = Problem(settings, [clean])
     truth, free = problem.parameters.vector(TRUTH, "truth"), problem.parameters.free
     least = bound(problem, truth, phi)
     estimates, deviations, hits = [], [], []
     started = time.perf_counter()
-    assert settings.polish is not None
+    assert settings.refinement is not None
     for seed in range(logs):
         rng = np.random.default_rng([seed, int(1000 * phi)])
-        one = Problem(arm, settings, [with_noise(clean, phi, rng, start=start)])
+        one = Problem(settings, [with_noise(clean, phi, rng, start=start)])
         first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-        found = polish_estimate(one, first, settings.polish, lambda _: None)
+        found = refine(one, first, settings.refinement, lambda _: None)
         theta = one.parameters.from_unit(found.point[None])[0]
         told = uncertainty(one, theta)
         estimates.append(theta[free])

@@ -2,10 +2,10 @@
 
     python benchmarks/kill_resume.py --kills 100 --seed 1
 
-Five kinds of run: simple GA, NSGA-II, the polish (with `refine`), multi-start least squares, and a study of
+Five kinds of run: simple GA, NSGA-II, the refinement (with `refine`), multi-start least squares, and a study of
 several seeds. Every run is killed (SIGKILL) twice before it may end, so that resumed runs are killed as well.
 Half of the moments are drawn from the time that the run takes, the earlier the likelier; the others follow
-files: the appearance of a checkpoint's, or any file's, temporary twin, or the growth of the polish's journal.
+files: the appearance of a checkpoint's, or any file's, temporary twin, or the growth of the refinement's journal.
 What a kill has met is read from what it left. All files are compared, but for the log, the lock and the last
 checkpoint but one.
 
@@ -28,21 +28,27 @@ from pathlib import Path
 
 from hydroid.cli import running  # noqa: F401  # what a run imports, once for all
 from hydroid.cli.app import main as hydroid
-from hydroid.identification import search
+from hydroid.fitting import search
 from hydroid.report import page, plots  # noqa: F401
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600
 GA = ["--algorithm", "ga", "--set", "search.ga.population=10"]
 KINDS: dict[str, list[str]] = {
-    "ga": [*GA, "--set", "search.ga.generations=30", "--no-polish"],
-    "nsga2": ["--set", "search.nsga2.population=10", "--set", "search.nsga2.generations=30", "--no-polish"],
-    "polish": [
+    "ga": [*GA, "--set", "search.ga.generations=30", "--no-refinement"],
+    "nsga2": [
+        "--set",
+        "search.nsga2.population=10",
+        "--set",
+        "search.nsga2.generations=30",
+        "--no-refinement",
+    ],
+    "refinement": [
         *GA,
         "--set",
         "search.ga.generations=0",
         "--set",
-        "refine=true",
+        "joint_refinement=true",
         "--set",
         "parameters.M3.fixed=22.5",
     ],
@@ -52,9 +58,9 @@ KINDS: dict[str, list[str]] = {
         "--set",
         "search.multistart.starts=3",
         "--set",
-        "polish.iterations=5",
+        "refinement.iterations=5",
     ],
-    "study": [*GA, "--set", "search.ga.generations=5", "--set", "polish.iterations=5", "--runs", "3"],
+    "study": [*GA, "--set", "search.ga.generations=5", "--set", "refinement.iterations=5", "--runs", "3"],
 }
 OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 """files of a run that tell of its course"""
@@ -135,7 +141,7 @@ def parts(folder: Path, prefix: str) -> set[object]:
 
 def sizes(folder: Path) -> set[object]:
     found = set[object]()
-    for file in (folder / "polish.journal", *folder.glob("seed-*/polish.journal")):
+    for file in (folder / "refinement.journal", *folder.glob("seed-*/refinement.journal")):
         try:
             found.add((file, file.stat().st_size))
         except OSError:
@@ -172,8 +178,8 @@ def phase(folder: Path) -> str:
         return "between runs, or at the end"
     if (run / "estimate.yaml").exists():
         return "report"
-    if (run / "polish.journal").exists():
-        return "polish"
+    if (run / "refinement.journal").exists():
+        return "refinement"
     return (
         "search, after a checkpoint"
         if (run / "checkpoint.npz").exists()

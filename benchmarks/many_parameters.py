@@ -9,7 +9,7 @@ total mass is known to 0.5 kg. Starts: each parameter a factor of 0.1 to 10 off 
 logarithm, which are the bounds too; then moved to where the total mass holds.
 
 Printed for every start, hydroid's and then mujoco.sysid's: rms error, simulations, wall time, and CPU time of
-all threads, which a busy machine changes less. Hydroid's is a complete fit of one start: search, polish,
+all threads, which a busy machine changes less. Hydroid's is a complete fit of one start: search, refinement,
 intervals. Then how many starts reached the optimum, and the intervals of the best. mujoco.sysid needs its
 extra: pip install 'mujoco[sysid]'.
 """
@@ -23,15 +23,15 @@ from pseudo_random import pseudo_random_log
 from scipy.stats import norm
 from sysid_peer import Peer
 
-from hydroid.identifiability.uncertainty import KNOWN
-from hydroid.identification.fit import Fit, fit
-from hydroid.identification.multistart import random_start
+from hydroid.fitting.fit import Fit, fit
+from hydroid.fitting.multistart import random_start
 from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.simulating import simulate_log
+from hydroid.uncertainty.covariance import KNOWN
 
 JOINTS = range(1, 8)
 MASSES = {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -61,12 +61,13 @@ def make_settings(seed: int) -> tuple[FitSettings, Arm]:
     changes = {
         "outputs": list(JOINTS),
         "parameters": parameters,
-        "known": known,
+        "priors": known,
         "objective": {"norm": 2, "segments": {"equal": 1}},
         "search": {"algorithm": "multistart", "seed": seed, "multistart": {"starts": 1}},
-        "polish": {"step_tolerance": TOLERANCE},
+        "refinement": {"step_tolerance": TOLERANCE},
     }
-    return load_settings("article-mech", changes)
+    settings = load_settings("article-mech", changes)
+    return settings, settings.arm
 
 
 def make_log(duration: float) -> Log:
@@ -74,11 +75,11 @@ def make_log(duration: float) -> Log:
     settings, arm = make_settings(1)
 
     def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, arm, log, TRUTH, "truth").angle
+        angle = simulate_log(settings, log, TRUTH, "truth").angle
         return bool(np.all((angle > arm.lower + MARGIN) & (angle < arm.upper - MARGIN)))
 
     commands = pseudo_random_log(arm.pose("study"), list(JOINTS), duration, allowed=off_the_stops)
-    log = simulate_log(settings, arm, commands, TRUTH, "truth")
+    log = simulate_log(settings, commands, TRUTH, "truth")
     log.angle[1:] += np.random.default_rng(1).normal(0.0, NOISE, log.angle[1:].shape)
     return log
 
@@ -110,7 +111,7 @@ class Table:
     def add(self, who: str, seed: int, theta: np.ndarray, simulated: int, clock: "Clock") -> None:
         """Print a row."""
         rows = self._problem.residuals(theta[None])
-        scores = self._problem.knowledge.scores(theta[None])[0]
+        scores = self._problem.priors.scores(theta[None])[0]
         cost = float(np.sum((rows / NOISE) ** 2) + np.sum(scores**2))
         self.found.append(theta)
         self.cost.append(cost)
@@ -168,7 +169,7 @@ def main() -> None:
     arguments = parser.parse_args()
     settings, arm = make_settings(1)
     log = make_log(arguments.duration)
-    problem = Problem(arm, settings, [log])
+    problem = Problem(settings, [log])
     at_truth = problem.rms(problem.residuals(problem.parameters.vector(TRUTH, "truth")[None]))[0]
     print(f"rms error at the true parameters: {np.rad2deg(at_truth):.5g} deg")
     print("| program | start | rms [deg] | simulations | wall [s] | CPU [s] |")
@@ -177,10 +178,10 @@ def main() -> None:
     for seed in range(1, arguments.starts + 1):
         settings, _ = make_settings(seed)
         clock = Clock()
-        result = fit(Problem(arm, settings, [log]), lambda state, memo: None, Silent())
+        result = fit(Problem(settings, [log]), lambda state, memo: None, Silent())
         clock.stop()
-        assert result.polish is not None
-        simulated = int(result.history[-1, 2]) + result.polish.evaluations
+        assert result.refinement is not None
+        simulated = int(result.history[-1, 2]) + result.refinement.evaluations
         ours.add("hydroid", seed, result.best.theta, simulated, clock)
         fits.append(result)
     for seed in range(1, arguments.peer_starts + 1):

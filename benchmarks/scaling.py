@@ -36,11 +36,9 @@ STAGES = {"mechanical": "article-mech", "hydraulic": "article-hyd"}
 
 def problem_of(config: str, executor: Executor | None, threads: int) -> Problem:
     changes = {"simulation.other_joints": "passive", "simulation.threads": threads}
-    settings, arm = load_settings(config, changes)
-    log = pseudo_random_log(arm.pose("study"), [2], duration=75.01)
-    return (
-        Problem(arm, settings, [log]) if executor is None else SpreadProblem(arm, settings, [log], executor)
-    )
+    settings = load_settings(config, changes)
+    log = pseudo_random_log(settings.arm.pose("study"), [2], duration=75.01)
+    return Problem(settings, [log]) if executor is None else SpreadProblem(settings, [log], executor)
 
 
 def sets(problem: Problem, n: int) -> np.ndarray:
@@ -73,14 +71,14 @@ def overhead(executors: dict[str, Executor], rounds: int) -> None:
 
 
 def chunk_cost(stage: str, rounds: int) -> None:
-    """Print start and cost of a member of one chunk in one thread, by a line through two sizes."""
+    """Print start and cost of a candidate of one chunk in one thread, by a line through two sizes."""
     problem = problem_of(STAGES[stage], None, 1)
     few, many = 1, 20
     calls = {str(n): partial(problem.evaluate, sets(problem, n)) for n in (few, many)}
     took = medians(calls, rounds, time.process_time)
-    member = (took[str(many)] - took[str(few)]) / (many - few)
-    start = max(took[str(few)] - member * few, 0.0)
-    print(f"{stage}: a chunk costs {1e3 * start:.0f} ms and {1e3 * member:.1f} ms a member")
+    candidate = (took[str(many)] - took[str(few)]) / (many - few)
+    start = max(took[str(few)] - candidate * few, 0.0)
+    print(f"{stage}: a chunk costs {1e3 * start:.0f} ms and {1e3 * candidate:.1f} ms a candidate")
 
 
 def table(stage: str, executors: dict[str, Executor], rounds: int) -> None:

@@ -72,7 +72,7 @@ class Peer:
         """Return sysid's residuals and those of what is known; x has shape (P,) or (P, n)."""
         self.rollouts += 1 if x.ndim == 1 else x.shape[1]
         rows, predicted, measured = self._residual(x, parameters)
-        scores = self._weight * self._problem.knowledge.scores(np.atleast_2d(x.T)).T
+        scores = self._weight * self._problem.priors.scores(np.atleast_2d(x.T)).T
         return [*rows, scores[:, 0] if x.ndim == 1 else scores], predicted, measured
 
     def _build(self, parameters: sysid.ParameterDict, _: mujoco.MjSpec) -> mujoco.MjModel:

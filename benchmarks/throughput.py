@@ -1,7 +1,7 @@
 """What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench`).
 
-A population (70 members, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
-on the same model and members, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
+A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
+on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
 search's own share of the wall time.
 """
 
@@ -18,7 +18,7 @@ from pseudo_random import pseudo_random_log
 
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.identification.search import Search
+from hydroid.fitting.search import Search
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm
@@ -30,32 +30,32 @@ MEMBERS, REPEATS = 70, 9
 
 def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm]:
     changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
-    settings, arm = load_settings("article-mech", changes)
-    log = pseudo_random_log(arm.pose("study"), [2], duration=75.01)
-    log = simulate_log(settings, arm, log, read_parameters(TRUTH), str(TRUTH))
-    return Problem(arm, settings, [log]), arm
+    settings = load_settings("article-mech", changes)
+    log = pseudo_random_log(settings.arm.pose("study"), [2], duration=75.01)
+    log = simulate_log(settings, log, read_parameters(TRUTH), str(TRUTH))
+    return Problem(settings, [log]), settings.arm
 
 
 def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
-    """Return MuJoCo's own rollout of the same members, written without hydroid's simulation."""
-    log, members = problem.logs[0], problem.stage.members(theta).arm
+    """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
+    log, candidates = problem.logs[0], problem.stage.candidates(theta).arm
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm.model, arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
     reduced.model.qpos_spring[:] = log.angle[0, moving]
     batch = Batch(reduced.model, nsim=len(theta))
-    inertials = reduced.inertials(members.mass)
+    inertials = reduced.inertials(candidates.mass)
     for name in ("mass", "inertia", "ipos", "iquat"):
         batch.expand(f"body_{name}")[:] = getattr(inertials, name)
-    batch.expand("dof_damping")[:] = members.damping[:, moving]
-    batch.expand("jnt_stiffness")[:] = members.stiffness[:, moving]
+    batch.expand("dof_damping")[:] = candidates.damping[:, moving]
+    batch.expand("jnt_stiffness")[:] = candidates.stiffness[:, moving]
     batch.set_const()
     steps = len(log.time) - 1
     batch.reset()
     batch.bind("qpos")[:] = log.angle[0, moving]
     bias = batch.bind("qfrc_bias")
     batch.forward()
-    torque = bias[:, None] + members.gain[:, None, moving] * log.command[:-1, moving]
+    torque = bias[:, None] + candidates.gain[:, None, moving] * log.command[:-1, moving]
     out = {"qpos": np.empty((len(theta), steps, len(moving)))}
     applied = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
 
@@ -101,9 +101,9 @@ def hydraulic_cost() -> None:
     mechanical, _ = make_problem("passive")
     problems = {"mechanical": mechanical}
     for what, joints in (("the shoulder's hydraulics", [2]), ("all seven joints'", list(range(1, 8)))):
-        settings, arm = load_settings("article-hyd", {"simulation.other_joints": "passive"})
-        log = pseudo_random_log(arm.pose("study"), joints, duration=75.01)
-        problems[what] = Problem(arm, settings, [log])
+        settings = load_settings("article-hyd", {"simulation.other_joints": "passive"})
+        log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
+        problems[what] = Problem(settings, [log])
     rng = np.random.default_rng(0)
     calls = {
         what: partial(p.evaluate, p.parameters.from_unit(rng.random((MEMBERS, int(p.parameters.free.sum())))))
@@ -144,7 +144,7 @@ def main() -> None:
     rng = np.random.default_rng(0)
     problem, _ = make_problem("locked")
     theta = problem.parameters.from_unit(rng.random((MEMBERS, int(problem.parameters.free.sum()))))
-    print(f"{MEMBERS} members, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} rounds")
+    print(f"{MEMBERS} candidates, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} rounds")
     measure(theta)
     hydraulic_cost()
     for algorithm in ("ga", "nsga2"):

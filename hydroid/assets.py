@@ -31,4 +31,4 @@ def find_config(name: str | Path, beside: Path | None = None) -> Path:
             if is_file(candidate):
                 return candidate
     known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
-    raise SettingsError("no such config", where=str(name), cure=f"give a YAML file or one of: {known}")
+    raise SettingsError("no such config", where=str(name), hint=f"give a YAML file or one of: {known}")

@@ -54,7 +54,7 @@ def collect(names: Sequence[str], out: Path, tell: Callable[[str], None]) -> Col
         RunError: no run is left, runs differ in more than their seeds, or `out` cannot be written.
     """
     if RunFolder(out).exists:
-        raise RunError("is a run itself", where=f"--out {out}", cure="name another folder")
+        raise RunError("is a run itself", where=f"--out {out}", hint="name another folder")
     runs: list[_Run] = []
     for path in _folders(names):
         try:
@@ -62,8 +62,8 @@ def collect(names: Sequence[str], out: Path, tell: Callable[[str], None]) -> Col
         except HydroidError as error:
             tell(f"left out: {error}")
     if not runs:
-        cure = "finish one that was stopped with --resume"
-        raise RunError("no finished run is there", where=" ".join(names), cure=cure)
+        hint = "finish one that was stopped with --resume"
+        raise RunError("no finished run is there", where=" ".join(names), hint=hint)
     runs.sort(key=lambda run: (run.result.seed, run.result.path))
     _refuse_others(runs, tell)
     once: dict[int, RunResult] = {}
@@ -92,12 +92,12 @@ def _read(path: Path) -> _Run:
     identity = folder.identity()
     if identity.get("status") != "done":
         what = f"is not finished ({identity.get('status')})"
-        raise RunError(what, where=str(path), cure="finish it with --resume")
+        raise RunError(what, where=str(path), hint="finish it with --resume")
     for name in ("config.yaml", "arm.yaml"):
         if not (path / name).is_file() or file_hash(path / name) != identity.get("files", {}).get(name):
             raise RunError("is gone, or has changed since the run began", where=str(path / name))
-    settings, arm = folder.settings()
-    parameters = Stage(arm, settings).parameters
+    settings = folder.settings()
+    parameters = Stage(settings).parameters
     return _Run(identity, settings, parameters, _result(path, settings.search.seed, parameters))
 
 
@@ -128,7 +128,7 @@ def _refuse_others(runs: Sequence[_Run], tell: Callable[[str], None]) -> None:
         tell(f"{path}: {words}")
     if differences:
         what = f"{len(differences)} of {len(runs)} runs differ from {first.result.path} in more than the seed"
-        raise RunError(what, cure="collect them apart")
+        raise RunError(what, hint="collect them apart")
 
 
 def _difference(first: _Run, run: _Run) -> str:

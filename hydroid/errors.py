@@ -14,17 +14,17 @@ class HydroidError(Exception):
     Args:
         what: what is wrong, a clause without a full stop.
         where: the file, with line, column or setting where known.
-        cure: what is allowed, or what to do.
+        hint: what is allowed, or what to do.
     """
 
-    def __init__(self, what: str, *, where: str = "", cure: str = "") -> None:
-        self.what, self.where, self.cure = what, where, cure
+    def __init__(self, what: str, *, where: str = "", hint: str = "") -> None:
+        self.what, self.where, self.hint = what, where, hint
         text = f"{where}: {what}" if where else what
-        super().__init__(_one_line(f"{text}; {cure}" if cure else text))
+        super().__init__(_one_line(f"{text}; {hint}" if hint else text))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
-        return _rebuild, (type(self), self.what, self.where, self.cure)
+        return _rebuild, (type(self), self.what, self.where, self.hint)
 
 
 def _one_line(text: str) -> str:
@@ -33,8 +33,8 @@ def _one_line(text: str) -> str:
     return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} ... {plain[-LONGEST // 2 :]}"
 
 
-def _rebuild(kind: type[HydroidError], what: str, where: str, cure: str) -> HydroidError:
-    return kind(what, where=where, cure=cure)
+def _rebuild(kind: type[HydroidError], what: str, where: str, hint: str) -> HydroidError:
+    return kind(what, where=where, hint=hint)
 
 
 class LogError(HydroidError):

@@ -15,9 +15,9 @@ import numpy as np
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution import Executor
-from hydroid.identification.fit import Fit, Watcher, fit
-from hydroid.identification.search import check_search
-from hydroid.identification.validation import ErrorIndices, error_indices
+from hydroid.fitting.fit import Fit, Watcher, fit
+from hydroid.fitting.search import check_search
+from hydroid.fitting.validation import ErrorIndices, error_indices
 from hydroid.log import Finding, Log, Warn, check_log, read_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
@@ -25,7 +25,6 @@ from hydroid.problem.spread import SpreadProblem
 from hydroid.report.write import write_report
 from hydroid.run.folder import RunFolder
 from hydroid.run.run_log import log_end, log_start
-from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 from hydroid.settings.load import load, read_yaml
 from hydroid.simulating import respond
@@ -33,45 +32,40 @@ from hydroid.simulating import respond
 _log = logging.getLogger(__name__)
 
 
-def load_settings(config: str | Path, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
+def load_settings(config: str | Path, overrides: dict[str, Any] | None = None) -> FitSettings:
     """Read a fit's settings, and the arm they name, from a path or a shipped config's name."""
-    path = find_config(config)
-    settings = load(path, FitSettings, overrides)
-    return settings, load_arm(settings.arm, path.parent)
+    return load(find_config(config), FitSettings, overrides)
 
 
-def read_logs(
-    paths: Sequence[Path], settings: FitSettings, arm: Arm, warn: Warn, repair: bool = False
-) -> list[Log]:
+def read_logs(paths: Sequence[Path], settings: FitSettings, warn: Warn, repair: bool = False) -> list[Log]:
     """Read logs as the settings map them; warnings and notes go to `warn`.
 
     Raises:
         LogError: the first fault that cannot be worked around.
     """
-    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    ranges = np.stack([settings.arm.lower, settings.arm.upper], axis=1)
     logs: list[Log] = []
     for path in paths:
         log, findings = read_log(path, settings.log, ranges, outputs=settings.outputs, repair=repair)
         for finding in findings:
             warn(finding)
         # what the log does not measure stands in the settings' pose
-        pose = np.where(log.measured, log.angle, arm.pose(settings.start_pose))
+        pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         logs.append(replace(log, angle=pose))
     return logs
 
 
 def check_logs(
-    paths: Sequence[Path], settings: FitSettings, arm: Arm, *, repair: bool = False
+    paths: Sequence[Path], settings: FitSettings, *, repair: bool = False
 ) -> Iterator[tuple[Path, Log | None, list[Finding]]]:
     """Check logs one by one: all that was found, and the log where it can be used."""
-    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    ranges = np.stack([settings.arm.lower, settings.arm.upper], axis=1)
     for path in paths:
         yield path, *check_log(path, settings.log, ranges, outputs=settings.outputs, repair=repair)
 
 
 def fit_logs(
     settings: FitSettings,
-    arm: Arm,
     paths: Sequence[Path],
     out: Path,
     watch: Watcher,
@@ -85,7 +79,6 @@ def fit_logs(
 
     Args:
         settings: the fit's settings.
-        arm: the arm.
         paths: the logs.
         out: the run folder.
         watch: is told how far the fit is.
@@ -99,23 +92,21 @@ def fit_logs(
     """
     _refuse_stray_payloads(settings, paths)
     findings: list[Finding] = []
-    logs = read_logs(paths, settings, arm, findings.append, repair)
+    logs = read_logs(paths, settings, findings.append, repair)
     for finding in findings:
         warn(finding)
-    problem = (
-        Problem(arm, settings, logs) if executor is None else SpreadProblem(arm, settings, logs, executor)
-    )
+    problem = Problem(settings, logs) if executor is None else SpreadProblem(settings, logs, executor)
     folder = RunFolder(out)
     if not folder.exists:
         check_search(problem)
     elif not resume:
-        cure = "continue it with --resume, or choose another --out"
-        raise RunError("holds a run already", where=str(out), cure=cure)
+        hint = "continue it with --resume, or choose another --out"
+        raise RunError("holds a run already", where=str(out), hint=hint)
     with folder.owned():
         log_start(settings, paths, findings)
         began = time.monotonic()
         try:
-            result = _fit(folder, problem, arm, paths, watch)
+            result = _fit(folder, problem, paths, watch)
         except KeyboardInterrupt:
             _log.info("interrupted after %.0f s; --resume goes on", time.monotonic() - began)
             folder.status("interrupted")
@@ -127,17 +118,17 @@ def fit_logs(
     return problem, result
 
 
-def _fit(folder: RunFolder, problem: Problem, arm: Arm, paths: Sequence[Path], watch: Watcher) -> Fit:
+def _fit(folder: RunFolder, problem: Problem, paths: Sequence[Path], watch: Watcher) -> Fit:
     """Begin the folder's run, or go on with it, to its report."""
     checkpoint = None
     if folder.exists:
-        folder.check(problem.settings, arm, paths)
+        folder.check(problem.settings, paths)
         checkpoint = folder.checkpoint()
         folder.status("running")
         done = 0 if checkpoint is None else len(checkpoint.state.history)
         _log.info("resumed after generation %d", done)
     else:
-        folder.begin(problem.settings, arm, paths)
+        folder.begin(problem.settings, paths)
     result = fit(problem, folder.save, watch, checkpoint, folder.journal())
     folder.write_estimate(problem, result)
     write_report(folder, problem, result)
@@ -150,7 +141,7 @@ def _refuse_stray_payloads(settings: FitSettings, paths: Sequence[Path]) -> None
     stray = sorted(set(settings.payloads) - {path.name for path in paths})
     if stray:
         names = ", ".join(path.name for path in paths)
-        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", cure=f"logs: {names}")
+        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", hint=f"logs: {names}")
 
 
 def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
@@ -188,10 +179,10 @@ def validate_fits(
     results: list[Validation] = []
     for path in folders:
         folder = RunFolder(path)
-        settings, arm = folder.settings(overrides)
+        settings = folder.settings(overrides)
         source = str(path / "estimate.yaml")
-        for log in read_logs(paths, settings, arm, warn):
-            response = respond(settings, arm, log, folder.estimate(), source, settings.outputs)
+        for log in read_logs(paths, settings, warn):
+            response = respond(settings, log, folder.estimate(), source, settings.outputs)
             indices = {
                 joint: error_indices(log.angle[:, joint - 1], response[:, column])
                 for column, joint in enumerate(settings.outputs)
@@ -211,5 +202,5 @@ def read_parameters(path: Path) -> dict[str, Any]:
     values, _ = read_yaml(path)
     inner = values.get("parameters", values)
     if not isinstance(inner, dict):
-        raise SettingsError("parameters must be a mapping", where=str(path), cure="write `K: 0.2` lines")
+        raise SettingsError("parameters must be a mapping", where=str(path), hint="write `K: 0.2` lines")
     return inner

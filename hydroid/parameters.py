@@ -37,7 +37,7 @@ class ParameterSet:
 
     def __post_init__(self) -> None:
         if not self.free.any():
-            raise SettingsError("no parameter is free", where="parameters", cure="fix fewer of them")
+            raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -81,7 +81,7 @@ class ParameterSet:
         unknown = [name for name in values if name not in self.names]
         if unknown:
             known = ", ".join(self.names)
-            raise SettingsError(f"unknown parameter {unknown[0]!r}", where=source, cure=f"known: {known}")
+            raise SettingsError(f"unknown parameter {unknown[0]!r}", where=source, hint=f"known: {known}")
         return np.array([_number(p, values.get(p.name, p.fixed), source) for p in self.parameters])
 
     def mapping(self, theta: Array) -> dict[str, float]:
@@ -102,6 +102,6 @@ def _number(parameter: Parameter, value: object, source: str) -> float:
         raise SettingsError(
             f"parameter {parameter.name!r} is {value!r}",
             where=source,
-            cure=f"a number from 0, in {parameter.unit}",
+            hint=f"a number from 0, in {parameter.unit}",
         )
     return float(value)

@@ -15,7 +15,6 @@ from hydroid.log import Log, Warn, read_log, write_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import HydraulicSimulation, Response
 
@@ -23,7 +22,7 @@ TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool"
 """columns of a trace, a joint"""
 
 
-def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str) -> Log:
+def simulate_log(settings: FitSettings, log: Log, values: dict[str, Any], source: str) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 
     Joints that the simulation locks stay where they start; prescribed ones keep their logged motion. Stage 2
@@ -40,7 +39,7 @@ def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, An
     pressures: list[int] = []
     if settings.stage == "hyd":
         pressures = [j for j in range(log.joints) if log.driven[j] and settings.log.pressure_of(j + 1)]
-    response = _response(settings, arm, log, values, source, moving, pressures)
+    response = _response(settings, log, values, source, moving, pressures)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None
     if response.pressure is not None:
@@ -49,19 +48,18 @@ def simulate_log(settings: FitSettings, arm: Arm, log: Log, values: dict[str, An
     return replace(log, angle=angle, pressure=pressure)
 
 
-def read_commands(path: Path, settings: FitSettings, arm: Arm, pose: str | None, warn: Warn) -> Log:
+def read_commands(path: Path, settings: FitSettings, pose: str | None, warn: Warn) -> Log:
     """Read a CSV of commands: to start in `pose`, or as logged, or in the settings' pose where unmeasured."""
-    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    ranges = np.stack([settings.arm.lower, settings.arm.upper], axis=1)
     log, findings = read_log(path, settings.log, ranges, angles_required=False)
     for finding in findings:
         warn(finding)
-    start = arm.pose(pose or settings.start_pose)
+    start = settings.arm.pose(pose or settings.start_pose)
     return replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
 
 
 def simulate_file(
     settings: FitSettings,
-    arm: Arm,
     commands: Path,
     values: dict[str, Any],
     source: str,
@@ -77,7 +75,6 @@ def simulate_file(
 
     Args:
         settings: the model's settings.
-        arm: the arm.
         commands: commands, and angles whose first sample is the start pose unless `pose` is given.
         values: parameters by name.
         source: where they came from, for messages.
@@ -92,25 +89,25 @@ def simulate_file(
         SettingsError: a trace is asked of stage 1, or the commands would be overwritten.
     """
     if out.resolve() == commands.resolve():
-        raise SettingsError("would overwrite the commands", where=f"--out {out}", cure="name another file")
+        raise SettingsError("would overwrite the commands", where=f"--out {out}", hint="name another file")
     if trace is not None and settings.stage != "hyd":
-        raise SettingsError("stage mech has no pressures to trace", where=source, cure="set stage: hyd")
-    log = read_commands(commands, settings, arm, pose, warn)
-    result = simulate_log(settings, arm, log, values, source)
+        raise SettingsError("stage mech has no pressures to trace", where=source, hint="set stage: hyd")
+    log = read_commands(commands, settings, pose, warn)
+    result = simulate_log(settings, log, values, source)
     noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
     write_log(out, replace(result, angle=result.angle + noise), settings.log)
     if trace is not None:
-        write_atomic(trace, _trace(settings, arm, log, values, source))
+        write_atomic(trace, _trace(settings, log, values, source))
 
 
-def _trace(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str) -> str:
+def _trace(settings: FitSettings, log: Log, values: dict[str, Any], source: str) -> str:
     """CSV of what the driven joints' actuators do, in bar, L/min, mm and N (N·m of a rotary one)."""
-    stage = Stage(arm, settings)
+    stage = Stage(settings)
     theta = stage.parameters.vector(values, source)
     outputs = [int(j) for j in np.flatnonzero(log.driven)]
-    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings)
+    simulation = make_simulation(load_model(settings.arm.model, settings.arm), log, outputs, settings)
     assert isinstance(simulation, HydraulicSimulation)
-    seen = simulation.trace(stage.members(theta[None]))
+    seen = simulation.trace(stage.candidates(theta[None]))
     names, columns = ["time_s"], [log.time]
     for k, joint in enumerate(seen.joints):
         names += [f"{what}{joint}_{unit}" for what, unit in TRACED]
@@ -128,7 +125,7 @@ def _trace(settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], so
 
 
 def respond(
-    settings: FitSettings, arm: Arm, log: Log, values: dict[str, Any], source: str, joints: Sequence[int]
+    settings: FitSettings, log: Log, values: dict[str, Any], source: str, joints: Sequence[int]
 ) -> Array:
     """Simulate a log's commands with parameters by name; return the angles [rad] of `joints`, shape (T, K).
 
@@ -136,24 +133,25 @@ def respond(
         SettingsError: a parameter that is missing or unknown.
         RunError: the simulation diverged.
     """
-    return _response(settings, arm, log, values, source, joints).angle[0]
+    return _response(settings, log, values, source, joints).angle[0]
 
 
 def _response(
     settings: FitSettings,
-    arm: Arm,
     log: Log,
     values: dict[str, Any],
     source: str,
     joints: Sequence[int],
     pressures: Sequence[int] = (),
 ) -> Response:
-    """The same with the pressures of some joints, 0-based, as a response of one member."""
-    stage = Stage(arm, settings)
+    """The same with the pressures of some joints, 0-based, as a response of one candidate."""
+    stage = Stage(settings)
     theta = stage.parameters.vector(values, source)
     outputs = [j - 1 for j in joints]
-    simulation = make_simulation(load_model(arm.model, arm), arm, log, outputs, settings, pressures)
-    response = simulation.simulate(stage.members(theta[None]))
+    simulation = make_simulation(
+        load_model(settings.arm.model, settings.arm), log, outputs, settings, pressures
+    )
+    response = simulation.simulate(stage.candidates(theta[None]))
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=source)
     return response

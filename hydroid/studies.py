@@ -7,13 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.design.design import Tell, design
 from hydroid.errors import RunError, SettingsError
-from hydroid.identifiability.identifiability import identifiability
-from hydroid.identifiability.intervals import Profile, bootstrap, profile
-from hydroid.identifiability.surface import surface
-from hydroid.identifiability.sweep import sweep
-from hydroid.identifiability.uncertainty import uncertainty
+from hydroid.experiment.design import Tell, design
 from hydroid.jobs import load_settings, read_logs, read_parameters
 from hydroid.log import Warn, write_log
 from hydroid.parameters import Array
@@ -23,8 +18,12 @@ from hydroid.report.studies import surface_table, write_design, write_sensitivit
 from hydroid.report.table import Table
 from hydroid.report.told import Told, write_told
 from hydroid.run.folder import RunFolder
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
+from hydroid.uncertainty.covariance import uncertainty
+from hydroid.uncertainty.directions import identifiability
+from hydroid.uncertainty.intervals import Profile, bootstrap, profile
+from hydroid.uncertainty.surface import surface
+from hydroid.uncertainty.sweep import sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,6 @@ class Subject:
     """A model at an estimate: theta, shape (P,), and where it came from."""
 
     settings: FitSettings
-    arm: Arm
     theta: Array
     source: str
 
@@ -54,19 +52,19 @@ def load_subject(
     """
     if (fit is None) == (params is None):
         what = "needs an estimate" if fit is None else "has two estimates"
-        raise SettingsError(what, cure="give either --fit DIR or --params P.yaml")
+        raise SettingsError(what, hint="give either --fit DIR or --params P.yaml")
     if fit is not None:
         source, values = str(fit / "estimate.yaml"), RunFolder(fit).estimate()
-        settings, arm = load_settings(config, overrides) if config else RunFolder(fit).settings(overrides)
+        settings = load_settings(config, overrides) if config else RunFolder(fit).settings(overrides)
         if config is None and RunFolder(fit).refined:
             settings = freed_settings(settings)
     else:
         assert params is not None
         beside = (params if params.is_dir() else params.parent) / "config.yaml"
         chosen = config or (str(beside) if beside.is_file() else "fit-mech")
-        settings, arm = load_settings(chosen, overrides)
+        settings = load_settings(chosen, overrides)
         source, values = str(params), read_parameters(params)
-    return Subject(settings, arm, Stage(arm, settings).parameters.vector(values, source), source)
+    return Subject(settings, Stage(settings).parameters.vector(values, source), source)
 
 
 def study_sensitivity(subject: Subject, logs: Sequence[Path], out: Path, warn: Warn, tell: Tell) -> Table:
@@ -107,7 +105,7 @@ def study_surface(
     pairs = [tuple(name.strip() for name in text.split(",")) for text in over]
     wrong = next((text for text, pair in zip(over, pairs, strict=True) if len(pair) != 2), None)
     if wrong is not None:
-        raise SettingsError("names no pair of parameters", where=f"--over {wrong}", cure="write --over K,D")
+        raise SettingsError("names no pair of parameters", where=f"--over {wrong}", hint="write --over K,D")
     problem = _problem(subject, logs, warn)
     how = subject.settings.objective
     found = [surface(problem, subject.theta, (a, b), points, around, tell) for a, b in pairs]
@@ -133,12 +131,12 @@ def study_design(
     Raises:
         HydroidError: what the user can mend.
     """
-    settings, arm = subject.settings, subject.arm
-    found = design(arm, settings, subject.theta, read_logs(logs, settings, arm, warn), seed, tell)
+    settings = subject.settings
+    found = design(settings, subject.theta, read_logs(logs, settings, warn), seed, tell)
     write_log(out / "commands.csv", found.log, settings.log)
     write_log(out / "predicted.csv", found.predicted, settings.log)
-    values = Stage(arm, settings).parameters.mapping(subject.theta)
-    return write_design(out, arm, settings.design, found, values)
+    values = Stage(settings).parameters.mapping(subject.theta)
+    return write_design(out, settings.arm, settings.design, found, values)
 
 
 def study_identifiability(
@@ -182,12 +180,12 @@ def study_identifiability(
 
 def middle_subject(config: str, overrides: dict[str, Any]) -> Subject:
     """The model of some settings, every free parameter in the middle of its bounds."""
-    settings, arm = load_settings(config, overrides)
-    parameters = Stage(arm, settings).parameters
+    settings = load_settings(config, overrides)
+    parameters = Stage(settings).parameters
     theta = parameters.from_unit(np.full((1, int(parameters.free.sum())), 0.5))[0]
-    return Subject(settings, arm, theta, "the middle of the bounds")
+    return Subject(settings, theta, "the middle of the bounds")
 
 
 def _problem(subject: Subject, logs: Sequence[Path], warn: Warn) -> Problem:
-    settings, arm = subject.settings, subject.arm
-    return Problem(arm, settings, read_logs(logs, settings, arm, warn))
+    settings = subject.settings
+    return Problem(settings, read_logs(logs, settings, warn))

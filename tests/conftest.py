@@ -38,8 +38,8 @@ def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: i
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def members(arm: Arm, n: int, seed: int = 0) -> ArmParameters:
-    """Random members around the article's true values; every joint shares gain, damping and stiffness."""
+def candidates(arm: Arm, n: int, seed: int = 0) -> ArmParameters:
+    """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
     rng = np.random.default_rng(seed)
     joints = np.ones((1, len(arm.joint_names)))
     shared = [rng.uniform(0.5, 2.0, (n, 1)) * value * joints for value in (0.2, 231.8, 53.4)]

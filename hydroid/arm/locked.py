@@ -112,7 +112,7 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
     if not joints or len(joints) < len(set(moving)):
         wrong = sorted(set(moving) - set(joints))
         what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
-        raise ModelError(what, where=arm.name, cure=f"joints: {', '.join(arm.joint_names)}")
+        raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
     with quiet_mujoco():
         full = spec.compile()
     data = mujoco.MjData(full)
@@ -192,7 +192,7 @@ def _skeleton(
     for option in _OPTIONS:
         setattr(model.opt, option, getattr(full.opt, option))
     disable = mujoco.mjtDisableBit
-    # what the skeleton has not got costs a tenth of a step to look for; a diverged member must stay diverged
+    # what the skeleton has not got costs a tenth of a step to look for; a diverged candidate must stay diverged
     idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
     chosen = [full.joint(name).id for name in joints]

@@ -56,9 +56,9 @@ def mass_properties(path: Path) -> MassProperties:
 def _read(path: Path) -> trimesh.Trimesh:
     where = str(path)
     if not is_file(path):
-        raise MeshError("no such mesh", where=where, cure="put the link's STL there, or correct its name")
+        raise MeshError("no such mesh", where=where, hint="put the link's STL there, or correct its name")
     if path.suffix.lower() not in KINDS:
-        raise MeshError("is neither STL nor OBJ", where=where, cure="export it again, as binary STL")
+        raise MeshError("is neither STL nor OBJ", where=where, hint="export it again, as binary STL")
     if path.suffix.lower() == ".stl":
         _check_stl(path)
     try:
@@ -68,11 +68,11 @@ def _read(path: Path) -> trimesh.Trimesh:
         raise MeshError(
             f"cannot be read ({reason[0] if reason else type(error).__name__})",
             where=where,
-            cure="export it again, as binary STL",
+            hint="export it again, as binary STL",
         ) from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise MeshError(
-            "holds no triangles", where=where, cure="export the solid, not a sketch or an assembly"
+            "holds no triangles", where=where, hint="export the solid, not a sketch or an assembly"
         )
     return mesh
 
@@ -89,44 +89,44 @@ def _check_stl(path: Path) -> None:
     if len(head) == 84 and size == 84 + 50 * faces:
         return
     if head.lstrip()[:5].lower() == b"solid":
-        raise MeshError("is an ASCII STL", where=str(path), cure="export it again, as binary STL")
+        raise MeshError("is an ASCII STL", where=str(path), hint="export it again, as binary STL")
     what = f"is no binary STL: it has {size} bytes"
     what += (
         f", and {faces} faces would need {84 + 50 * faces}" if len(head) == 84 else ", its head alone is 84"
     )
-    raise MeshError(what, where=str(path), cure="copy or export it again, as binary STL")
+    raise MeshError(what, where=str(path), hint="copy or export it again, as binary STL")
 
 
 def _check(mesh: trimesh.Trimesh, where: str) -> None:
     if not np.isfinite(mesh.vertices).all():
-        raise MeshError("has vertices that are not finite", where=where, cure="export it again")
+        raise MeshError("has vertices that are not finite", where=where, hint="export it again")
     mesh.merge_vertices()  # an STL names a corner anew in every face
     extent = float(np.ptp(mesh.vertices, axis=0).max())
     if extent > LARGEST_LINK:
         raise MeshError(
             f"is {extent:.4g} m long, which looks like millimetres",
             where=where,
-            cure="export it in metres, or scale it by 0.001",
+            hint="export it in metres, or scale it by 0.001",
         )
     away = float(np.linalg.norm(mesh.vertices.mean(axis=0)))
     if away > LARGEST_LINK:
         raise MeshError(
-            f"lies {away:.4g} m from its origin", where=where, cure="put the origin in the link's joint"
+            f"lies {away:.4g} m from its origin", where=where, hint="put the origin in the link's joint"
         )
     if not mesh.is_watertight:
         raise MeshError(
             f"is not watertight: {_open_edges(mesh)} edges do not join exactly two faces",
             where=where,
-            cure="close its holes in CAD, and export one solid",
+            hint="close its holes in CAD, and export one solid",
         )
     if not mesh.is_winding_consistent:
         raise MeshError(
-            "has faces that look both inward and outward", where=where, cure="make its normals consistent"
+            "has faces that look both inward and outward", where=where, hint="make its normals consistent"
         )
     if mesh.volume < -SMALLEST_VOLUME:
-        raise MeshError("is inside out: its volume is negative", where=where, cure="flip its normals")
+        raise MeshError("is inside out: its volume is negative", where=where, hint="flip its normals")
     if mesh.volume < SMALLEST_VOLUME:
-        raise MeshError("encloses no volume", where=where, cure="give the solid a thickness, in metres")
+        raise MeshError("encloses no volume", where=where, hint="give the solid a thickness, in metres")
 
 
 def _open_edges(mesh: trimesh.Trimesh) -> int:

@@ -91,7 +91,7 @@ def load_model(path: Path, arm: Arm) -> mujoco.MjSpec:
     """
     where = str(path)
     if not is_file(path):
-        raise ModelError("no such model", where=where, cure="`hydroid build-model` writes it")
+        raise ModelError("no such model", where=where, hint="`hydroid build-model` writes it")
     try:
         with quiet_mujoco():
             spec = mujoco.MjSpec.from_file(where)
@@ -121,7 +121,7 @@ def _match(spec: mujoco.MjSpec, arm: Arm, where: str) -> None:
         for name in wanted:
             if name not in present:
                 raise ModelError(
-                    f"has no {what} {name!r}", where=where, cure=f"it has: {', '.join(filter(None, present))}"
+                    f"has no {what} {name!r}", where=where, hint=f"it has: {', '.join(filter(None, present))}"
                 )
     for joint in spec.joints:
         if joint.name not in arm.joint_names:
@@ -130,7 +130,7 @@ def _match(spec: mujoco.MjSpec, arm: Arm, where: str) -> None:
             raise ModelError(f"joint {joint.name!r} must be a hinge, alone on its body", where=where)
     if joints != list(arm.joint_names):
         raise ModelError(
-            f"joints come in the order {', '.join(joints)}", where=where, cure="list them so in the settings"
+            f"joints come in the order {', '.join(joints)}", where=where, hint="list them so in the settings"
         )
     if spec.equalities:
         raise ModelError("has equality constraints, which hydroid does not simulate", where=where)

@@ -16,8 +16,8 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
         SettingsError: they do not say where.
     """
     if arm.payload is None:
-        cure = "add payload: {carried_by: LINK, at: [x, y, z]} to the arm's file"
-        raise SettingsError(f"{arm.name} has no place for a payload", where="payloads", cure=cure)
+        hint = "add payload: {carried_by: LINK, at: [x, y, z]} to the arm's file"
+        raise SettingsError(f"{arm.name} has no place for a payload", where="payloads", hint=hint)
     loaded = spec.copy()
     loaded.body(arm.payload.carried_by).add_body(
         name="payload",

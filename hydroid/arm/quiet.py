@@ -9,7 +9,7 @@ import mujoco
 
 @contextmanager
 def quiet_mujoco() -> Generator[None]:
-    """Keep MuJoCo from printing a warning for every diverged member, and from writing MUJOCO_LOG.TXT."""
+    """Keep MuJoCo from printing a warning for every diverged candidate, and from writing MUJOCO_LOG.TXT."""
     before = mujoco.MjLogConfig.get()
     silent = mujoco.MjLogConfig.get()
     silent.logto_console = False

@@ -17,9 +17,9 @@ def check(
     """List everything that is wrong or odd about logs; exit 2 where one cannot be used."""
     from hydroid.jobs import check_logs, load_settings
 
-    settings, arm = load_settings(config, overrides(setting))
+    settings = load_settings(config, overrides(setting))
     broken = False
-    for path, log, findings in check_logs(logs, settings, arm, repair=repair):
+    for path, log, findings in check_logs(logs, settings, repair=repair):
         for finding in findings:
             typer.echo(f"{finding.level}: {finding}")
         if log is None:

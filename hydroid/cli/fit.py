@@ -22,7 +22,7 @@ Seed = Annotated[int | None, typer.Option(help="Seed of the search; the same see
 Runs = Annotated[int, typer.Option(min=1, max=10_000, help="Repeat over this many seeds, from --seed on.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run in --out, or begin it.")]
-Polish = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
+Refinement = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
 Threads = Annotated[
     int | None, typer.Option(min=0, max=1024, help="Threads; 0: one a core, or one a worker.")
 ]
@@ -36,7 +36,7 @@ def fit_mech(
     runs: Runs = 1,
     out: Out = None,
     resume: Resume = False,
-    polish: Polish = None,
+    refinement: Refinement = None,
     threads: Threads = None,
     workers: Workers = None,
     dask: Dask = None,
@@ -51,7 +51,7 @@ def fit_mech(
     Writes a run folder: parameter tables, figures, report.html, estimate.yaml, the fitted MJCF, history,
     checkpoint. Tell what the estimate is worth with `hydroid validate` on a log it was not fitted on.
     """
-    changes = _changes(setting, algorithm, seed, threads, polish)
+    changes = _changes(setting, algorithm, seed, threads, refinement)
     from hydroid.cli.running import run_fits
 
     run_fits(
@@ -83,8 +83,10 @@ def fit_hyd(
     runs: Runs = 1,
     out: Out = None,
     resume: Resume = False,
-    polish: Polish = None,
-    refine: Annotated[bool | None, typer.Option(help="Then polish both stages' parameters together.")] = None,
+    refinement: Refinement = None,
+    refine: Annotated[
+        bool | None, typer.Option(help="Then refinement both stages' parameters together.")
+    ] = None,
     threads: Threads = None,
     workers: Workers = None,
     dask: Dask = None,
@@ -99,9 +101,9 @@ def fit_hyd(
     Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as
     fit-mech does.
     """
-    changes = _changes(setting, algorithm, seed, threads, polish)
+    changes = _changes(setting, algorithm, seed, threads, refinement)
     if refine is not None:
-        changes["refine"] = refine
+        changes["joint_refinement"] = refine
     from hydroid.cli.running import run_fits, with_mechanical
 
     if logs:
@@ -128,7 +130,7 @@ def _changes(
     algorithm: str | None,
     seed: int | None,
     threads: int | None,
-    polish: bool | None,
+    refinement: bool | None,
 ) -> dict[str, Any]:
     """The settings that flags replace."""
     changes = overrides(setting)
@@ -140,6 +142,6 @@ def _changes(
         "simulation.threads": threads,
     }
     changes |= {key: value for key, value in flags.items() if value is not None}
-    if polish is False:
-        changes["polish"] = None
+    if refinement is False:
+        changes["refinement"] = None
     return changes

@@ -34,7 +34,9 @@ def identifiability(
     ] = None,
     profile: Annotated[
         str,
-        typer.Option(metavar="K,D", help="Profile likelihood of these parameters; costs a polish a point."),
+        typer.Option(
+            metavar="K,D", help="Profile likelihood of these parameters; costs a refinement a point."
+        ),
     ] = "",
     bootstrap: Annotated[int, typer.Option(min=0, max=100_000, help="Refits with redrawn residuals.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,

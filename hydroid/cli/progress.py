@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from hydroid.cli import stopping
-from hydroid.identification.search import HISTORY
+from hydroid.fitting.search import HISTORY
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 
@@ -57,10 +57,10 @@ class Progress:
         text = f"best {now['best'] * self._scale:.4g}{self._unit}, {rate:.0f} simulations/s"
         self._show(f"{self._step} {now['generation']:.0f} of {self._total}", text, now["generation"])
 
-    def polishing(self, simulated: int) -> None:
-        """Take the number of simulations the polish has made."""
+    def refining(self, simulated: int) -> None:
+        """Take the number of simulations the refinement has made."""
         _stop_if_asked()
-        self._show("polish", f"{simulated} simulations", None)
+        self._show("refinement", f"{simulated} simulations", None)
 
     def _show(self, where: str, text: str, done: float | None) -> None:
         if self._bar is not None:

@@ -12,7 +12,7 @@ from hydroid.cli.progress import Progress
 from hydroid.cli.terminal import shown
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution import open_executor
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.jobs import fit_logs, load_settings, mechanical_values
 from hydroid.log import Warn
 from hydroid.problem.problem import Problem
@@ -20,7 +20,6 @@ from hydroid.report import words
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
 from hydroid.run.folder import RunFolder
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 
 
@@ -41,9 +40,9 @@ def run_fits(
     dask: str | None = None,
 ) -> None:
     """Fit over one seed or several and print the tables, or JSON."""
-    settings, arm = load_settings(config, changes)
+    settings = load_settings(config, changes)
     if not logs:
-        logs, settings, arm = _continued(out, changes, resume, runs)
+        logs, settings = _continued(out, changes, resume, runs)
     out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.name}"
     results: list[tuple[int, Problem, Fit]] = []
     warn = _silent if verbose else warn  # the log has them
@@ -54,9 +53,7 @@ def run_fits(
             folder = out / f"seed-{seed}" if runs > 1 else out
             options = {"resume": resume, "repair": repair}
             with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
-                problem, fit = fit_logs(
-                    seeded, arm, logs, folder, progress, warn, **options, executor=executor
-                )
+                problem, fit = fit_logs(seeded, logs, folder, progress, warn, **options, executor=executor)
             results.append((seed, problem, fit))
             warn = _silent  # the logs are the same for every seed
     table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])
@@ -72,13 +69,13 @@ def run_fits(
 
 def with_mechanical(mech: Path | None, config: str, changes: dict[str, Any]) -> dict[str, Any]:
     """Add what holds stage 1's parameters at its estimate; `--set` still has the last word."""
-    settings, _ = load_settings(config, changes)
+    settings = load_settings(config, changes)
     if mech is not None:
         return mechanical_values(mech, settings) | changes
     open_ = [n for n, p in settings.parameters.items() if p.quantity in MECHANICAL_UNITS and p.fixed is None]
     if open_:
-        cure = "give --mech RUN, or fix them in the config"
-        raise SettingsError(f"stage 2 needs stage 1's {', '.join(open_)}", cure=cure)
+        hint = "give --mech RUN, or fix them in the config"
+        raise SettingsError(f"stage 2 needs stage 1's {', '.join(open_)}", hint=hint)
     return changes
 
 
@@ -103,11 +100,11 @@ def summary(problem: Problem, fit: Fit) -> dict[str, Any]:
 
 def _continued(
     out: Path | None, changes: dict[str, Any], resume: bool, runs: int
-) -> tuple[list[Path], FitSettings, Arm]:
+) -> tuple[list[Path], FitSettings]:
     """The logs and settings of a run that is continued by its folder alone."""
     if not resume or out is None:
         raise SettingsError(
-            "no log given", cure="name at least one LOG.csv, or --resume a run with --out DIR"
+            "no log given", hint="name at least one LOG.csv, or --resume a run with --out DIR"
         )
     if runs > 1:
         raise SettingsError("--runs needs its logs to be named", where="--resume")
@@ -115,9 +112,9 @@ def _continued(
     logs = [Path(name) for name in folder.identity().get("logs", {})]
     missing = [str(p) for p in logs if not p.is_file()]
     if missing or not logs:
-        raise RunError(f"its log {', '.join(missing)} is not there", where=str(out), cure="name the log")
-    settings, arm = folder.settings(changes)
-    return logs, settings, arm
+        raise RunError(f"its log {', '.join(missing)} is not there", where=str(out), hint="name the log")
+    settings = folder.settings(changes)
+    return logs, settings
 
 
 def _silent(finding: object) -> None:

@@ -39,11 +39,10 @@ def simulate(
 
     beside = (params if params.is_dir() else params.parent) / "config.yaml"
     chosen = config or (str(beside) if beside.is_file() else "fit-mech")
-    settings, arm = load_settings(chosen, overrides(setting))
+    settings = load_settings(chosen, overrides(setting))
     values = read_parameters(params)
     simulate_file(
         settings,
-        arm,
         commands,
         values,
         str(params),

@@ -31,7 +31,7 @@ def open_executor(
         try:
             from hydroid.execution.cluster import DaskCluster
         except ImportError as error:
-            cure = "install it: pip install 'hydroid[cluster]'"
-            raise SettingsError(f"Dask is not there ({error})", where="--dask", cure=cure) from None
+            hint = "install it: pip install 'hydroid[cluster]'"
+            raise SettingsError(f"Dask is not there ({error})", where="--dask", hint=hint) from None
         return DaskCluster(dask, settings)
     return nullcontext()

@@ -58,10 +58,10 @@ class DaskCluster:
         try:
             self._client: Any = Client(self._cluster or address, timeout=CONNECT)
         except (OSError, ValueError) as error:
-            cure = "start one with `dask scheduler` and give the address that it prints"
+            hint = "start one with `dask scheduler` and give the address that it prints"
             words = " ".join(str(error).split())
             raise RunError(
-                f"no Dask scheduler answers ({words})", where=f"--dask {address}", cure=cure
+                f"no Dask scheduler answers ({words})", where=f"--dask {address}", hint=hint
             ) from None
         self._kept = ("", "")  # key of the work that the workers have, and its name there
 
@@ -109,7 +109,7 @@ class DaskCluster:
                 raise
             words = " ".join(str(error).split()) or type(error).__name__
             raise RunError(
-                f"the Dask scheduler is gone ({words})", cure="start it anew, and go on with --resume"
+                f"the Dask scheduler is gone ({words})", hint="start it anew, and go on with --resume"
             ) from None
 
     def _answers(self, name: str, chunks: Sequence[Any]) -> list[Answer | None]:
@@ -177,7 +177,7 @@ class _Kept(WorkerPlugin):
             if version(name) != ours:
                 raise RunError(
                     f"a Dask worker has {name} {version(name)}, here is {ours}",
-                    cure="install the same everywhere: others need not give the same bits",
+                    hint="install the same everywhere: others need not give the same bits",
                 )
 
 
@@ -196,7 +196,7 @@ def _taken(future: Any) -> Answer | None:
 
 def _slurm(settings: ClusterSettings) -> Any:
     if shutil.which("sbatch") is None:
-        raise SettingsError("there is no sbatch here", where="--dask slurm", cure="run on a Slurm machine")
+        raise SettingsError("there is no sbatch here", where="--dask slurm", hint="run on a Slurm machine")
     from dask_jobqueue.slurm import SLURMCluster
 
     cluster: Any = SLURMCluster(

@@ -139,8 +139,8 @@ class _Worker:
             self.pipe.recv()
         except (EOFError, OSError):
             self._process.join()
-            cure = "its own words stand above; without --workers none is needed"
-            raise RunError(f"a worker process did not start ({self.end()})", cure=cure) from None
+            hint = "its own words stand above; without --workers none is needed"
+            raise RunError(f"a worker process did not start ({self.end()})", hint=hint) from None
         self._started = True
 
 

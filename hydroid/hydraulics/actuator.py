@@ -5,7 +5,7 @@
             MuJoCo takes one step with qfrc_applied = torque and dof_armature = armature (plus the arm's own)
             angle = actuator.close(state, velocity, mass), and MuJoCo's qpos becomes this angle
 
-J is the number of moving joints, n that of members. `mass` is MuJoCo's sparse mass matrix `M` as bound by
+J is the number of moving joints, n that of candidates. `mass` is MuJoCo's sparse mass matrix `M` as bound by
 `mujoco.batch`, (n, nC), as its last call left it; `entries`, (J, J), says where M[i, j] stands in such a row.
 All joints that move belong in, also those without hydraulics (kind NONE): their inertia couples. Viscous
 damping is the plugin's: MuJoCo's dof_damping must be 0, and its dof_armature the arm's own before `start`.
@@ -54,7 +54,7 @@ class Actuator:
     """All actuators of a population on one model.
 
     Args:
-        parameters: of n members; the coil of an infeasible one has no force, its spool never moves.
+        parameters: of n candidates; the coil of an infeasible one has no force, its spool never moves.
         linkages: of the J joints.
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
@@ -154,12 +154,12 @@ class Actuator:
         kernel.close(self.plugin, state.joints, velocity, mass, angle)
         return angle
 
-    def observe(self, state: ActuatorState, angle: Array, members: slice = slice(None)) -> Observation:
+    def observe(self, state: ActuatorState, angle: Array, candidates: slice = slice(None)) -> Observation:
         """Return pressures, flows, spool and force at `angle` [rad], shape (n, J).
 
-        With one member chosen, n may as well be the samples of a record: its states, one after another.
+        With one candidate chosen, n may as well be the samples of a record: its states, one after another.
         """
-        c, z = self.plugin.coefficients[members], state.joints
+        c, z = self.plugin.coefficients[candidates], state.joints
         driven = c["kind"] != NONE
         fills = _fills(c, angle)
         pressure = [

@@ -1,4 +1,4 @@
-"""One joint of one member during a look-ahead: what the compiled loops of `kernel` do with it.
+"""One joint of one candidate during a look-ahead: what the compiled loops of `kernel` do with it.
 
 c is its record of coefficients, z what it carries from step to step, w its scratch pad (`records` lists
 their fields). Compiled code only: plain numpy belongs to the components, whose laws are called here.

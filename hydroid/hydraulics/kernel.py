@@ -1,4 +1,4 @@
-"""The compiled loop: all joints of every member look ahead over one MuJoCo step.
+"""The compiled loop: all joints of every candidate look ahead over one MuJoCo step.
 
 Oil is stiff: with the arm it rings at 60 to 300 rad/s, so a torque that is computed, then held for 0.01 s, is
 unstable or wrong. Instead the actuators look ahead. With the arm's mass matrix M as it is, and all that is
@@ -21,7 +21,7 @@ that is strong throws the arm about. After the step `close` puts the joint at q 
 e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped solution, of
 second order in the sub-step and stable for any stiffness; their change is first order in MuJoCo's step.
 
-Every member is computed from its own numbers in a fixed order: neither threads nor chunks change a bit of it.
+Every candidate is computed from its own numbers in a fixed order: neither threads nor chunks change a bit of it.
 """
 
 import hashlib
@@ -76,7 +76,7 @@ def substitute(matrix: Any, vector: Any) -> None:
 
 
 class Plugin(NamedTuple):
-    """What stays the same during a run, of n members' J joints."""
+    """What stays the same during a run, of n candidates' J joints."""
 
     coefficients: Any
     """(n, J), of COEFFICIENTS"""
@@ -114,7 +114,7 @@ def make_pad(joints: int) -> Pad:
 @compilable
 def look_ahead(
     plugin: Plugin,
-    member: int,
+    candidate: int,
     state: Any,
     pad: Pad,
     commands: Any,
@@ -125,7 +125,7 @@ def look_ahead(
     torque: Any,
     armature: Any,
 ) -> None:
-    """Look ahead over one step of one member: its rows of what `hydroid.hydraulics.actuator` describes.
+    """Look ahead over one step of one candidate: its rows of what `hydroid.hydraulics.actuator` describes.
 
     `newest` is the row of `commands`, (.., J), that holds now; those before it are its past.
     """
@@ -136,12 +136,12 @@ def look_ahead(
     step = part * period
     for a in range(joints):
         j = order[a]
-        c, z, w = coefficients[member, j], state[j], work[j]
+        c, z, w = coefficients[candidate, j], state[j], work[j]
         begin(c, z, w, angle[j], velocity[j])
         w.inertia = mass[entries[a, a]] - z.armature
         matrix[a, a] = w.inertia
         if a < idle:
-            coast(z, w, damping[member, j], step)
+            coast(z, w, damping[candidate, j], step)
             matrix[a, a] += w.share * step * w.resist
         else:
             command(c, w, commands, newest, j, period, substeps)
@@ -155,10 +155,10 @@ def look_ahead(
     for i in range(substeps):
         for a in range(joints):
             j = order[a]
-            c, z, w = coefficients[member, j], state[j], work[j]
+            c, z, w = coefficients[candidate, j], state[j], work[j]
             if a >= idle:
                 meter(c, w, move_spool(c, z, w, i, step))
-                load(c, w, damping[member, j], step)
+                load(c, w, damping[candidate, j], step)
             drag = w.share * w.stiff + w.resist
             gain[a] = step * (w.push + z.external - drag * w.speed)
             if a >= idle:
@@ -169,7 +169,7 @@ def look_ahead(
         substitute(matrix, gain)
         for a in range(joints):
             j = order[a]
-            settle(coefficients[member, j], state[j], work[j], gain[a], step)
+            settle(coefficients[candidate, j], state[j], work[j], gain[a], step)
     for j in range(joints):
         z, w = state[j], work[j]
         z.way, z.predicted = w.way, w.speed
@@ -182,7 +182,7 @@ def look_ahead(
 
 @compilable
 def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) -> None:
-    """Take over one member's true new velocity [rad/s]; writes the new angle [rad] to `angle`."""
+    """Take over one candidate's true new velocity [rad/s]; writes the new angle [rad] to `angle`."""
     order, entries, period = plugin.order, plugin.entries, plugin.period
     for a in range(order.size):
         z = state[order[a]]
@@ -206,10 +206,10 @@ def advance(
     armature: Any,
     source: int = SOURCE,
 ) -> None:
-    """Let all members look ahead over one step under the last of the commands."""
-    members, joints = state.shape
+    """Let all candidates look ahead over one step under the last of the commands."""
+    candidates, joints = state.shape
     pad, newest = make_pad(joints), commands.shape[0] - 1
-    for n in range(members):
+    for n in range(candidates):
         look_ahead(
             plugin, n, state[n], pad, commands, newest, angle[n], velocity[n], mass[n], torque[n], armature[n]
         )
@@ -217,6 +217,6 @@ def advance(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def close(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any, source: int = SOURCE) -> None:
-    """Let all members take over their true new velocities."""
+    """Let all candidates take over their true new velocities."""
     for n in range(state.shape[0]):
         take_over(plugin, state[n], velocity[n], mass[n], angle[n])

@@ -1,4 +1,4 @@
-"""What an actuator is: its parameters for a whole population, and the geometry that all members share."""
+"""What an actuator is: its parameters for a whole population, and the geometry that all candidates share."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Linkages:
 
 @dataclass(frozen=True)
 class ActuatorParameters:
-    """Parameters of n members' J actuators in SI, shape (n, J) each; what they are: `settings.hydraulics`.
+    """Parameters of n candidates' J actuators in SI, shape (n, J) each; what they are: `settings.hydraulics`.
 
     Of a rotary actuator area_a and area_b are displacements [m³/rad], dead_volume the constant volume of a
     chamber, dry_friction a torque [N·m]. flow_limit is inf where there is none.
@@ -110,7 +110,7 @@ class ActuatorParameters:
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Which members have a force-stroke curve at every actuator, shape (n,)."""
+        """Which candidates have a force-stroke curve at every actuator, shape (n,)."""
         exists = curve_exists(self.force_1, self.force_2, self.stroke_1, self.stroke_2)
         return np.asarray(exists.all(axis=1), dtype=bool)
 
@@ -123,15 +123,15 @@ class ActuatorParameters:
 
 
 def nominal_parameters(
-    arm: Arm, settings: HydraulicSettings, joints: Sequence[int], members: int = 1
+    arm: Arm, settings: HydraulicSettings, joints: Sequence[int], candidates: int = 1
 ) -> ActuatorParameters:
-    """Return what the settings say, the same for all members.
+    """Return what the settings say, the same for all candidates.
 
     Args:
         arm: the arm's settings, for areas and valve openings.
         settings: the hydraulics.
         joints: the moving joints, 0-based, in the order of the stepped model.
-        members: n.
+        candidates: n.
     """
     columns: list[list[float]] = []
     for j in joints:
@@ -145,5 +145,5 @@ def nominal_parameters(
             values["area_a"] = values["area_b"] = actuator.displacement
             values["dead_volume"] = settings.rotary_volume
         columns.append([values[name] * factor for name, (_, factor) in HYDRAULIC_UNITS.items()])
-    table = np.tile(np.array(columns).T[:, None, :], (1, members, 1))
+    table = np.tile(np.array(columns).T[:, None, :], (1, candidates, 1))
     return ActuatorParameters(**dict(zip(HYDRAULIC_UNITS, table, strict=True)))

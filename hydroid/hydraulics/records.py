@@ -39,7 +39,7 @@ WORK = _record(
 def coefficients(
     parameters: ActuatorParameters, linkages: Linkages, settings: HydraulicSettings
 ) -> NDArray[np.void]:
-    """Lay out what the kernel reads of n members' J actuators, shape (n, J)."""
+    """Lay out what the kernel reads of n candidates' J actuators, shape (n, J)."""
     table = np.zeros(parameters.area_a.shape, COEFFICIENTS)
     for source in (parameters, linkages):
         for f in fields(source):

@@ -73,7 +73,7 @@ class Record:
         self,
         level: Literal["error", "warning", "note"],
         what: str,
-        cure: str = "",
+        hint: str = "",
         rows: Sequence[int] | NDArray[np.int64] = (),
         channel: Channel | None = None,
     ) -> Finding:
@@ -82,7 +82,7 @@ class Record:
             last = self.lines[rows[-1]]
             what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to line {last})"
         line = int(self.lines[rows[0]]) if len(rows) else None
-        return Finding(level, what, self.table.source, cure, line, channel.name if channel else "")
+        return Finding(level, what, self.table.source, hint, line, channel.name if channel else "")
 
     def text(self, row: int, column: int) -> str:
         """Return the cell of a row and a channel as it stands in the file."""
@@ -148,12 +148,12 @@ def missing_columns(table: Table, wanted: Sequence[Channel]) -> list[Finding]:
         names += f" and {len(lacking) - _LACKING} more" if len(lacking) > _LACKING else ""
         have = [name for name in table.names if name]
         more = f" and {len(have) - _LISTED} more" if len(have) > _LISTED else ""
-        cure = (
+        hint = (
             f"it has: {', '.join(have[:_LISTED])}{more}; set log.time, log.command, log.angle or log.joints, "
             "where null says that a joint is not in the log"
         )
         what = f"has no column {names}"
-        findings.append(Finding("error", what, table.source, cure, table.header, lacking[0].name))
+        findings.append(Finding("error", what, table.source, hint, table.header, lacking[0].name))
     for name, count in Counter(table.names).items():
         if count > 1 and any(channel.name == name for channel in wanted):
             what = f"has {count} columns of this name"
@@ -161,8 +161,8 @@ def missing_columns(table: Table, wanted: Sequence[Channel]) -> list[Finding]:
     for name, count in Counter(channel.name for channel in wanted).items():
         if count > 1:
             users = " and ".join(str(channel) for channel in wanted if channel.name == name)
-            what, cure = f"one column cannot be {users}", "mend log.joints in the config"
-            findings.append(Finding("error", what, table.source, cure, table.header, name))
+            what, hint = f"one column cannot be {users}", "mend log.joints in the config"
+            findings.append(Finding("error", what, table.source, hint, table.header, name))
     return findings
 
 

@@ -47,10 +47,10 @@ def _holes(record: Record) -> Iterator[Finding]:
             continue
         text = record.text(rows[0], column)
         what = f"{text[:30]!r} is not a number" if text else "the cell is empty"
-        cure = "mend the cell, or use --repair, which bridges holes up to log.repair_s"
+        hint = "mend the cell, or use --repair, which bridges holes up to log.repair_s"
         if channel.kind == "time":
-            cure = "time is a number in log.time.unit (s or ms), not a date or clock time"
-        yield record.finding("error", what, cure, rows, channel)
+            hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
+        yield record.finding("error", what, hint, rows, channel)
 
 
 def _time(record: Record, settings: LogSettings) -> Iterator[Finding]:
@@ -60,14 +60,14 @@ def _time(record: Record, settings: LogSettings) -> Iterator[Finding]:
     if len(back):
         at = np.flatnonzero(steps <= 0)[0]
         what = f"time does not increase: {time[at + 1]:.12g} s follows {time[at]:.12g} s"
-        cure = "delete or sort the lines, or log the time with more digits"
-        yield record.finding("error", what, cure, back, channel)
+        hint = "delete or sort the lines, or log the time with more digits"
+        yield record.finding("error", what, hint, back, channel)
         return
     duration = time[-1] - time[0] if len(time) else 0.0
     if len(time) < 2 or duration < settings.shortest_s:
         what = f"holds {len(time)} samples over {duration:.6g} s, fewer than {settings.shortest_s:g} s"
-        cure = "give a longer log, set log.time.unit if it is wrong, or lower log.shortest_s"
-        yield record.finding("error", what, cure)
+        hint = "give a longer log, set log.time.unit if it is wrong, or lower log.shortest_s"
+        yield record.finding("error", what, hint)
         return
     period = sample_period(time)
     if period > SLOWEST * settings.period_s:
@@ -85,12 +85,12 @@ def _steps(
     if len(gaps):
         worst = steps[gaps].max()
         what = f"{steps[gaps[0]]:.6g} s without a sample, the usual step is {period:.6g} s"
-        cure = (
+        hint = (
             "fill it with --repair"
             if worst <= longest * (1 + 1e-9) + period
             else (f"cut the log into two files there (--repair bridges up to log.repair_s: {longest:g})")
         )
-        yield record.finding("error", what, cure, rows[1:][gaps], channel)
+        yield record.finding("error", what, hint, rows[1:][gaps], channel)
         return
     uneven = np.flatnonzero(np.abs(per_row - period) > JITTER * period)
     if len(uneven):
@@ -106,10 +106,10 @@ def _outside(record: Record) -> Iterator[Finding]:
         rows = np.flatnonzero((values < channel.low - rounding) | (values > channel.high + rounding))
         if not len(rows):
             continue
-        to_unit, unit, cure = _presented(channel)
+        to_unit, unit, hint = _presented(channel)
         value, low, high = (to_unit * x for x in (values[rows[0]], channel.low, channel.high))
         what = f"{channel} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
-        yield record.finding("error", what, cure, rows, channel)
+        yield record.finding("error", what, hint, rows, channel)
 
 
 def _presented(channel: Channel) -> tuple[float, str, str]:
@@ -117,8 +117,8 @@ def _presented(channel: Channel) -> tuple[float, str, str]:
         return 1.0, "%", "correct the cells, or log.command's scale and offset"
     if channel.kind == "pressure":
         return 1e-5, "bar", "correct the cells, or log.pressure's unit, scale and offset"
-    cure = "correct the cells, log.angle's unit, scale and offset, or the joint's range"
-    return 180 / np.pi, "deg", cure
+    hint = "correct the cells, log.angle's unit, scale and offset, or the joint's range"
+    return 180 / np.pi, "deg", hint
 
 
 def _jumps(record: Record) -> Iterator[Finding]:
@@ -145,12 +145,12 @@ def _constant(record: Record, outputs: Sequence[int]) -> Iterator[Finding]:
         driven, still = np.nan_to_num(u).any(), _is_constant(q)
         if ("angle", joint) in names and still and (driven or joint in outputs):
             what = f"angle of joint {joint} never changes" + (" though it is driven" if driven else "")
-            cure = "check the sensor and the mapping of log.angle"
-            yield record.finding("warning", what, cure, (), names["angle", joint])
+            hint = "check the sensor and the mapping of log.angle"
+            yield record.finding("warning", what, hint, (), names["angle", joint])
         if ("command", joint) in names and joint in outputs and _is_constant(u):
             what = f"command of output joint {joint} is constant at {np.nanmax(u):g} %"
-            cure = "one such log alone tells little: fit it together with others"
-            yield record.finding("warning", what, cure, (), names["command", joint])
+            hint = "one such log alone tells little: fit it together with others"
+            yield record.finding("warning", what, hint, (), names["command", joint])
 
 
 def _is_constant(values: Floats) -> bool:

@@ -77,19 +77,19 @@ def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]
     if early:
         lag = float(np.median(list(early.values())))
         what = f"{_named('command', list(early))} looks {lag:.2f} s early against the angle"
-        cure = f"set log.delay_s: {settings.delay_s + lag:.2f} if the machine has that transport delay"
-        findings.append(Finding("note", what, log.source, cure, column=column(min(early))))
+        hint = f"set log.delay_s: {settings.delay_s + lag:.2f} if the machine has that transport delay"
+        findings.append(Finding("note", what, log.source, hint, column=column(min(early))))
     if late:
         lag = float(np.median(list(late.values())))
         what = f"{_named('angle', list(late))} moves {-lag:.2f} s before the command, as no machine does"
-        cure = f"the log's clocks differ: mend the log, or set log.delay_s: {settings.delay_s + lag:.2f}"
-        findings.append(Finding("warning", what, log.source, cure, column=column(min(late))))
+        hint = f"the log's clocks differ: mend the log, or set log.delay_s: {settings.delay_s + lag:.2f}"
+        findings.append(Finding("warning", what, log.source, hint, column=column(min(late))))
     if against:
         what = f"{_named('angle', against)} moves against the command"
-        cure = (
+        hint = (
             "give log.command or log.angle a negative scale if the axis or the valve is logged the other way"
         )
-        findings.append(Finding("warning", what, log.source, cure, column=column(min(against))))
+        findings.append(Finding("warning", what, log.source, hint, column=column(min(against))))
     return findings
 
 

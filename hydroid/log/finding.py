@@ -15,7 +15,7 @@ class Finding:
         level: `error`: the log cannot be used; `warning`: look at it; `note`: what the reader did.
         what: a clause without a full stop.
         source: the file.
-        cure: what to do.
+        hint: what to do.
         line: [1-based] of the first place, where there is one.
         column: its name in the header, where there is one.
     """
@@ -23,7 +23,7 @@ class Finding:
     level: Literal["error", "warning", "note"]
     what: str
     source: str
-    cure: str = ""
+    hint: str = ""
     line: int | None = None
     column: str = ""
 
@@ -35,7 +35,7 @@ class Finding:
 
     def error(self) -> LogError:
         """Return the finding as the error that ends a command."""
-        return LogError(self.what, where=self.where, cure=self.cure)
+        return LogError(self.what, where=self.where, hint=self.hint)
 
     def __str__(self) -> str:
         return str(self.error())

@@ -68,7 +68,7 @@ def check_log(
     try:
         table = open_table(path)
     except LogError as error:
-        return None, [Finding("error", error.what, error.where, error.cure)]
+        return None, [Finding("error", error.what, error.where, error.hint)]
     wanted = map_channels(settings, ranges)
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:

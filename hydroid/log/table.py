@@ -75,20 +75,20 @@ def open_table(path: Path) -> Table:
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
     if len(lines[longest]) > MAX_LINE:
         raise LogError(
-            f"is longer than {MAX_LINE} characters", where=f"{source}, line {longest + 1}", cure=_IS_CSV
+            f"is longer than {MAX_LINE} characters", where=f"{source}, line {longest + 1}", hint=_IS_CSV
         )
     declared = re.fullmatch(r"sep=([,;\t|]) *", lines[0])
     start = 1 if declared else 0
     content = [*islice((i for i in range(start, len(lines)) if _is_content(lines[i])), 2)]
     if not content:
-        raise LogError("is empty", where=source, cure=_IS_CSV)
+        raise LogError("is empty", where=source, hint=_IS_CSV)
     head, row = lines[content[0]], lines[content[-1]]
     separator = declared[1] if declared else _separator(head, row)
     names = tuple(name.strip() for name in _split(head, separator))
     header = content[0] + 1
     if all(_is_number(name.replace(",", ".")) for name in names if name):
-        cure = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError("has no header: this line holds numbers", where=f"{source}, line {header}", cure=cure)
+        hint = "write the columns' names above it (a line that starts with # is a comment)"
+        raise LogError("has no header: this line holds numbers", where=f"{source}, line {header}", hint=hint)
     return Table(source, lines, header, names, separator)
 
 
@@ -124,7 +124,7 @@ def _decode(path: Path) -> str:
         raise LogError(f"cannot be read ({reason})", where=str(path)) from None
     if len(data) > MAX_BYTES:
         raise LogError(
-            f"is larger than {MAX_BYTES >> 20} MiB", where=str(path), cure="cut it into several logs"
+            f"is larger than {MAX_BYTES >> 20} MiB", where=str(path), hint="cut it into several logs"
         )
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
@@ -135,7 +135,7 @@ def _decode(path: Path) -> str:
         if "\0" not in text:
             return text
         break
-    raise LogError("is not a text file", where=str(path), cure=_IS_CSV)
+    raise LogError("is not a text file", where=str(path), hint=_IS_CSV)
 
 
 def _is_content(line: str, separator: str = ",") -> bool:

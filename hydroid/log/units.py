@@ -41,9 +41,9 @@ def _fractions(record: Record, driven: np.ndarray, moved: Floats) -> Iterator[Fi
     if moved[most] > MOVES:
         joint = int(driven[most]) + 1
         what = f"no command exceeds {FRACTION:g} %, yet joint {joint} turns by {moved[most]:.3g} deg"
-        cure = "if commands are fractions from -1 to 1, set log.command.scale: 100"
+        hint = "if commands are fractions from -1 to 1, set log.command.scale: 100"
         channel = next(c for c in record.channels if c.kind == "command" and c.joint == joint)
-        yield record.finding("warning", what, cure, (), channel)
+        yield record.finding("warning", what, hint, (), channel)
 
 
 def _radians(record: Record, driven: np.ndarray, push: Floats, path: Floats) -> Iterator[Finding]:

@@ -42,14 +42,14 @@ def _check(path: Path, log: Log, channels: list[Channel]) -> None:
     commanded = {channel.joint for channel in channels if channel.kind == "command"}
     for joint in np.flatnonzero(log.driven) + 1:
         if joint not in commanded:
-            cure = f"map a column in log.joints.{joint}.command"
+            hint = f"map a column in log.joints.{joint}.command"
             raise LogError(
-                f"joint {joint} is driven but no column holds its command", where=str(path), cure=cure
+                f"joint {joint} is driven but no column holds its command", where=str(path), hint=hint
             )
     for channel in channels:
         if channel.kind == "angle" and not log.measured[channel.joint - 1]:
-            cure = f"set log.joints.{channel.joint}.angle: null"
-            raise LogError(f"joint {channel.joint} has no angle to write", where=str(path), cure=cure)
+            hint = f"set log.joints.{channel.joint}.angle: null"
+            raise LogError(f"joint {channel.joint} has no angle to write", where=str(path), hint=hint)
 
 
 def _cells(channel: Channel, log: Log, command: Floats) -> Floats:

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from hydroid.arm.model import load_model
 from hydroid.arm.payload import add_payload
 from hydroid.log import Log
-from hydroid.objective.norms import overall_objective
-from hydroid.objective.segments import segment_bounds, segment_objectives
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.knowledge import Knowledge
+from hydroid.problem.norms import overall_objective
+from hydroid.problem.priors import Priors
+from hydroid.problem.segments import segment_bounds, segment_objectives
 from hydroid.problem.stage import Stage
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.objective import SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
@@ -46,29 +45,27 @@ class Problem:
     """Logs, the model that is to reproduce them, and how the difference is measured.
 
     Args:
-        arm: the arm's settings.
         settings: the fit's settings.
         logs: one or more records, each with its own start pose.
 
     Attributes:
         channels: what is compared, in the order of a row of residuals.
-        knowledge: what is known besides the logs.
+        priors: what is known besides the logs.
         measured: all channels in a row, times their weights, shape (R,).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
-    def __init__(self, arm: Arm, settings: FitSettings, logs: Sequence[Log]) -> None:
-        self._arm = arm
-        spec = load_model(arm.model, arm)
+    def __init__(self, settings: FitSettings, logs: Sequence[Log]) -> None:
+        spec = load_model(settings.arm.model, settings.arm)
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
-        self.stage = Stage(arm, settings)
+        self.stage = Stage(settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
-        self.knowledge = Knowledge(settings.known, self.parameters)
+        self.priors = Priors(settings.priors, self.parameters)
         pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [
-            make_simulation(spec, arm, log, outputs, settings, joints)
+            make_simulation(spec, log, outputs, settings, joints)
             for log, joints in zip(logs, pressures, strict=True)
         ]
         self.channels = make_channels(logs, outputs, pressures, settings.objective)
@@ -77,17 +74,17 @@ class Problem:
 
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
-        return Problem(self._arm, freed_settings(self.settings), self.logs)
+        return Problem(freed_settings(self.settings), self.logs)
 
     def first(self, seconds: float) -> "Problem":
         """Return the same problem up to so long after each log's first command, in one segment a channel."""
         objective = self.settings.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
         settings = self.settings.model_copy(update={"objective": objective})
-        return Problem(self._arm, settings, [log.first(seconds) for log in self.logs])
+        return Problem(settings, [log.first(seconds) for log in self.logs])
 
     def theta(self, unit: Array) -> Array:
         """Return parameter sets, (n, P), from points of the unit box, moved to where what is known holds."""
-        return self.knowledge.project(self.parameters.from_unit(unit))
+        return self.priors.project(self.parameters.from_unit(unit))
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
@@ -106,9 +103,9 @@ class Problem:
         return np.concatenate([channel.residual(responses) for channel in self.channels], axis=1)
 
     def responses(self, theta: Array) -> list[Response]:
-        """Simulate theta, shape (n, P); one response of n members a log."""
-        members = self.stage.members(theta)
-        return [simulation.simulate(members) for simulation in self._simulations]
+        """Simulate theta, shape (n, P); one response of n candidates a log."""
+        candidates = self.stage.candidates(theta)
+        return [simulation.simulate(candidates) for simulation in self._simulations]
 
     def rms(self, residuals: Array) -> Array:
         """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""
@@ -145,7 +142,6 @@ def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
 
 def make_simulation(
     spec: mujoco.MjSpec,
-    arm: Arm,
     log: Log,
     outputs: list[int],
     settings: FitSettings,
@@ -155,7 +151,6 @@ def make_simulation(
 
     Args:
         spec: the arm's MJCF.
-        arm: the arm's settings.
         log: the record.
         outputs: joints whose angles are wanted, 0-based.
         settings: the fit's settings.
@@ -163,11 +158,11 @@ def make_simulation(
     """
     payload = settings.payloads.get(Path(log.source).name)
     if payload:
-        spec = add_payload(spec, arm, payload)
-    record = Record(spec, arm, log, outputs, settings.simulation)
+        spec = add_payload(spec, settings.arm, payload)
+    record = Record(spec, settings.arm, log, outputs, settings.simulation)
     if settings.stage == "mech":
         return MechanicalSimulation(record, settings.simulation)
-    return HydraulicSimulation(record, arm, settings.hydraulics, settings.simulation, pressures)
+    return HydraulicSimulation(record, settings.arm, settings.hydraulics, settings.simulation, pressures)
 
 
 class Memo:

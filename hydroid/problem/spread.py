@@ -12,7 +12,6 @@ from hydroid.execution import Executor, Work
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 
 
@@ -32,22 +31,21 @@ class SpreadProblem(Problem):
     kills its workers is infeasible, as one that diverges is; the others of its chunk are not.
 
     Args:
-        arm: the arm's settings.
         settings: the fit's settings; a worker has `simulation.threads` threads, one where that is 0.
         logs: one or more records.
         executor: the workers. They get the compiled problem, and need no file of it.
     """
 
-    def __init__(self, arm: Arm, settings: FitSettings, logs: Sequence[Log], executor: Executor) -> None:
-        super().__init__(arm, settings, logs)
+    def __init__(self, settings: FitSettings, logs: Sequence[Log], executor: Executor) -> None:
+        super().__init__(settings, logs)
         threads = settings.simulation.threads or 1
         simulation = settings.simulation.model_copy(update={"threads": threads})
-        theirs = Problem(arm, settings.model_copy(update={"simulation": simulation}), logs)
+        theirs = Problem(settings.model_copy(update={"simulation": simulation}), logs)
         self._executor, self._work = executor, Work(partial(_compute, theirs))
 
     def freed(self) -> "SpreadProblem":
         """Return the same problem, on the same workers, with every parameter free that has bounds."""
-        return SpreadProblem(self._arm, super().freed().settings, self.logs, self._executor)
+        return SpreadProblem(super().freed().settings, self.logs, self._executor)
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Simulate theta, shape (n, P), on the workers and measure it."""

@@ -13,7 +13,7 @@ from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings, ParameterSettings
 from hydroid.settings.hydraulics import HYDRAULIC_UNITS
-from hydroid.simulation import ArmParameters, Members
+from hydroid.simulation import ArmParameters, Candidates
 
 
 class Stage:
@@ -24,21 +24,21 @@ class Stage:
     and the arm's file have it.
 
     Args:
-        arm: the arm's settings.
         settings: the fit's settings, whose `parameters` say what is estimated.
 
     Raises:
         SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
     """
 
-    def __init__(self, arm: Arm, settings: FitSettings) -> None:
+    def __init__(self, settings: FitSettings) -> None:
+        arm = settings.arm
         self._arm, self._hydraulics = arm, settings.hydraulics if settings.stage == "hyd" else None
         self._slots = {name: _slots(arm, name, p) for name, p in settings.parameters.items()}
         self._quantities = {name: p.quantity for name, p in settings.parameters.items()}
         self._refuse_overlap()
         self.parameters = ParameterSet(tuple(_parameter(name, p) for name, p in settings.parameters.items()))
 
-    def members(self, theta: Array) -> Members:
+    def candidates(self, theta: Array) -> Candidates:
         """Spread theta, shape (n, P), over joints, links and actuators."""
         arm = {f.name: np.zeros((len(theta), len(self._arm.joint_names))) for f in fields(ArmParameters)}
         arm["mass"] = np.tile(self._arm.masses, (len(theta), 1))
@@ -52,7 +52,7 @@ class Stage:
                 arm[quantity][:, slots] = theta[:, column, None]
             elif actuators is not None:
                 getattr(actuators, quantity)[:, slots] = theta[:, column, None] * HYDRAULIC_UNITS[quantity][1]
-        return Members(ArmParameters(**arm), actuators)
+        return Candidates(ArmParameters(**arm), actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
         """Refuse commands that nothing turns into torque: stage 1 needs gain and damping of active joints.
@@ -73,7 +73,7 @@ class Stage:
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
                     where="parameters",
-                    cure="add one, or leave the joint's command out with log.joints",
+                    hint="add one, or leave the joint's command out with log.joints",
                 )
 
     def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
@@ -82,7 +82,7 @@ class Stage:
         The motor of a joint then takes the command in %. Springs are slack at their `springref`, which a
         simulation sets to its start pose.
         """
-        values = self.members(theta[None]).arm
+        values = self.candidates(theta[None]).arm
         for name, mass, nominal in zip(self._arm.link_names, values.mass[0], self._arm.masses, strict=True):
             body = spec.body(name)
             body.fullinertia = np.asarray(body.fullinertia) * (
@@ -105,7 +105,7 @@ class Stage:
                     raise SettingsError(
                         f"{other} and {name} both set the {self._quantities[name]} of the same joint or link",
                         where=f"parameters.{name}",
-                        cure="give each its own joints, or remove one",
+                        hint="give each its own joints, or remove one",
                     )
 
 
@@ -115,7 +115,7 @@ def _slots(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     if settings.link is not None:
         if settings.link not in arm.link_names:
             known = ", ".join(arm.link_names)
-            raise SettingsError(f"no link {settings.link!r}", where=where, cure=f"links: {known}")
+            raise SettingsError(f"no link {settings.link!r}", where=where, hint=f"links: {known}")
         return [arm.link_names.index(settings.link)]
     count = len(arm.joint_names)
     joints = settings.joints if settings.joints is not None else range(1, count + 1)

@@ -9,7 +9,7 @@ from hydroid.files import write_atomic
 from hydroid.hydraulics.parameters import ActuatorParameters
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
-from hydroid.simulation import Members
+from hydroid.simulation import Candidates
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class ActuatorCard:
     range: tuple[float, float]
 
 
-def actuator_card(arm: Arm, member: Members, joint: int, source: str) -> ActuatorCard:
+def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> ActuatorCard:
     """Take one actuator, joint 1-based, out of a parameter set with hydraulics.
 
     Raises:
@@ -30,15 +30,15 @@ def actuator_card(arm: Arm, member: Members, joint: int, source: str) -> Actuato
     """
     if not 1 <= joint <= len(arm.joints):
         raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
-    assert member.actuators is not None
-    all_joints = member.actuators
+    assert candidate.actuators is not None
+    all_joints = candidate.actuators
     p = ActuatorParameters(**{f.name: getattr(all_joints, f.name)[0, joint - 1] for f in fields(all_joints)})
     if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
         raise SettingsError(
             f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
             f"and {p.force_2:g} N at {1e3 * p.stroke_2:g} mm",
             where=source,
-            cure="it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
+            hint="it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
         )
     settings = arm.joints[joint - 1]
     return ActuatorCard(f"Joint {joint}, {settings.name}", p, linkage(settings), settings.range)

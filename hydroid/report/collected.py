@@ -15,13 +15,13 @@ from hydroid.report.write import write_spread, write_table
 class RunResult:
     """What one run found: the search's estimate, and the one to use.
 
-    polished: whether these two differ. without_effect: parameters that the outputs do not feel.
+    refined: whether these two differ. without_effect: parameters that the outputs do not feel.
     """
 
     path: Path
     searched: SeedResult
     best: SeedResult
-    polished: bool
+    refined: bool
     without_effect: frozenset[str]
 
     @property
@@ -48,8 +48,8 @@ def write_collected(out: Path, parameters: ParameterSet, runs: Sequence[RunResul
     """
     ignore = frozenset[str].intersection(*(run.without_effect for run in runs))
     found = {"search": [run.searched for run in runs]}
-    if any(run.polished for run in runs):
-        found["polished"] = [run.best for run in runs]
+    if any(run.refined for run in runs):
+        found["refined"] = [run.best for run in runs]
     table = write_spread(out, parameters, found, [n for n in parameters.names if n in ignore])
     write_table(out, "runs", runs_by_error(parameters, runs))
     return table

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hydroid.identifiability.identifiability import Identifiability
-from hydroid.identifiability.uncertainty import KNOWN, Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import log_names
 from hydroid.report.html import Picture, Section
 from hydroid.report.table import Cell, Table
+from hydroid.uncertainty.covariance import KNOWN, Uncertainty
+from hydroid.uncertainty.directions import Identifiability
 
 FIGURES = {
     "singular_values": "How strongly each direction is felt, in units of the noise: the inverse of its "
@@ -54,8 +54,8 @@ def noise_table(problem: Problem, found: Uncertainty) -> Table:
                 f"{channel.quantity.replace('_', ' ')} [{'deg' if angle else 'bar'}]",
                 left,
                 factor * noise.level,
-                noise.memory * problem.logs[channel.log].period,
-                noise.independent_samples,
+                noise.correlation_time * problem.logs[channel.log].period,
+                noise.effective_sample_size,
                 noise.source,
             )
         )

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import channels
 from hydroid.report.html import Picture, Section, report_html
 from hydroid.report.identifiability import told_section
 from hydroid.report.table import Table, number
 from hydroid.report.words import cautions, norm_label, summary, told
-from hydroid.settings.knowledge import KnownSettings
+from hydroid.settings.priors import PriorSettings
 
 _ALGORITHMS = {
     "ga": "simple genetic algorithm",
@@ -105,7 +105,7 @@ def _facts(arm: str, identity: Mapping[str, Any], problem: Problem) -> tuple[tup
         ("stage", _STAGES[settings.stage]),
         *logs,
         *((f"in the gripper, {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
-        *((f"known: {name}", _statement(s)) for name, s in settings.known.items()),
+        *((f"known: {name}", _statement(s)) for name, s in settings.priors.items()),
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
         ("other joints", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
@@ -114,7 +114,7 @@ def _facts(arm: str, identity: Mapping[str, Any], problem: Problem) -> tuple[tup
     )
 
 
-def _statement(known: KnownSettings) -> str:
+def _statement(known: PriorSettings) -> str:
     """A statement in words."""
     if known.ratio is not None:
         what = " / ".join(known.ratio)
@@ -142,12 +142,12 @@ def _effort(fit: Fit) -> tuple[tuple[str, str], ...]:
             ("evaluations", f"{evaluations:,}, of which {simulated:,} had to be simulated"),
             ("diverged", f"{infeasible:,}"),
         ]
-    if fit.polish is not None:
-        polish = fit.polish
+    if fit.refinement is not None:
+        refinement = fit.refinement
         facts.append(
             (
-                "polish",
-                f"{polish.iterations} iterations, {polish.evaluations:,} simulations: {polish.ending.value}",
+                "refinement",
+                f"{refinement.iterations} iterations, {refinement.evaluations:,} simulations: {refinement.ending.value}",
             )
         )
     return tuple(facts)

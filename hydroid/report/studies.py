@@ -4,11 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.design.design import Design
+from hydroid.experiment.design import Design
 from hydroid.files import write_atomic
-from hydroid.identifiability.surface import Surface
-from hydroid.identifiability.sweep import Sweep
-from hydroid.identifiability.uncertainty import KNOWN
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import file_name, log_names
@@ -18,6 +15,9 @@ from hydroid.report.write import write_figure, write_table
 from hydroid.settings.arm import Arm
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.objective import ObjectiveSettings
+from hydroid.uncertainty.covariance import KNOWN
+from hydroid.uncertainty.surface import Surface
+from hydroid.uncertainty.sweep import Sweep
 
 _READER = {"angle": ("deg", 180 / np.pi), "pressure_a": ("bar", 1e-5), "pressure_b": ("bar", 1e-5)}
 _SHORT = {"angle": "q", "pressure_a": "pA", "pressure_b": "pB"}

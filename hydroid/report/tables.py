@@ -6,8 +6,8 @@ from math import degrees
 
 import numpy as np
 
-from hydroid.identification.fit import Estimate, Fit
-from hydroid.identification.validation import ErrorIndices, error_indices, pooled_indices
+from hydroid.fitting.fit import Estimate, Fit
+from hydroid.fitting.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.parameters import Array, Parameter, ParameterSet, relative_error
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import channels
@@ -133,7 +133,7 @@ def runs_table(
     results: Sequence[SeedResult],
     truth: Mapping[str, float] | None = None,
     ignore: Collection[str] = (),
-    what: str = "polished",
+    what: str = "refined",
 ) -> Table:
     """Median and spread over seeds of each parameter and of the output error.
 

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.files import write_atomic
-from hydroid.identifiability.identifiability import Identifiability
-from hydroid.identifiability.intervals import Profile
-from hydroid.identifiability.uncertainty import Uncertainty
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.html import Section
 from hydroid.report.identifiability import direction_table, noise_table, told_section
 from hydroid.report.table import Cell, Table, known
 from hydroid.report.write import write_figure, write_table
+from hydroid.uncertainty.covariance import Uncertainty
+from hydroid.uncertainty.directions import Identifiability
+from hydroid.uncertainty.intervals import Profile
 
 
 @dataclass(frozen=True, eq=False)

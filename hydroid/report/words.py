@@ -5,21 +5,21 @@ from collections.abc import Collection
 
 import numpy as np
 
-from hydroid.identifiability.patterns import listed
-from hydroid.identifiability.uncertainty import KNOWN, NOT_DETERMINED, WEAK, at_bounds
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 from hydroid.report.table import number, plain
 from hydroid.settings.objective import ObjectiveSettings
+from hydroid.uncertainty.covariance import KNOWN, NOT_DETERMINED, WEAK, at_bounds
+from hydroid.uncertainty.patterns import listed
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
     "average": "mean of the best set of each segment, as in the article",
     "utopia": "closest to the best of every segment at once",
     "best": "lowest error over the whole record",
-    "polished": "least squares from the best of the others",
-    "refined": "least squares over both stages' parameters from there",
+    "refined": "least squares from the best of the others",
+    "joint": "least squares over both stages' parameters from there",
 }
 
 
@@ -115,20 +115,20 @@ def _search_cautions(problem: Problem, fit: Fit) -> list[str]:
         for name, estimate in fit.estimates.items()
         if not math.isfinite(estimate.rms)
     ]
-    if fit.polish is not None:
-        if not fit.polish.ending.converged:
-            said.append(f"The polish ended early: {fit.polish.ending.value}.")
+    if fit.refinement is not None:
+        if not fit.refinement.ending.converged:
+            said.append(f"The refinement ended early: {fit.refinement.ending.value}.")
         if fit.best.overall > fit.searched.overall:
             minimised = _NORMS[problem.settings.objective.norm]
             said.append(
-                f"The polish lowered the rms error; the {minimised}, which the search minimised, rose."
+                f"The refinement lowered the rms error; the {minimised}, which the search minimised, rose."
             )
     else:
-        said.append("The estimate is the search's own, without a polish.")
+        said.append("The estimate is the search's own, without a refinement.")
     return said
 
 
 def summary(fit: Fit) -> str:
     """How well the final estimate does, in a sentence."""
-    name = f"{fit.final} estimate" if fit.final in ("polished", "refined") else "search's estimate"
+    name = f"{fit.final} estimate" if fit.final in ("refined", "joint") else "search's estimate"
     return f"The {name} leaves an rms error of {number(math.degrees(fit.best.rms))} deg on the fitted logs."

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hydroid.files import write_atomic
-from hydroid.identification.fit import Fit
-from hydroid.identification.search import HISTORY
-from hydroid.identification.validation import ErrorIndices
+from hydroid.fitting.fit import Fit
+from hydroid.fitting.search import HISTORY
+from hydroid.fitting.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.problem import Problem
@@ -81,7 +81,7 @@ def write_report(
         **plots.told(fit.uncertainty, fit.identifiability),
     }
     vector = {name: plots.svg(figure) for name, figure in drawn.items()}
-    page = fit_page(folder.settings()[1].name, folder.identity(), problem, fit, tables, vector)
+    page = fit_page(folder.settings().arm.name, folder.identity(), problem, fit, tables, vector)
     written = [write_table(folder.path, name, table) for name, table in tables.items()]
     written += [write_figure(folder.path, name, figure, vector[name]) for name, figure in drawn.items()]
     files = {
@@ -107,8 +107,8 @@ def write_runs(
         if all("no effect" in f for f in each)
     ]
     found = {"search": [SeedResult(seed, fit.searched.theta, fit.searched.rms) for seed, _, fit in results]}
-    if any(fit.polish is not None for _, _, fit in results):
-        found["polished"] = [SeedResult(seed, fit.best.theta, fit.best.rms) for seed, _, fit in results]
+    if any(fit.refinement is not None for _, _, fit in results):
+        found["refined"] = [SeedResult(seed, fit.best.theta, fit.best.rms) for seed, _, fit in results]
     return write_spread(out, parameters, found, ignore, truth)
 
 
@@ -124,7 +124,7 @@ def write_spread(
     Args:
         out: folder to write.
         parameters: of all runs.
-        found: one result a run, by the name of the estimate: `search`, and `polished` where there is one.
+        found: one result a run, by the name of the estimate: `search`, and `refined` where there is one.
         ignore: parameters without effect in any run.
         truth: true values by name.
     """

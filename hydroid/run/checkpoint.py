@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hydroid.errors import RunError
 from hydroid.files import undisturbed, write_atomic
-from hydroid.identification.search import Checkpoint, SearchState
+from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.problem.problem import Memo
 from hydroid.search.algorithm import Population
 
@@ -82,10 +82,10 @@ def _read(file: Path, run: str) -> Checkpoint:
         state = SearchState(population, json.loads(arrays["rng"].tobytes()), arrays["history"])
         memo, owner = (arrays["memo_theta"], arrays["memo_values"]), arrays["run"].tobytes().decode()
     except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
-        cure = "remove the run's checkpoints to begin again from the seed"
-        raise RunError(f"is damaged ({type(error).__name__})", where=str(file), cure=cure) from None
+        hint = "remove the run's checkpoints to begin again from the seed"
+        raise RunError(f"is damaged ({type(error).__name__})", where=str(file), hint=hint) from None
     if owner != run:
-        raise RunError("is another run's", where=str(file), cure="put the run's own checkpoint back")
+        raise RunError("is another run's", where=str(file), hint="put the run's own checkpoint back")
     return Checkpoint(state, memo)
 
 

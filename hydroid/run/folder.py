@@ -15,9 +15,9 @@ import yaml
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.files import remove_parts, write_atomic
-from hydroid.identification.fit import Fit
-from hydroid.identification.journal import Journal
-from hydroid.identification.search import Checkpoint, SearchState
+from hydroid.fitting.fit import Fit
+from hydroid.fitting.journal import Journal
+from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run.checkpoint import read_checkpoint, write_checkpoint
 from hydroid.run.identity import (
@@ -31,7 +31,7 @@ from hydroid.run.identity import (
 )
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
-from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.arm import load_arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
 
@@ -59,21 +59,22 @@ class RunFolder:
             remove_parts(self.path)
             yield
 
-    def begin(self, settings: FitSettings, arm: Arm, logs: Sequence[Path]) -> None:
+    def begin(self, settings: FitSettings, logs: Sequence[Path]) -> None:
         """Write what the run is: settings, the arm it is about, versions, seed, hashes of the logs.
 
         Raises:
             RunError: the folder cannot be written, or holds other files.
         """
         self._refuse_other_files()
-        self._write_model(load_model(arm.model, arm))
+        self._write_model(load_model(settings.arm.model, settings.arm))
+        arm = settings.arm
         local = arm.model_copy(update={"model": Path("model/arm.xml"), "meshes": Path("model/meshes")})
         self._write_yaml("arm.yaml", local.model_dump(mode="json"))
         self._write_yaml("config.yaml", portable(settings))
-        files = {"files": self._hashes(), "origin": model_hash(arm), "status": "running"}
+        files = {"files": self._hashes(), "origin": model_hash(settings.arm), "status": "running"}
         self.write("run.json", json.dumps(identity(settings, logs) | files, indent=2) + "\n")
 
-    def check(self, settings: FitSettings, arm: Arm, logs: Sequence[Path]) -> None:
+    def check(self, settings: FitSettings, logs: Sequence[Path]) -> None:
         """Refuse to continue a run that was another one.
 
         Raises:
@@ -82,10 +83,10 @@ class RunFolder:
         then = self.identity()
         refuse_other_identity(self.path, then, settings, logs)
         self._refuse_changed_files(then.get("files", {}))
-        their_settings, their_arm = self.settings()
-        refuse_other_settings(self.path, their_settings, settings)
-        if arm.model.resolve() != (self.path / "model" / "arm.xml").resolve():  # its own is its own
-            refuse_other_arm(self.path, their_arm, arm, then.get("origin"))
+        theirs = self.settings()
+        refuse_other_settings(self.path, theirs, settings)
+        if settings.arm.model.resolve() != (self.path / "model" / "arm.xml").resolve():  # its own is its own
+            refuse_other_arm(self.path, theirs.arm, settings.arm, then.get("origin"))
 
     def identity(self) -> dict[str, Any]:
         """Read run.json.
@@ -97,27 +98,27 @@ class RunFolder:
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
-            cure = "name a folder that `hydroid fit-mech --out` has made"
+            hint = "name a folder that `hydroid fit-mech --out` has made"
             raise RunError(
                 f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})",
                 where=str(file),
-                cure=cure,
+                hint=hint,
             ) from None
         hashes = [content.get(key, {}) for key in ("logs", "files")] if isinstance(content, dict) else [None]
         if not all(isinstance(h, dict) and all(isinstance(v, str) for v in h.values()) for h in hashes):
             raise RunError("is not a run's description", where=str(file))
         return content
 
-    def settings(self, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
-        """Read back the resolved settings, some of them replaced, and the arm."""
+    def settings(self, overrides: dict[str, Any] | None = None) -> FitSettings:
+        """Read back the resolved settings, some of them replaced."""
         self.identity()  # says what is wrong where the folder holds no run
-        return load(self.path / "config.yaml", FitSettings, overrides), load_arm(self.path / "arm.yaml")
+        return load(self.path / "config.yaml", FitSettings, overrides)
 
     @property
     def refined(self) -> bool:
         """Whether the final estimate is that of a refinement, which frees what was held fixed."""
         file = self.path / "estimate.yaml"
-        return file.exists() and read_yaml(file)[0].get("final") == "refined"
+        return file.exists() and read_yaml(file)[0].get("final") == "joint"
 
     def estimate(self) -> dict[str, Any]:
         """Read the final parameters by name.
@@ -127,7 +128,7 @@ class RunFolder:
         """
         file = self.path / "estimate.yaml"
         if not file.exists():
-            raise RunError("has no estimate yet", where=str(self.path), cure="finish the fit with --resume")
+            raise RunError("has no estimate yet", where=str(self.path), hint="finish the fit with --resume")
         parameters = read_yaml(file)[0].get("parameters")
         if not isinstance(parameters, dict):
             raise RunError("holds no parameters", where=str(file))
@@ -185,8 +186,8 @@ class RunFolder:
         return read_checkpoint(self.path / "checkpoint.npz", self._id())
 
     def journal(self) -> Journal:
-        """What the polish under way has simulated."""
-        return Journal(self.path / "polish.journal")
+        """What the refinement under way has simulated."""
+        return Journal(self.path / "refinement.journal")
 
     def _id(self) -> str:
         """What tells this run's checkpoints from those of others."""
@@ -204,15 +205,15 @@ class RunFolder:
         now = self._hashes()
         for name, known in then.items():
             if now.get(name) != known:
-                cure = "put it back as it was, or choose another --out"
-                raise RunError("has changed since the run began", where=str(self.path / name), cure=cure)
+                hint = "put it back as it was, or choose another --out"
+                raise RunError("has changed since the run began", where=str(self.path / name), hint=hint)
 
     def _refuse_other_files(self) -> None:
         """A folder is the run's where it is empty, or has the run's description or at least its lock."""
         if not self.path.exists() or self.exists or (self.path / LOCK).exists():
             return
         if not self.path.is_dir() or any(self.path.iterdir()):
-            raise RunError("exists and holds no run", where=str(self.path), cure="choose another --out")
+            raise RunError("exists and holds no run", where=str(self.path), hint="choose another --out")
 
     def _write_model(self, spec: mujoco.MjSpec) -> None:
         """Copy the MJCF with its meshes, so that the run can be read where the original is gone."""

@@ -28,7 +28,8 @@ def identity(settings: FitSettings, logs: Sequence[Path]) -> dict[str, Any]:
 
 def portable(settings: FitSettings) -> dict[str, Any]:
     """Settings as they stand in a run folder, with the arm beside them."""
-    return settings.model_copy(update={"arm": "arm.yaml"}).model_dump(mode="json")
+    values = settings.model_dump(mode="json", exclude={"arm"})
+    return {"stage": values.pop("stage"), "arm": "arm.yaml"} | values
 
 
 def refuse_other_identity(
@@ -41,7 +42,7 @@ def refuse_other_identity(
             raise RunError(
                 f"holds a run with other {key}: {then.get(key)}, now {now[key]}",
                 where=str(where),
-                cure="choose another --out",
+                hint="choose another --out",
             )
 
 
@@ -51,7 +52,7 @@ def refuse_other_settings(where: Path, then: FitSettings, now: FitSettings) -> N
         raise RunError(
             f"holds a run with {key} = {old}, now {new}",
             where=str(where),
-            cure="continue it with its own settings, or choose another --out",
+            hint="continue it with its own settings, or choose another --out",
         )
 
 
@@ -71,11 +72,11 @@ def refuse_other_arm(where: Path, then: Arm, now: Arm, model: str | None) -> Non
         raise RunError(
             f"holds a run of an arm with {key} = {before}, now {after}",
             where=str(where),
-            cure="continue it with its own arm, or choose another --out",
+            hint="continue it with its own arm, or choose another --out",
         )
     if model_hash(now) != model:
-        cure = "continue it by `--resume --out` alone, or choose another --out"
-        raise RunError(f"holds a run of another model than {now.model} is now", where=str(where), cure=cure)
+        hint = "continue it by `--resume --out` alone, or choose another --out"
+        raise RunError(f"holds a run of another model than {now.model} is now", where=str(where), hint=hint)
 
 
 def model_hash(arm: Arm) -> str:

@@ -53,8 +53,8 @@ def _take(file: IO[bytes], folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            cure = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {_holder(file)}", where=str(folder), cure=cure) from None
+            hint = "wait for it to end, or choose another --out"
+            raise RunError(f"is in use by {_holder(file)}", where=str(folder), hint=hint) from None
         _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
         return
     try:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.errors import RunError
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.log import Finding
 from hydroid.settings.fit import FitSettings
 

@@ -28,11 +28,11 @@ Bool = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Members and what they scored; nothing ever writes into its arrays.
+    """Candidates and what they scored; nothing ever writes into its arrays.
 
     Attributes:
         chromosomes: shape (n, length), see `coding`.
-        objectives: to be made small, shape (n, m). A member with an objective that is not finite is
+        objectives: to be made small, shape (n, m). A candidate with an objective that is not finite is
             infeasible.
 
     Raises:
@@ -53,15 +53,15 @@ class Population:
 
     @property
     def feasible(self) -> Bool:
-        """Members all of whose objectives are finite, shape (n,)."""
+        """Candidates all of whose objectives are finite, shape (n,)."""
         return feasible(self.objectives)
 
     def take(self, index: NDArray[np.int64]) -> "Population":
-        """The members at `index`, in that order."""
+        """The candidates at `index`, in that order."""
         return Population(self.chromosomes[index], self.objectives[index])
 
     def join(self, other: "Population") -> "Population":
-        """These members, then the others."""
+        """These candidates, then the others."""
         return Population(
             np.concatenate((self.chromosomes, other.chromosomes)),
             np.concatenate((self.objectives, other.objectives)),
@@ -83,7 +83,7 @@ class Algorithm(Protocol):
 
     @property
     def population_size(self) -> int:
-        """Members of a population."""
+        """Candidates of a population."""
         ...
 
     def start(self, rng: Generator) -> Genes:

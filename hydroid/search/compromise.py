@@ -11,16 +11,16 @@ Int = NDArray[np.int64]
 
 
 def segment_best(objectives: Float) -> Int:
-    """The best member of each segment, the thin traces of figure 19.
+    """The best candidate of each segment, the thin traces of figure 19.
 
     Args:
         objectives: shape (n, S).
 
     Returns:
-        Indices, shape (S,); one member may be best in several segments.
+        Indices, shape (S,); one candidate may be best in several segments.
 
     Raises:
-        SettingsError: no member is feasible.
+        SettingsError: no candidate is feasible.
     """
     return _ranked(objectives).argmin(axis=0)
 
@@ -33,16 +33,16 @@ def average(points: Float, objectives: Float) -> Float:
         objectives: shape (n, S).
 
     Returns:
-        Shape (p,): as a rule not a member of the set, and inside the bounds where all members are.
+        Shape (p,): as a rule not a candidate of the set, and inside the bounds where all candidates are.
 
     Raises:
-        SettingsError: no member is feasible.
+        SettingsError: no candidate is feasible.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
 
 def utopia(points: Float, objectives: Float) -> Float:
-    """The member nearest to the utopia point F⁰.
+    """The candidate nearest to the utopia point F⁰.
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far would
     decide alone, so each objective is first divided by its range over the set; one without range is left
@@ -50,13 +50,13 @@ def utopia(points: Float, objectives: Float) -> Float:
 
     Args:
         points: shape (n, p).
-        objectives: shape (n, S), of the Pareto set only: other members would widen the ranges.
+        objectives: shape (n, S), of the Pareto set only: other candidates would widen the ranges.
 
     Returns:
         Shape (p,), the first of equals.
 
     Raises:
-        SettingsError: no member is feasible.
+        SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
     nearest = ideal(objectives)
@@ -66,7 +66,7 @@ def utopia(points: Float, objectives: Float) -> Float:
 
 
 def best(points: Float, overall: Float) -> Float:
-    """The member with the lowest norm over the whole record.
+    """The candidate with the lowest norm over the whole record.
 
     Args:
         points: shape (n, p).
@@ -76,17 +76,17 @@ def best(points: Float, overall: Float) -> Float:
         Shape (p,), the first of equals.
 
     Raises:
-        SettingsError: no member is feasible.
+        SettingsError: no candidate is feasible.
     """
     return points[segment_best(overall[:, None])[0]]
 
 
 def _ranked(objectives: Float) -> Float:
-    """Objectives with inf throughout for infeasible members."""
+    """Objectives with inf throughout for infeasible candidates."""
     usable = feasible(objectives)
     if not usable.any():
         raise SettingsError(
-            "no member of the population could be simulated",
-            cure="check the bounds of the parameters, and the model with `hydroid simulate`",
+            "no candidate of the population could be simulated",
+            hint="check the bounds of the parameters, and the model with `hydroid simulate`",
         )
     return np.where(usable[:, None], objectives, np.inf)

@@ -25,7 +25,7 @@ def derivatives(
     a second batch, unless the bound is there.
 
     Args:
-        residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed member.
+        residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed candidate.
         point: shape (p,), within [0, 1].
         row: residual there, shape (R,).
         width: the step in units of STEP; a wider one looks over small jumps of the residual.

@@ -31,12 +31,12 @@ class SimpleGa:
 
     @property
     def population_size(self) -> int:
-        """Members of a population."""
+        """Candidates of a population."""
         return self.settings.population
 
     @property
     def coding(self) -> Coding:
-        """How members are written as chromosomes."""
+        """How candidates are written as chromosomes."""
         return make_coding(self.settings.coding, self.parameters)
 
     def start(self, rng: Generator) -> Genes:
@@ -50,7 +50,7 @@ class SimpleGa:
         return breed(population.chromosomes[parents], count, self.settings, self.coding, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """The best `elitism` members of the present population, then all offspring."""
+        """The best `elitism` candidates of the present population, then all offspring."""
         if population is None:
             return offspring
         best = np.argsort(_objective(population), kind="stable")[: self.settings.elitism]
@@ -61,7 +61,7 @@ class SimpleGa:
         return self.coding.decode(chromosomes)
 
     def reached(self, population: Population) -> bool:
-        """Whether the best member is as good as the target, where there is one."""
+        """Whether the best candidate is as good as the target, where there is one."""
         target = self.settings.target
         return target is not None and bool(_objective(population).min() <= target)
 

@@ -1,9 +1,9 @@
-"""Polish: bounded least squares from a search's estimate, on `mujoco.minimize.least_squares`.
+"""Refinement: bounded least squares from a search's estimate, on `mujoco.minimize.least_squares`.
 
 MuJoCo's Gauss-Newton / Levenberg-Marquardt works on the box of the parameters. Simulated residuals need
 some things more, which are here:
 
-- Where derivatives fail on both sides of a point (see `derivatives`), the polish ends.
+- Where derivatives fail on both sides of a point (see `derivatives`), the refinement ends.
 - A parameter without effect stays where it is. Its column of the Jacobian is zero or rounding noise, and
   noise scaled to unit length would send it to a bound. It gets a pseudo-measurement of its present value
   instead: a residual that is always zero, with derivative one. The rest of the problem does not change.
@@ -13,7 +13,7 @@ some things more, which are here:
 - Steps that cannot help are not simulated: after a failed step MuJoCo tries shorter ones, down to nothing.
 - Where no step helps, derivatives are taken again over wider differences, and then over narrow ones. A joint
   that meets its stop makes small jumps in the response, and narrow differences see nothing but the jumps.
-- The best point evaluated is returned, whatever ended the polish, and with it the reason by name.
+- The best point evaluated is returned, whatever ended the refinement, and with it the reason by name.
 - Nothing is printed.
 """
 
@@ -26,7 +26,7 @@ from mujoco import minimize
 from numpy.typing import NDArray
 
 from hydroid.search.derivatives import derivatives
-from hydroid.settings.search import PolishSettings
+from hydroid.settings.search import RefinementSettings
 
 Float = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ SOLVED = 1e-20
 
 
 class Ending(Enum):
-    """Why a polish ended."""
+    """Why a refinement ended."""
 
     STEP = "the steps became shorter than the tolerance"
     GRADIENT = "no direction inside the bounds improves the fit"
@@ -59,14 +59,14 @@ class Ending(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Polish:
-    """What a polish found.
+class Refinement:
+    """What a refinement found.
 
     Attributes:
         point: best point of the unit box, shape (p,).
         cost_before: half the sum of the squared residuals at the start; inf if it failed.
         cost_after: the same at `point`, never more than before.
-        evaluations: members simulated.
+        evaluations: candidates simulated.
         iterations: steps accepted.
         ending: why it ended.
     """
@@ -79,12 +79,14 @@ class Polish:
     ending: Ending
 
 
-def polish(start: Float, residuals: Callable[[Float], Float], settings: PolishSettings) -> Polish:
+def least_squares(
+    start: Float, residuals: Callable[[Float], Float], settings: RefinementSettings
+) -> Refinement:
     """Improve a point of the unit box by bounded least squares.
 
     Args:
         start: shape (p,), within [0, 1].
-        residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed member.
+        residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed candidate.
         settings: when to end.
 
     Returns:
@@ -99,7 +101,7 @@ def polish(start: Float, residuals: Callable[[Float], Float], settings: PolishSe
         course.look_again(width)
         ending, more = _descend(course, settings.model_copy(update={"iterations": left}))
         iterations += more
-    return Polish(
+    return Refinement(
         point=course.point,
         cost_before=course.cost_before,
         cost_after=course.cost,
@@ -109,7 +111,7 @@ def polish(start: Float, residuals: Callable[[Float], Float], settings: PolishSe
     )
 
 
-def _descend(course: "_Course", settings: PolishSettings) -> tuple[Ending, int]:
+def _descend(course: "_Course", settings: RefinementSettings) -> tuple[Ending, int]:
     """MuJoCo's least squares from the course's best point; why it ended, and the steps accepted."""
     start, jacobians = course.point, course.jacobians
     try:
@@ -138,7 +140,7 @@ class _StopError(Exception):
 
 
 class _Course:
-    """The course of one polish: what MuJoCo asks for, counted, and the best point so far.
+    """The course of one refinement: what MuJoCo asks for, counted, and the best point so far.
 
     MuJoCo works with columns: points (p, 1), residuals (R + p, 1). The last p residuals are the
     pseudo-measurements, always zero; the others are scaled, see LARGE.
@@ -184,7 +186,7 @@ class _Course:
         pseudo = np.diag((~effective).astype(float))
         return np.concatenate((self._scale * columns.T, pseudo))
 
-    def ending(self, points: list[Float], settings: PolishSettings) -> Ending:
+    def ending(self, points: list[Float], settings: RefinementSettings) -> Ending:
         """The reason for which MuJoCo ended by itself, which it only prints."""
         if not self._tried:
             return Ending.GRADIENT

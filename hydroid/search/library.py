@@ -26,7 +26,7 @@ HUGE = 1e100
 """Objectives from here on are taken as infeasible: libraries square what they are told."""
 
 UNSCALED = 1e6
-"""What infeasible members are told to have while no feasible one has shown the objectives' scale."""
+"""What infeasible candidates are told to have while no feasible one has shown the objectives' scale."""
 
 
 class Engine(Protocol):
@@ -44,7 +44,7 @@ class Engine(Protocol):
 class LibraryAlgorithm:
     """A library's algorithm as ours; its chromosomes are points of the unit box.
 
-    The population is the best `population` members that the run has evaluated, by the crowded comparison
+    The population is the best `population` candidates that the run has evaluated, by the crowded comparison
     of NSGA-II: with one objective the lowest, with several the first fronts.
 
     Args:
@@ -63,7 +63,7 @@ class LibraryAlgorithm:
 
     @property
     def population_size(self) -> int:
-        """Members of a population."""
+        """Candidates of a population."""
         return self.settings.population
 
     def start(self, rng: Generator) -> Genes:
@@ -94,7 +94,7 @@ class LibraryAlgorithm:
 
 
 class _Penalty:
-    """Finite objectives for infeasible members: worse, by their range, than all feasible ones so far."""
+    """Finite objectives for infeasible candidates: worse, by their range, than all feasible ones so far."""
 
     def __init__(self) -> None:
         self._best: Float | float = np.inf
@@ -124,5 +124,5 @@ def need(module: str, extra: str) -> Any:
         raise SettingsError(
             f"the library {library} cannot be imported ({error})",
             where="search.algorithm",
-            cure=f"install it with: pip install 'hydroid[{extra}]'",
+            hint=f"install it with: pip install 'hydroid[{extra}]'",
         ) from None

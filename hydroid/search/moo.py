@@ -50,14 +50,14 @@ def pymoo(settings: PymooSettings, parameters: int, objectives: int) -> LibraryA
         raise SettingsError(
             f"no algorithm {settings.algorithm!r}" + (f"; did you mean {near[0]}?" if near else ""),
             where="search.pymoo.algorithm",
-            cure=f"pymoo has: {', '.join(sorted(known))}",
+            hint=f"pymoo has: {', '.join(sorted(known))}",
         )
     kind, single = known[settings.algorithm]
     if not single and objectives < 2:
         raise SettingsError(
             f"{settings.algorithm} minimises several objectives, and there is one segment",
             where="search.pymoo.algorithm",
-            cure="ask for more with objective.segments, or choose DE, PSO or cmaes",
+            hint="ask for more with objective.segments, or choose DE, PSO or cmaes",
         )
     count = 1 if single else objectives
     return LibraryAlgorithm(

@@ -33,12 +33,12 @@ class Nsga2:
 
     @property
     def population_size(self) -> int:
-        """Members of a population."""
+        """Candidates of a population."""
         return self.settings.population
 
     @property
     def coding(self) -> Coding:
-        """How members are written as chromosomes."""
+        """How candidates are written as chromosomes."""
         return make_coding(self.settings.coding, self.parameters)
 
     def start(self, rng: Generator) -> Genes:
@@ -66,7 +66,7 @@ class Nsga2:
 
 
 def crowded_order(objectives: Float) -> Int:
-    """Members from best to worst by the crowded comparison: lower rank first, then more room around them.
+    """Candidates from best to worst by the crowded comparison: lower rank first, then more room around them.
 
     Args:
         objectives: shape (n, m).
@@ -81,8 +81,8 @@ def crowded_order(objectives: Float) -> Int:
 def tournament(objectives: Float, count: int, rng: Generator) -> Int:
     """Winners of binary tournaments by the crowded comparison.
 
-    The contestants of each round are a random permutation of the population, so that every member
-    competes equally often. No infeasible member beats a feasible one.
+    The contestants of each round are a random permutation of the population, so that every candidate
+    competes equally often. No infeasible candidate beats a feasible one.
 
     Returns:
         Indices of the parents, shape (count,).

@@ -19,11 +19,11 @@ def roulette(objective: Float, count: int, rng: Generator) -> Int:
     """Parents from the weighted roulette wheel, with replacement.
 
     The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness is the
-    distance to the worst feasible member of this population, max(J) - J. The worst itself and infeasible
-    members are never drawn; among equals, and where no member is feasible, all are equally likely.
+    distance to the worst feasible candidate of this population, max(J) - J. The worst itself and infeasible
+    candidates are never drawn; among equals, and where no candidate is feasible, all are equally likely.
 
     Args:
-        objective: J of each member, shape (n,), not finite where infeasible.
+        objective: J of each candidate, shape (n,), not finite where infeasible.
         count: how many to draw.
         rng: source of randomness.
 

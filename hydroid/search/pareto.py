@@ -1,6 +1,6 @@
 """Pareto sets: dominance, ranks, crowding, utopia. All objectives are to be small.
 
-A member with an objective that is not finite is infeasible: every feasible member dominates it.
+A candidate with an objective that is not finite is infeasible: every feasible candidate dominates it.
 """
 
 import numpy as np
@@ -12,12 +12,12 @@ Bool = NDArray[np.bool_]
 
 
 def feasible(objectives: Float) -> Bool:
-    """Members all of whose objectives (n, m) are finite, shape (n,)."""
+    """Candidates all of whose objectives (n, m) are finite, shape (n,)."""
     return np.all(np.isfinite(objectives), axis=1)
 
 
 def dominates(values: Float) -> Bool:
-    """Whether member i (row) dominates member j (column): nowhere worse, somewhere better, shape (n, n)."""
+    """Whether candidate i (row) dominates candidate j (column): nowhere worse, somewhere better, shape (n, n)."""
     n, m = values.shape
     no_worse = np.ones((n, n), dtype=bool)
     better = np.zeros((n, n), dtype=bool)
@@ -29,14 +29,14 @@ def dominates(values: Float) -> Bool:
 
 
 def ranks(objectives: Float) -> Int:
-    """Fast non-dominated sorting (Deb 2002): the front that each member belongs to.
+    """Fast non-dominated sorting (Deb 2002): the front that each candidate belongs to.
 
     Args:
         objectives: shape (n, m).
 
     Returns:
-        Shape (n,): 0 for the members that nobody dominates, 1 for those that only these dominate, ...;
-        infeasible members share the last front.
+        Shape (n,): 0 for the candidates that nobody dominates, 1 for those that only these dominate, ...;
+        infeasible candidates share the last front.
     """
     values = np.where(feasible(objectives)[:, None], objectives, np.inf)
     above = dominates(values)
@@ -53,38 +53,38 @@ def ranks(objectives: Float) -> Int:
 
 
 def non_dominated(objectives: Float) -> Bool:
-    """The Pareto set among the members, shape (n,); empty if none is feasible."""
+    """The Pareto set among the candidates, shape (n,); empty if none is feasible."""
     return (ranks(objectives) == 0) & feasible(objectives)
 
 
 def crowding(objectives: Float, rank: Int) -> Float:
-    """Crowding distance (Deb 2002): the room each member has to itself on its front.
+    """Crowding distance (Deb 2002): the room each candidate has to itself on its front.
 
     Args:
         objectives: shape (n, m).
-        rank: front of each member, shape (n,).
+        rank: front of each candidate, shape (n,).
 
     Returns:
-        Shape (n,): over the objectives, the sum of the gaps between a member's two neighbours in terms of
+        Shape (n,): over the objectives, the sum of the gaps between a candidate's two neighbours in terms of
         the front's range; inf for the ends of a front, 0 for the infeasible.
     """
     room = np.zeros(len(objectives))
     usable = feasible(objectives)
     for front in range(int(rank.max(initial=-1)) + 1):
-        members = np.flatnonzero((rank == front) & usable)
-        if len(members):
-            room[members] = _room(objectives[members])
+        candidates = np.flatnonzero((rank == front) & usable)
+        if len(candidates):
+            room[candidates] = _room(objectives[candidates])
     return room
 
 
 def ideal(objectives: Float) -> Float:
-    """Utopia point (article, definition 1): the least of each objective over the feasible members.
+    """Utopia point (article, definition 1): the least of each objective over the feasible candidates.
 
     Returns:
         Shape (m,).
 
     Raises:
-        ValueError: no member is feasible.
+        ValueError: no candidate is feasible.
     """
     return objectives[feasible(objectives)].min(axis=0)
 

@@ -168,7 +168,7 @@ class Arm(Settings):
             SettingsError: no such pose, with the names there are.
         """
         if name not in self.poses:
-            raise SettingsError(f"{self.name} has no pose {name!r}", cure=f"one of: {', '.join(self.poses)}")
+            raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
         return np.radians(self.poses[name])
 
 

@@ -3,22 +3,23 @@
 import difflib
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.cluster import ClusterSettings
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
-from hydroid.settings.knowledge import KnownSettings
 from hydroid.settings.load import Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.priors import PriorSettings
 from hydroid.settings.search import (
     CmaesSettings,
     GaSettings,
     MultistartSettings,
     Nsga2Settings,
-    PolishSettings,
     PymooSettings,
+    RefinementSettings,
 )
 from hydroid.settings.simulation import SimulationSettings
 
@@ -94,12 +95,17 @@ class SearchSettings(Settings):
         return self.pymoo.algorithm if self.algorithm == "pymoo" else self.algorithm
 
 
+def _read_arm(value: Any, info: ValidationInfo) -> Any:
+    """Read the arm's file where the settings name one."""
+    return load_arm(value, (info.context or {}).get("folder")) if isinstance(value, str) else value
+
+
 class FitSettings(Settings):
     """All that a fit needs besides its logs."""
 
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque"""
-    arm: str = "hydrolek"
+    arm: Annotated[Arm, BeforeValidator(_read_arm)] = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
     """the arm's YAML: a shipped name, or a path (looked up beside this file first)"""
     outputs: Annotated[tuple[Joint, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
@@ -107,7 +113,7 @@ class FitSettings(Settings):
     """the arm's pose in which joints without a measured angle stand"""
     parameters: dict[str, ParameterSettings]
     hydraulics: HydraulicSettings = HydraulicSettings()
-    known: dict[str, KnownSettings] = Field(default_factory=dict[str, KnownSettings])
+    priors: dict[str, PriorSettings] = Field(default_factory=dict[str, PriorSettings])
     """what is known besides the logs, by any name"""
     payloads: dict[str, Annotated[float, Field(gt=0)]] = Field(default_factory=dict[str, float])
     """known mass in the gripper [kg], by a log's file name"""
@@ -115,10 +121,10 @@ class FitSettings(Settings):
     simulation: SimulationSettings = SimulationSettings()
     objective: ObjectiveSettings = ObjectiveSettings()
     search: SearchSettings = SearchSettings()
-    polish: PolishSettings | None = PolishSettings()
+    refinement: RefinementSettings | None = RefinementSettings()
     """null: none, as in the article"""
-    refine: bool = False
-    """then polish all parameters that have bounds together, those held fixed included"""
+    joint_refinement: bool = False
+    """then refinement all parameters that have bounds together, those held fixed included"""
     design: DesignSettings = DesignSettings()
     """of `hydroid design`; a fit does not use it"""
     cluster: ClusterSettings = ClusterSettings()

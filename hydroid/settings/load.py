@@ -40,7 +40,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
         raise SettingsError(f"is larger than {MAX_BYTES >> 10} KiB, too large for settings", where=str(path))
     values, lines = read_document(text, str(path))
     if not isinstance(values, dict):
-        raise SettingsError("must be a mapping of settings", where=str(path), cure="write `key: value` lines")
+        raise SettingsError("must be a mapping of settings", where=str(path), hint="write `key: value` lines")
     return values, lines
 
 
@@ -58,7 +58,7 @@ def load(path: Path, kind: type[S], overrides: dict[str, Any] | None = None) -> 
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
         _set(values, key, value)
-    return validate(values, kind, str(path), lines, set(overrides or {}))
+    return validate(values, kind, str(path), lines, set(overrides or {}), path.parent)
 
 
 def validate(
@@ -67,17 +67,21 @@ def validate(
     source: str,
     lines: dict[tuple[str, ...], int] | None = None,
     overridden: set[str] | None = None,
+    folder: Path | None = None,
 ) -> S:
-    """Check a mapping against `kind`; report the first fault with its place."""
+    """Check a mapping against `kind`; report the first fault with its place.
+
+    Files that the settings name are looked up in `folder` first.
+    """
     try:
-        taken = kind.model_validate(values)
+        taken = kind.model_validate(values, context={"folder": folder})
     except ValidationError as error:
         first = error.errors()[0]
         loc = tuple(str(part) for part in first["loc"])
         more = error.error_count() - 1
-        cure = f"and {more} more fault{'s' if more > 1 else ''} in this file" if more else ""
+        hint = f"and {more} more fault{'s' if more > 1 else ''} in this file" if more else ""
         what = explain(".".join(loc), first, kind)
-        raise SettingsError(what, where=_where(loc, source, lines, overridden), cure=cure) from None
+        raise SettingsError(what, where=_where(loc, source, lines, overridden), hint=hint) from None
     if loc := _truth_for_number(values, taken):
         what = f"{'.'.join(loc)}: true and false are no numbers"
         raise SettingsError(what, where=_where(loc, source, lines, overridden))
@@ -120,7 +124,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise SettingsError("needs key=value", where=f"--set {text}", cure="for example --set search.seed=3")
+        raise SettingsError("needs key=value", where=f"--set {text}", hint="for example --set search.seed=3")
     return key.strip(), read_value(value, f"--set {text}")
 
 

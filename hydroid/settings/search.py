@@ -39,7 +39,7 @@ class GaSettings(GeneticSettings):
     crossover_rate: Rate = 0.8
     mutation_rate: Rate = 0.05
     elitism: Annotated[int, Field(ge=0)] = 1
-    """Best members carried over unchanged (the article is silent)."""
+    """Best candidates carried over unchanged (the article is silent)."""
     target: float | None = None
     """The search stops once its best objective is this low."""
 
@@ -92,7 +92,7 @@ class MultistartSettings(Settings):
     iterations: Annotated[int, Field(ge=1)] = 40
     """Steps at most, of each of these fits."""
     step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
-    """As the polish's; coarser, since the polish follows from the best point found."""
+    """As the refinement's; coarser, since the refinement follows from the best point found."""
 
     @property
     def generations(self) -> int:
@@ -100,9 +100,9 @@ class MultistartSettings(Settings):
         return self.starts - 1
 
 
-class PolishSettings(Settings):
+class RefinementSettings(Settings):
     """The bounded least squares that starts from a search's estimate (ours; not in the article)."""
 
     iterations: Annotated[int, Field(ge=1)] = 100
     step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-14
-    """Relative length of a step, in units of the bounds' widths, below which the polish ends."""
+    """Relative length of a step, in units of the bounds' widths, below which the refinement ends."""

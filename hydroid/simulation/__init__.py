@@ -2,6 +2,6 @@
 
 from hydroid.simulation.hydraulic import HydraulicSimulation
 from hydroid.simulation.mechanical import MechanicalSimulation
-from hydroid.simulation.population import ArmParameters, Members, Response
+from hydroid.simulation.population import ArmParameters, Candidates, Response
 
-__all__ = ["ArmParameters", "HydraulicSimulation", "MechanicalSimulation", "Members", "Response"]
+__all__ = ["ArmParameters", "Candidates", "HydraulicSimulation", "MechanicalSimulation", "Response"]

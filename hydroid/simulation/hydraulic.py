@@ -1,8 +1,8 @@
 """Stage 2: the whole chain from command to torque on every active joint, stepped beside MuJoCo.
 
 The actuators look ahead over each MuJoCo step and hand it a torque and an armature (`hydroid.hydraulics`).
-Each member is rolled out by compiled code alone (`hydroid.simulation.rollout`), as many at a time as there
-are threads; members are independent, and no thread count changes a bit.
+Each candidate is rolled out by compiled code alone (`hydroid.simulation.rollout`), as many at a time as there
+are threads; candidates are independent, and no thread count changes a bit.
 """
 
 import logging
@@ -21,7 +21,7 @@ from hydroid.hydraulics.parameters import ActuatorParameters, Linkages
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.population import Array, Members, Population, Response, in_chunks, quiet_mujoco
+from hydroid.simulation.population import Array, Candidates, Population, Response, in_chunks, quiet_mujoco
 from hydroid.simulation.record import Record
 from hydroid.simulation.rollout import Machine, compile_rollout
 from hydroid.simulation.run import HydraulicRun, Start
@@ -31,7 +31,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Trace:
-    """What one member's actuators did at the log's samples; J active joints.
+    """What one candidate's actuators did at the log's samples; J active joints.
 
     joints: 1-based numbers, (J,). pressure [Pa] and flow [m³/s]: chambers A, B, shape (T, J, 2).
     spool [m], force [N]: shape (T, J).
@@ -45,7 +45,7 @@ class Trace:
 
 
 class HydraulicSimulation:
-    """Simulates members on one record with their actuators.
+    """Simulates candidates on one record with their actuators.
 
     Args:
         record: the record; its active joints have hydraulics.
@@ -83,45 +83,45 @@ class HydraulicSimulation:
         none = np.empty((len(self.command), 0))
         self._servo = none if record.prescribed is None else np.ascontiguousarray(record.prescribed.torque)
 
-    def simulate(self, members: Members) -> Response:
-        """Simulate n members, whatever n is.
+    def simulate(self, candidates: Candidates) -> Response:
+        """Simulate n candidates, whatever n is.
 
         Returns:
             Angles of the outputs, and the pressures asked for, at the log's samples; the first is the start.
-            A member without a force-stroke curve, or that diverged, is infeasible.
+            A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
-        return in_chunks(self._simulate_chunk, members, self.record.chunk)
+        return in_chunks(self._simulate_chunk, candidates, self.record.chunk)
 
-    def trace(self, members: Members) -> Trace:
-        """Simulate one member and keep what its actuators did."""
-        run = self.begin(members)
+    def trace(self, candidates: Candidates) -> Trace:
+        """Simulate one candidate and keep what its actuators did."""
+        run = self.begin(candidates)
         with quiet_mujoco():
             _, seen = run.follow(self.command, self._steps, observe=True)
         assert seen is not None
         return Trace(self.joints + 1, seen.pressure, seen.flow, seen.spool, seen.force)
 
-    def begin(self, members: Members) -> HydraulicRun:
-        """Put one feasible member at the start of the record, to be stepped as one likes."""
-        return HydraulicRun(self._start(members), 0, self._machine())
+    def begin(self, candidates: Candidates) -> HydraulicRun:
+        """Put one feasible candidate at the start of the record, to be stepped as one likes."""
+        return HydraulicRun(self._start(candidates), 0, self._machine())
 
-    def _simulate_chunk(self, members: Members) -> Response:
-        assert members.actuators is not None
-        n, samples = len(members), 1 + len(self.command) // self._steps
+    def _simulate_chunk(self, candidates: Candidates) -> Response:
+        assert candidates.actuators is not None
+        n, samples = len(candidates), 1 + len(self.command) // self._steps
         angle = np.full((n, samples, len(self.record.outputs)), np.nan)
         pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
-        exists = np.flatnonzero(members.actuators.feasible)
+        exists = np.flatnonzero(candidates.actuators.feasible)
         if exists.size:
-            start, threads = self._start(members[exists]), min(self._threads, exists.size)
+            start, threads = self._start(candidates[exists]), min(self._threads, exists.size)
             free = deque(self._machine() for _ in range(threads))
 
-            def simulate(member: int) -> None:
+            def simulate(candidate: int) -> None:
                 machine = free.pop()
-                run = HydraulicRun(start, member, machine)
+                run = HydraulicRun(start, candidate, machine)
                 followed, seen = run.follow(self.command, self._steps, observe=pressure is not None)
                 if run.healthy:
-                    angle[exists[member]] = followed[:, self.record.outputs]
+                    angle[exists[candidate]] = followed[:, self.record.outputs]
                     if pressure is not None and seen is not None:
-                        pressure[exists[member]] = seen.pressure[:, self._pressures]
+                        pressure[exists[candidate]] = seen.pressure[:, self._pressures]
                 free.append(machine)
 
             with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
@@ -129,18 +129,18 @@ class HydraulicSimulation:
         feasible: NDArray[np.bool_] = np.all(np.isfinite(angle), axis=(1, 2))
         return Response(angle, feasible, pressure)
 
-    def _start(self, members: Members) -> Start:
-        assert members.actuators is not None
+    def _start(self, candidates: Candidates) -> Start:
+        assert candidates.actuators is not None
         record = self.record
-        population = Population(record.arm, len(members), self._threads, record.prescribed)
-        balance = population.start(members.arm, record.joints, record.pose)[:, self._columns]
+        population = Population(record.arm, len(candidates), self._threads, record.prescribed)
+        balance = population.start(candidates.arm, record.joints, record.pose)[:, self._columns]
         parameters = {
-            f.name: getattr(members.actuators, f.name)[:, self.joints] for f in fields(ActuatorParameters)
+            f.name: getattr(candidates.actuators, f.name)[:, self.joints] for f in fields(ActuatorParameters)
         }
         actuator = Actuator(
             ActuatorParameters(**parameters),
             self._linkages,
-            members.arm.damping[:, self.joints],
+            candidates.arm.damping[:, self.joints],
             record.arm.model.opt.timestep,
             self._hydraulics,
             self._entries,

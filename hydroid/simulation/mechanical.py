@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.population import Members, Population, Response, in_chunks
+from hydroid.simulation.population import Candidates, Population, Response, in_chunks
 from hydroid.simulation.record import Record
 
 
 class MechanicalSimulation:
-    """Simulates members on one record by `Batch.rollout`.
+    """Simulates candidates on one record by `Batch.rollout`.
 
     Args:
         record: the record.
@@ -21,20 +21,20 @@ class MechanicalSimulation:
         self.record, self._threads = record, settings.threads
         self._population: Population | None = None
 
-    def simulate(self, members: Members) -> Response:
-        """Simulate n members, whatever n is.
+    def simulate(self, candidates: Candidates) -> Response:
+        """Simulate n candidates, whatever n is.
 
         Returns:
             Angles of the outputs at the log's samples, shape (n, T, K); the first sample is the start pose.
         """
-        return in_chunks(self._simulate_chunk, members, self.record.chunk)
+        return in_chunks(self._simulate_chunk, candidates, self.record.chunk)
 
-    def _simulate_chunk(self, members: Members) -> Response:
-        record, n = self.record, len(members)
+    def _simulate_chunk(self, candidates: Candidates) -> Response:
+        record, n = self.record, len(candidates)
         population = self._room(n)
-        balance = population.start(members.arm, record.joints, record.pose)
+        balance = population.start(candidates.arm, record.joints, record.pose)
         torque, angle = self._torque[:n], self._angle[:n]
-        np.multiply(members.arm.gain[:, None, record.joints], record.command, out=torque)
+        np.multiply(candidates.arm.gain[:, None, record.joints], record.command, out=torque)
         torque += balance[:, None]
         if record.prescribed is not None:
             torque[:, :, record.prescribed.columns] = record.prescribed.torque

@@ -1,7 +1,7 @@
-"""A population of arms on `mujoco.batch`: each member with its own masses, dampers and springs.
+"""A population of arms on `mujoco.batch`: each candidate with its own masses, dampers and springs.
 
-Every member starts at rest in the log's first pose, in static balance with gravity. Its springs are
-slack there, and a constant torque tau0 = g(q0), computed anew for every member, holds it.
+Every candidate starts at rest in the log's first pose, in static balance with gravity. Its springs are
+slack there, and a constant torque tau0 = g(q0), computed anew for every candidate, holds it.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class ArmParameters:
 
 
 @dataclass(frozen=True)
-class Members:
+class Candidates:
     """A population: its arms, and in stage 2 their actuators, (n, J) for all joints of the arm."""
 
     arm: ArmParameters
@@ -51,15 +51,15 @@ class Members:
     def __len__(self) -> int:
         return len(self.arm)
 
-    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Members":
-        return Members(self.arm[rows], None if self.actuators is None else self.actuators[rows])
+    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Candidates":
+        return Candidates(self.arm[rows], None if self.actuators is None else self.actuators[rows])
 
 
 @dataclass(frozen=True)
 class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints.
 
-    A member that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
+    A candidate that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
     (n, T, L, 2), are those of chambers A and B of L joints, where they were asked for.
     """
 
@@ -68,9 +68,9 @@ class Response:
     pressure: Array | None = None
 
 
-def in_chunks(simulate: Callable[[Members], Response], members: Members, size: int) -> Response:
-    """Simulate members `size` at a time: memory for the steps does not grow with their number."""
-    parts = [simulate(members[i : i + size]) for i in range(0, len(members), size)]
+def in_chunks(simulate: Callable[[Candidates], Response], candidates: Candidates, size: int) -> Response:
+    """Simulate candidates `size` at a time: memory for the steps does not grow with their number."""
+    parts = [simulate(candidates[i : i + size]) for i in range(0, len(candidates), size)]
     pressures = [p.pressure for p in parts if p.pressure is not None]
     return Response(
         np.concatenate([p.angle for p in parts]),
@@ -80,15 +80,15 @@ def in_chunks(simulate: Callable[[Members], Response], members: Members, size: i
 
 
 class Population:
-    """Up to `size` members of one arm, stepped together on a thread pool.
+    """Up to `size` candidates of one arm, stepped together on a thread pool.
 
     Args:
         arm: the arm with the joints that do not move left out.
-        size: members of one call.
+        size: candidates of one call.
         threads: threads that step them; 0 is one a core. Results do not depend on it.
         prescribed: joints that follow a log; they keep no damper and spring of their own.
 
-    Attributes, live arrays over the members:
+    Attributes, live arrays over the candidates:
         position [rad], velocity [rad/s], applied torque [N·m], damping [N·m·s/rad]: shape (size, V).
     """
 
@@ -107,10 +107,10 @@ class Population:
         self.position, self.velocity, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
 
     def start(self, parameters: ArmParameters, joints: NDArray[np.intp], pose: Array) -> Array:
-        """Put the members into `pose` at rest and return what holds them there.
+        """Put the candidates into `pose` at rest and return what holds them there.
 
         Args:
-            parameters: n <= size members.
+            parameters: n <= size candidates.
             joints: the moving joints among the arm's, 0-based, shape (V,).
             pose: angles of the moving joints [rad], shape (V,).
 
@@ -139,28 +139,28 @@ class Population:
         self._batch.warning[:n], self._failed[:n] = 0, False
         return self._bias[:n].copy()
 
-    def copy(self, member: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Write a member into a copy of the arm's model and its data; M is that of its pose."""
-        self._batch.get_model(member, model)
-        self._batch.get_data(member, data)
+    def copy(self, candidate: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Write a candidate into a copy of the arm's model and its data; M is that of its pose."""
+        self._batch.get_model(candidate, model)
+        self._batch.get_data(candidate, data)
         data.warning.number[:] = 0
         mujoco.mj_fwdPosition(model, data)
 
     @property
     def healthy(self) -> NDArray[np.bool_]:
-        """Members that are finite and drew no warning of MuJoCo's since their start, shape (size,)."""
+        """Candidates that are finite and drew no warning of MuJoCo's since their start, shape (size,)."""
         finite = np.isfinite(self.position).all(axis=1) & np.isfinite(self.velocity).all(axis=1)
         return finite & ~self._failed & ~self._batch.warning[:, :, 1].any(axis=1)
 
     def roll(self, torque: Array, out: Array) -> NDArray[np.bool_]:
-        """Step members from their start under the given joint torques.
+        """Step candidates from their start under the given joint torques.
 
         Args:
             torque: applied at each step [N·m], shape (n, steps, V), C-contiguous.
             out: receives the angles after each step [rad], shape (n, steps, V).
 
         Returns:
-            Which members stayed healthy, shape (n,).
+            Which candidates stayed healthy, shape (n,).
         """
         n, steps, _ = torque.shape
         spec = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
@@ -169,5 +169,5 @@ class Population:
                 self._batch.rollout(steps, torque, spec, ("qpos",), np.arange(n), {"qpos": out})
             except SimulationError as error:
                 self._failed[error.ids] = True
-        # a member whose warnings rose stopped there; what it recorded after that is no simulation
+        # a candidate whose warnings rose stopped there; what it recorded after that is no simulation
         return self.healthy[:n] & np.isfinite(out[:, -1]).all(axis=-1)

@@ -56,9 +56,9 @@ class Record:
 
     @property
     def chunk(self) -> int:
-        """Members simulated together: as many as the memory setting allows."""
-        member = 2 * 8 * self.command.size  # torque in, angle out [bytes]
-        return max(1, self._settings.chunk_mib * 2**20 // max(member, 1))
+        """Candidates simulated together: as many as the memory setting allows."""
+        candidate = 2 * 8 * self.command.size  # torque in, angle out [bytes]
+        return max(1, self._settings.chunk_mib * 2**20 // max(candidate, 1))
 
     def sampled(self, angle: Array) -> Array:
         """Return angles at the log's samples, start pose first, from those after each step.

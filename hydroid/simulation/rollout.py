@@ -1,4 +1,4 @@
-"""The compiled rollout of stage 2: one member through its whole record, MuJoCo's steps included.
+"""The compiled rollout of stage 2: one candidate through its whole record, MuJoCo's steps included.
 
 `mujoco.batch` has a rollout, but nothing can be done between its steps; and where Python does something at
 every step, threads wait for the interpreter. So the compiled loop calls `mj_step` of MuJoCo's own library
@@ -51,10 +51,10 @@ class Arm(NamedTuple):
 
 
 class Machine:
-    """A MuJoCo simulation that members of a population take in turn.
+    """A MuJoCo simulation that candidates of a population take in turn.
 
     Args:
-        model: the arm's; each member brings its own values.
+        model: the arm's; each candidate brings its own values.
         columns: joints with actuators among the moving ones, shape (J,).
         prescribed: those that follow the log, if any.
 
@@ -82,14 +82,14 @@ class Machine:
             follows=np.array([], np.intp) if prescribed is None else prescribed.columns,
         )
 
-    def take(self, population: Population, member: int) -> None:
-        """Become a member of a population as it stands at its start."""
-        population.copy(member, self._model, self._data)
+    def take(self, population: Population, candidate: int) -> None:
+        """Become a candidate of a population as it stands at its start."""
+        population.copy(candidate, self._model, self._data)
         self._model.dof_damping[self.arm.columns] = 0.0  # the actuators integrate it
 
     @property
     def healthy(self) -> np.bool_:
-        """Whether the member is finite and drew no warning of MuJoCo's."""
+        """Whether the candidate is finite and drew no warning of MuJoCo's."""
         arm = self.arm
         return np.isfinite([arm.angle, arm.velocity]).all() & ~arm.warnings.any()
 
@@ -114,7 +114,7 @@ def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
 def roll(
     arm: Any,
     plugin: Plugin,
-    member: int,
+    candidate: int,
     state: Any,
     commands: Any,
     torque: Any,
@@ -123,12 +123,12 @@ def roll(
     seen: Any,
     source: int = SOURCE,
 ) -> None:
-    """Roll one member out, up to the first warning of MuJoCo's.
+    """Roll one candidate out, up to the first warning of MuJoCo's.
 
     Args:
         arm: an `Arm`, at the start.
         plugin: of the population.
-        member: which one of it.
+        candidate: which one of it.
         state: its actuators, shape (J,) of JOINT.
         commands: held during each step [%], with those before the start, shape (past + T steps, J).
         torque: of the joints that follow a log, at each step [N·m], shape (T steps, P).
@@ -145,7 +145,17 @@ def roll(
         for j in range(joints):
             here[j], speed[j] = arm.angle[columns[j]], arm.velocity[columns[j]]
         look_ahead(
-            plugin, member, state, pad, commands, past + k, here, speed, arm.mass, lent_torque, lent_armature
+            plugin,
+            candidate,
+            state,
+            pad,
+            commands,
+            past + k,
+            here,
+            speed,
+            arm.mass,
+            lent_torque,
+            lent_armature,
         )
         for j in range(joints):
             arm.applied[columns[j]] = lent_torque[j]

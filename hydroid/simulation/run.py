@@ -1,4 +1,4 @@
-"""One member of stage 2 on its way through a record."""
+"""One candidate of stage 2 on its way through a record."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from hydroid.simulation.rollout import Machine, roll
 
 @dataclass(frozen=True)
 class Start:
-    """Members at the start of a record: their arms, their actuators, and the torque of prescribed joints."""
+    """Candidates at the start of a record: their arms, their actuators, and the torque of prescribed joints."""
 
     population: Population
     actuator: Actuator
@@ -21,22 +21,22 @@ class Start:
 
 
 class HydraulicRun:
-    """One member on its way through a record, wherever the commands come from.
+    """One candidate on its way through a record, wherever the commands come from.
 
     Args:
         start: a population at the start.
-        member: which one of it.
+        candidate: which one of it.
         machine: what simulates it, and no other until this run is over.
 
     Attributes:
         position: angles of the record's moving joints [rad], live, shape (1, V).
     """
 
-    def __init__(self, start: Start, member: int, machine: Machine) -> None:
-        machine.take(start.population, member)
+    def __init__(self, start: Start, candidate: int, machine: Machine) -> None:
+        machine.take(start.population, candidate)
         self.position = machine.arm.angle[None]
-        self._machine, self._actuator, self._member = machine, start.actuator, member
-        self._state, self._recent = start.state.joints[member], start.state.commands[1:]
+        self._machine, self._actuator, self._member = machine, start.actuator, candidate
+        self._state, self._recent = start.state.joints[candidate], start.state.commands[1:]
         self._servo = start.servo
 
     def step(self, command: Array) -> None:
@@ -55,7 +55,7 @@ class HydraulicRun:
 
         Returns:
             Angles of the moving joints [rad], shape (1 + T, V), and what can be measured on the actuators,
-            samples in the place of members: now and after each sample.
+            samples in the place of candidates: now and after each sample.
 
         Raises:
             ValueError: joints follow a log that ends before the commands do.
@@ -86,5 +86,5 @@ class HydraulicRun:
 
     @property
     def healthy(self) -> np.bool_:
-        """Whether the member has not diverged."""
+        """Whether the candidate has not diverged."""
         return self._machine.healthy

@@ -10,9 +10,8 @@ from hydroid.errors import SettingsError
 from hydroid.hydraulics.parameters import ActuatorParameters, nominal_parameters
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.problem.stage import Stage
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import ArmParameters, Members
+from hydroid.simulation import ArmParameters, Candidates
 
 P = TypeVar("P", ArmParameters, ActuatorParameters)
 
@@ -22,14 +21,13 @@ class Chosen:
     """A parameter set with the arm and settings it belongs to.
 
     Attributes:
-        member: the one parameter set.
+        candidate: the one parameter set.
         nominal: names of parameters for which no value was given; the arm's and settings' own stand for them.
         source: where the values came from.
     """
 
     settings: FitSettings
-    arm: Arm
-    member: Members
+    candidate: Candidates
     nominal: tuple[str, ...]
     source: str
 
@@ -49,35 +47,35 @@ def choose(config: str | None, params: Path | None, changes: dict[str, Any] | No
     folder = params if params is None or params.is_dir() else params.parent
     beside = folder / "config.yaml" if folder is not None else None
     named = config or (str(beside) if beside is not None and beside.is_file() else "fit-hyd")
-    settings, arm = load_settings(named, changes)
+    settings = load_settings(named, changes)
     if settings.stage != "hyd":
-        raise SettingsError("stage mech has no actuators", where=named, cure="use --config fit-hyd")
+        raise SettingsError("stage mech has no actuators", where=named, hint="use --config fit-hyd")
     values: dict[str, Any] = {}
     if params is not None:
         values = read_parameters(params)
     source = str(params or named)
-    stage = Stage(arm, settings)
+    stage = Stage(settings)
     known = stage.parameters.parameters
     missing = tuple(p.name for p in known if p.name not in values and p.fixed is None)
     theta = stage.parameters.vector(dict.fromkeys(missing, 0.0) | values, source)
     theta[[p.name in missing for p in known]] = np.nan
-    member = _filled(stage.members(theta[None]), _nominal(arm, settings))
-    return Chosen(settings, arm, member, missing, source)
+    candidate = _filled(stage.candidates(theta[None]), _nominal(settings))
+    return Chosen(settings, candidate, missing, source)
 
 
-def _nominal(arm: Arm, settings: FitSettings) -> Members:
+def _nominal(settings: FitSettings) -> Candidates:
     """What the arm's file and the settings say where no parameter does."""
-    none = np.zeros((1, len(arm.joints)))
-    return Members(
-        ArmParameters(gain=none, damping=none, stiffness=none, friction=none, mass=arm.masses[None]),
-        nominal_parameters(arm, settings.hydraulics, range(len(arm.joints))),
+    none = np.zeros((1, len(settings.arm.joints)))
+    return Candidates(
+        ArmParameters(gain=none, damping=none, stiffness=none, friction=none, mass=settings.arm.masses[None]),
+        nominal_parameters(settings.arm, settings.hydraulics, range(len(settings.arm.joints))),
     )
 
 
-def _filled(member: Members, nominal: Members) -> Members:
-    assert member.actuators is not None
+def _filled(candidate: Candidates, nominal: Candidates) -> Candidates:
+    assert candidate.actuators is not None
     assert nominal.actuators is not None
-    return Members(_known(member.arm, nominal.arm), _known(member.actuators, nominal.actuators))
+    return Candidates(_known(candidate.arm, nominal.arm), _known(candidate.actuators, nominal.actuators))
 
 
 def _known(values: P, nominal: P) -> P:

@@ -1,4 +1,4 @@
-"""One simulated member, and the whole arm in the pose that it has.
+"""One simulated candidate, and the whole arm in the pose that it has.
 
 What is stepped is the simulation, with the joints that move; the whole arm only takes over its angles. The
 controls of its motors are the commands in %: a log sets them, or the viewer's sliders do.
@@ -10,18 +10,18 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
-from hydroid.simulation import HydraulicSimulation, Members
+from hydroid.simulation import Candidates, HydraulicSimulation
 from hydroid.simulation.population import quiet_mujoco
 
 
 class Player:
-    """Plays one member, from the start of its record as often as wanted.
+    """Plays one candidate, from the start of its record as often as wanted.
 
     Args:
         spec: the arm's MJCF; its motors become the sliders.
         arm: its settings.
         simulation: of the joints that move, on `log`.
-        member: one parameter set.
+        candidate: one parameter set.
         log: the record; joints that do not move stand as in its first sample.
         live: the sliders command, for ever; otherwise the log does, to its end.
 
@@ -35,13 +35,13 @@ class Player:
         spec: mujoco.MjSpec,
         arm: Arm,
         simulation: HydraulicSimulation,
-        member: Members,
+        candidate: Candidates,
         log: Log,
         *,
         live: bool,
     ) -> None:
         self._names = [arm.joint_names[j] for j in simulation.joints]
-        self._simulation, self._member, self._log, self._live = simulation, member, log, live
+        self._simulation, self._member, self._log, self._live = simulation, candidate, log, live
         self._step = simulation.record.arm.model.opt.timestep
         for name in arm.joint_names:
             motor = spec.actuator(name)

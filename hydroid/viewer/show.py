@@ -27,7 +27,7 @@ def plot_actuator(chosen: Chosen, joint: int, out: Path) -> list[Path]:
         SettingsError: no such joint, or no force-stroke curve.
         RunError: `out` cannot be written.
     """
-    return write_actuator(out, actuator_card(chosen.arm, chosen.member, joint, chosen.source))
+    return write_actuator(out, actuator_card(chosen.settings.arm, chosen.candidate, joint, chosen.source))
 
 
 def view(chosen: Chosen, log: Path | None, pose: str | None, warn: Warn) -> None:
@@ -54,21 +54,21 @@ def animate(chosen: Chosen, log: Path, pose: str | None, out: Path, warn: Warn) 
 
 
 def _player(chosen: Chosen, path: Path | None, pose: str | None, warn: Warn) -> Player:
-    settings, arm = chosen.settings, chosen.arm
-    for joint in range(1, 1 + len(arm.joints)):
-        actuator_card(arm, chosen.member, joint, chosen.source)  # says what is wrong with one
+    settings = chosen.settings
+    for joint in range(1, 1 + len(settings.arm.joints)):
+        actuator_card(settings.arm, chosen.candidate, joint, chosen.source)  # says what is wrong with one
     if path is None:
-        start = arm.pose(pose or settings.start_pose)
+        start = settings.arm.pose(pose or settings.start_pose)
         log = Log(
             "sliders", np.array([0.0, PERIOD]), np.zeros((2, len(start))), np.tile(start, (2, 1)), PERIOD
         )
         outputs = list(range(len(start)))  # what is compared can move, and what can move has a slider
     else:
-        log = read_commands(path, settings, arm, pose, warn)
+        log = read_commands(path, settings, pose, warn)
         outputs = [int(j) for j in np.flatnonzero(log.driven)]
         if not outputs:
-            raise SettingsError("commands nothing", where=str(path), cure="leave it out to use the sliders")
-    spec = load_model(arm.model, arm)
-    simulation = make_simulation(spec, arm, log, outputs, settings)
+            raise SettingsError("commands nothing", where=str(path), hint="leave it out to use the sliders")
+    spec = load_model(settings.arm.model, settings.arm)
+    simulation = make_simulation(spec, log, outputs, settings)
     assert isinstance(simulation, HydraulicSimulation)
-    return Player(spec, arm, simulation, chosen.member, log, live=path is None)
+    return Player(spec, settings.arm, simulation, chosen.candidate, log, live=path is None)

@@ -73,8 +73,8 @@ def window(player: Player) -> Generator[Viewer]:
             _try_window()
         viewer = mujoco.viewer.launch_passive(player.model, player.data, show_left_ui=False)
     except (ImportError, RuntimeError) as error:
-        cure = "without a display write a file with --gif OUT.gif"
-        raise RunError(f"no window can be opened ({error})", cure=cure) from None
+        hint = "without a display write a file with --gif OUT.gif"
+        raise RunError(f"no window can be opened ({error})", hint=hint) from None
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
@@ -117,8 +117,8 @@ def animation(player: Player, camera: str = "corner") -> bytes:
     try:
         renderer = mujoco.Renderer(player.model, height=SIZE[1], width=SIZE[0])
     except (mujoco.FatalError, ImportError, RuntimeError) as error:
-        cure = "install libEGL (Mesa's needs no GPU)"
-        raise RunError(f"no picture can be rendered ({error})", cure=cure) from None
+        hint = "install libEGL (Mesa's needs no GPU)"
+        raise RunError(f"no picture can be rendered ({error})", hint=hint) from None
     frames: list[Image.Image] = []
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # most of the time where there is no GPU
     with renderer:

@@ -14,10 +14,10 @@ from hydroid.hydraulics.solenoid import coil_force, force_curve, resting_stroke
 from hydroid.hydraulics.valve import conductance, opening, port_flow, spool
 from hydroid.parameters import Array
 from hydroid.report.actuator import ActuatorCard
-from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled
+from hydroid.report.plots.style import GREY, MEASURED, REFINED, SEARCH, figure, styled
 
 SIDE_A: dict[str, Any] = {"color": SEARCH}
-SIDE_B: dict[str, Any] = {"color": POLISHED, "linestyle": (0, (5, 2))}
+SIDE_B: dict[str, Any] = {"color": REFINED, "linestyle": (0, (5, 2))}
 _SHADES = ("#56B4E9", "#009E73", "#E69F00", "#CC79A7")
 _LITRES = 6e4
 """L/min in a m³/s"""
@@ -71,7 +71,7 @@ def _force(axes: Axes, card: ActuatorCard) -> None:
         axes.plot(1e3 * rest, p.plunger_stiffness * rest, "o", color=shade, markeredgecolor="white", zorder=4)
     axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=MEASURED, linewidth=1.0, label="spring")
     points = 1e3 * np.array([p.stroke_1, p.stroke_2]), np.array([p.force_1, p.force_2])
-    axes.plot(*points, "D", color=POLISHED, markeredgecolor="white", label="F1, F2 (rated)")
+    axes.plot(*points, "D", color=REFINED, markeredgecolor="white", label="F1, F2 (rated)")
     axes.plot([], [], "o", color=GREY, label="at rest")
     steepest = float(coil_force(coil * max(currents) ** 2, 0.0, gap))
     axes.set_ylim(0, min(1.6 * float(p.force_1), 1.1 * steepest))

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.report.plots.style import GREY, MEASURED, PALE, POLISHED, SEARCH, figure, styled
+from hydroid.report.plots.style import GREY, MEASURED, PALE, REFINED, SEARCH, figure, styled
 from hydroid.report.table import plain
 
 
@@ -47,7 +47,7 @@ def _joint(axes: Axes, log: Log, joint: int, limits: tuple[float, float]) -> Non
     right.grid(False)
     axes.set_zorder(right.get_zorder() + 1)
     axes.patch.set_visible(False)
-    axes.plot(log.time, angle, color=POLISHED, linewidth=1.8, label="predicted angle")
+    axes.plot(log.time, angle, color=REFINED, linewidth=1.8, label="predicted angle")
     axes.plot((), (), color=GREY, linewidth=1.0, label="command")
     reach = max(0.15 * float(np.ptp(angle)), 1.0)
     axes.set_ylim(float(angle.min()) - reach, float(angle.max()) + reach)
@@ -77,7 +77,7 @@ def precision(names: Sequence[str], before: Array, random: Array, designed: Arra
     for values, color, mark, label in (
         (before, GREY, "|", "before"),
         (random, SEARCH, "o", "random experiment (median)"),
-        (designed, POLISHED, "D", "designed experiment"),
+        (designed, REFINED, "D", "designed experiment"),
     ):
         axes.plot(100 * values, at, mark, color=color, markersize=8, label=label)
     axes.axvline(100 * known, color=MEASURED, linewidth=1.0, linestyle=(0, (5, 3)))

@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from hydroid.identifiability.identifiability import Identifiability
-from hydroid.identifiability.intervals import THRESHOLD, Profile
-from hydroid.identifiability.uncertainty import KNOWN, Uncertainty
 from hydroid.parameters import Array
-from hydroid.report.plots.style import GREY, MEASURED, POLISHED, SEARCH, figure, styled, tick
+from hydroid.report.plots.style import GREY, MEASURED, REFINED, SEARCH, figure, styled, tick
 from hydroid.report.table import plain
+from hydroid.uncertainty.covariance import KNOWN, Uncertainty
+from hydroid.uncertainty.directions import Identifiability
+from hydroid.uncertainty.intervals import THRESHOLD, Profile
 
 _CELL = 0.36  # [in]
 _MOST_NUMBERS = 14
@@ -42,7 +42,7 @@ def singular_values(found: Identifiability) -> Figure:
     axes.set_ylim(foot / 3, 3 * top)
     for i, value in enumerate(values, start=1):
         felt, strong = value > foot, value >= 1 / KNOWN
-        color = SEARCH if strong else POLISHED
+        color = SEARCH if strong else REFINED
         axes.plot([i, i], [foot / 3, max(value, foot)], color=color, linewidth=1.0, alpha=0.5)
         mark = "o" if strong else "D"
         axes.plot(
@@ -80,7 +80,7 @@ def directions(found: Identifiability) -> Figure:
     axes.set_title("Directions: relative changes that belong together")
     axes.set_xlabel("standard deviation along the direction")
     for label, value in zip(axes.get_xticklabels(), found.singular, strict=True):
-        label.set_color(MEASURED if value >= 1 / KNOWN else POLISHED)
+        label.set_color(MEASURED if value >= 1 / KNOWN else REFINED)
     return drawing
 
 
@@ -105,7 +105,7 @@ def profiles(found: Sequence[Profile], told_: Uncertainty, names: Sequence[str])
         if np.isfinite(deviation) and deviation > 0:
             fine = np.linspace(one.values[0], one.values[-1], 101)
             axes.plot(fine, ((fine - centre) / deviation) ** 2, "--", color=GREY, linewidth=1.0)
-        axes.axhline(THRESHOLD, color=POLISHED, linewidth=1.0)
+        axes.axhline(THRESHOLD, color=REFINED, linewidth=1.0)
         axes.set_ylim(-0.2, max(2.5 * THRESHOLD, 0.5))
         axes.set_xlabel(one.name)
         axes.set_ylabel("deviance")

@@ -6,14 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.problem.problem import Problem
 from hydroid.report.plots.style import (
     GREY,
     MEASURED,
     OTHER_LOOKS,
-    POLISHED,
+    REFINED,
     SEARCH,
     estimate_looks,
     figure,
@@ -72,7 +72,7 @@ def runs(
 
     Args:
         parameters: the parameters.
-        results: runs by the name of their estimate, such as `search` and `polished`, in that order.
+        results: runs by the name of their estimate, such as `search` and `refined`, in that order.
         truth: true values by name.
         ignore: parameters without effect in any run, drawn grey.
     """
@@ -82,7 +82,7 @@ def runs(
     *_, (final, final_runs) = results.items()
     _frame(upper, rows, f"Spread over {len(final_runs)} runs with different seeds")
     upper.text(_TEXT_AT, -0.7, final, fontsize=9, fontweight="bold", va="center")
-    looks = dict(zip(results, ((SEARCH, "o"), (POLISHED, "D"), *OTHER_LOOKS), strict=False))
+    looks = dict(zip(results, ((SEARCH, "o"), (REFINED, "D"), *OTHER_LOOKS), strict=False))
     for row, parameter in enumerate(rows):
         dull = parameter.name in ignore
         bounded = _bar(upper, row, parameter, dull=dull)

@@ -5,11 +5,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.report.plots.style import (
     GREY,
-    POLISHED,
+    REFINED,
     SEARCH,
     estimate_looks,
     every,
@@ -61,7 +61,7 @@ def pareto(problem: Problem, fit: Fit) -> Figure:
     for depth, (name, (color, mark)) in enumerate(estimate_looks(fit).items()):
         values = finite(in_reader_units(settings, fit.estimates[name].segments))
         shown.append(values)
-        wide = 2.0 if color in (SEARCH, POLISHED) else 1.3
+        wide = 2.0 if color in (SEARCH, REFINED) else 1.3
         label = estimate_label(fit, name)
         (line,) = axes.plot(
             at, values, color=color, linewidth=wide, marker=mark, label=label, zorder=4 - depth / 10

@@ -7,10 +7,10 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hydroid.identifiability.jacobian import NO_EFFECT
 from hydroid.parameters import Array
-from hydroid.report.plots.style import GREY, MEASURED, POLISHED, figure, finite, styled
+from hydroid.report.plots.style import GREY, MEASURED, REFINED, figure, finite, styled
 from hydroid.report.table import number, plain
+from hydroid.uncertainty.jacobian import NO_EFFECT
 
 _ROW, _MOST = 0.95, 12
 """height of a panel [in]; more parameters than this stand in two columns"""
@@ -41,7 +41,7 @@ def slopes(title: str, unit: str, names: Sequence[str], time: Array, output: Arr
     none = strength <= NO_EFFECT * np.nanmax(strength, initial=0.0)
     for axes, name, curve, rms, idle in zip(panels, names, change, strength, none, strict=True):
         most = 0.0 if idle else float(np.max(np.abs(curve)))
-        axes.plot(time[thin], finite(curve)[thin], color=POLISHED)
+        axes.plot(time[thin], finite(curve)[thin], color=REFINED)
         axes.axhline(0.0, color=GREY, linewidth=0.8)
         # what is no more than rounding is drawn flat
         reach = 1.15 * most if np.isfinite(most) and most > 0 else 1.0

@@ -19,14 +19,14 @@ from matplotlib.axis import Axis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array
 from hydroid.report.table import plain
 
 WIDTH = 6.4  # [in]; at half a page's width the smallest text is still 5 pt
 MEASURED = "#222222"
 SEARCH = "#0072B2"
-POLISHED = "#D55E00"
+REFINED = "#D55E00"
 OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 OTHER_LOOKS: tuple[tuple[str, str], ...] = tuple(zip(OTHERS, ("s", "^", "v", "P"), strict=True))
 GREY = "#8C8C8C"
@@ -106,7 +106,7 @@ def _rendered(drawing: Figure, **how: Any) -> bytes:
 
 def estimate_looks(fit: Fit) -> dict[str, tuple[str, str]]:
     """Colour and marker of each estimate, the most important first."""
-    main = {fit.final: (POLISHED, "D")} | {fit.searched.name: (SEARCH, "o")}
+    main = {fit.final: (REFINED, "D")} | {fit.searched.name: (SEARCH, "o")}
     others = [name for name in fit.estimates if name not in main]
     return main | dict(zip(others, OTHER_LOOKS, strict=False))
 

@@ -6,12 +6,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from hydroid.identifiability.surface import Surface
 from hydroid.parameters import Parameter
-from hydroid.report.plots.style import GREY, PALE, POLISHED, figure, styled
+from hydroid.report.plots.style import GREY, PALE, REFINED, figure, styled
 from hydroid.report.table import number, plain
 from hydroid.report.words import in_reader_units, norm_label
 from hydroid.settings.objective import ObjectiveSettings
+from hydroid.uncertainty.surface import Surface
 
 _LEVELS = 14
 
@@ -45,7 +45,7 @@ def contours(found: Surface, how: ObjectiveSettings) -> Figure:
     unit = "" if how.relative else " deg"
     for (x, y, value), color, mark, label in (
         (best, "white", "o", "lowest of the grid"),
-        ((*found.estimate, found.estimate_error), POLISHED, "D", "estimate"),
+        ((*found.estimate, found.estimate_error), REFINED, "D", "estimate"),
     ):
         told = f"{label} ({number(float(in_reader_units(how, np.array(value))))}{unit})"
         (handle,) = axes.plot(

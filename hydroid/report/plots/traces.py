@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hydroid.identification.fit import Fit
+from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import Channel
@@ -17,7 +17,7 @@ from hydroid.report.plots.style import (
     MEASURED,
     OTHERS,
     PALE,
-    POLISHED,
+    REFINED,
     SEARCH,
     figure,
     finite,
@@ -53,7 +53,7 @@ def response(problem: Problem, fit: Fit, channel: Channel) -> Figure:
         if name == fit.searched.name:
             traces.append(_Trace(label, angle, SEARCH))
         elif name == fit.final:
-            traces.append(_Trace(label, angle, POLISHED))
+            traces.append(_Trace(label, angle, REFINED))
         else:
             traces.append(_Trace(label, angle, next(others)))
     return _traces(f"Joint {channel.joint} in {channel.log}", channel, traces)
@@ -62,7 +62,7 @@ def response(problem: Problem, fit: Fit, channel: Channel) -> Figure:
 @styled
 def validation(channel: Channel, simulated: Mapping[str, Array]) -> Figure:
     """Measured angle of a log and the responses [rad], shape (T,), of several fits by name."""
-    colors = (POLISHED, SEARCH, *OTHERS)
+    colors = (REFINED, SEARCH, *OTHERS)
     traces = [
         _Trace(name, np.degrees(finite(angle)), colors[i % len(colors)])
         for i, (name, angle) in enumerate(simulated.items())

@@ -1,0 +1,5 @@
+"""`python -m hydroid`: the command line."""
+
+from hydroid.cli.app import main
+
+main()

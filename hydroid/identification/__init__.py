@@ -1,1 +1,0 @@
-"""A fit: search, polish, what the estimate is worth; and how it does on logs it has not seen."""

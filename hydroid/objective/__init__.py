@@ -1,1 +1,0 @@
-"""Objectives: from an output error to the numbers a search makes small."""

@@ -1,0 +1,122 @@
+"""Candidates fail, runs do not: what diverged is counted, told, and never selected."""
+
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid.errors import HydroidError
+from hydroid.fitting.fit import fit
+from hydroid.jobs import load_settings
+from hydroid.problem.problem import Evaluation, Memo, Problem
+from hydroid.report.tables import objective_table, parameter_table
+from hydroid.report.words import cautions
+from hydroid.simulating import simulate_log
+
+TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+STEPS = 2**16 - 1
+"""of a parameter's 16 bits"""
+
+
+class Fragile(Problem):
+    """Every set with much damping diverges; so do all that no chromosome can write, where `grid` is on."""
+
+    grid = False
+
+    def bad(self, theta) -> np.ndarray:
+        unit = self.parameters.to_unit(theta)
+        off = np.abs(unit * STEPS - np.round(unit * STEPS)).max(axis=1) > 1e-6
+        return (unit[:, 1] > 0.5) | (off & self.grid)
+
+    def residuals(self, theta):
+        rows = super().residuals(theta)
+        rows[self.bad(theta)] = np.nan
+        return rows
+
+
+class Watcher:
+    def generation(self, row) -> None:
+        pass
+
+    def refining(self, simulated: int) -> None:
+        pass
+
+
+def make(kind=Fragile, **changes) -> Problem:
+    small = {
+        "search.ga.population": 10,
+        "search.ga.generations": 5,
+        "search.nsga2.population": 10,
+        "search.nsga2.generations": 5,
+        "objective.segments": {"equal": 3},
+    }
+    settings = load_settings("article-mech", small | changes)
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH, "truth")
+    return kind(settings, [log])
+
+
+@pytest.mark.parametrize("algorithm", ["ga", "nsga2"])
+@pytest.mark.parametrize("refinement", [None, {"iterations": 3}])
+def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refinement):
+    problem = make(**{"search.algorithm": algorithm, "refinement": refinement})
+    kept = []
+    result = fit(problem, lambda state, memo: kept.append(memo), Watcher())
+    theta, values = kept[-1].arrays()
+    diverged = int(problem.bad(theta).sum())
+    assert 0 < diverged < len(theta)
+    assert result.history[-1, 3] == diverged == np.sum(~np.isfinite(values[:, -1]))
+    assert f"{diverged} of {len(theta)} simulated parameter sets diverged" in " ".join(
+        cautions(problem, result)
+    )
+    assert all(e.usable and np.isfinite(e.overall) for e in result.estimates.values())
+    assert not problem.bad(np.array([e.theta for e in result.estimates.values()])).any()
+    front, evaluation = result.front
+    assert not problem.bad(front).any()
+    assert np.isfinite(evaluation.segments).all()
+    np.testing.assert_array_equal(kept[-1].best, theta[np.argmin(values[:, -1])])
+    assert np.isfinite(result.history[:, 4:]).all()
+
+
+def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
+    """The mean of the best sets is none of the sets, and need not be one that can be simulated."""
+    problem = make(**{"search.algorithm": "nsga2", "refinement": None})
+    problem.grid = True
+    result = fit(problem, lambda state, memo: None, Watcher())
+    assert not result.estimates["average"].usable
+    assert result.final == result.searched.name == "utopia"
+    assert result.best.usable
+    assert "estimate average diverged" in caplog.text
+    assert "The estimate average diverged" in " ".join(cautions(problem, result))
+    assert "search (utopia)" in parameter_table(problem, result).markdown()
+    assert "average" in objective_table(problem, result).markdown()
+
+
+def test_where_everything_diverges_the_run_says_so():
+    class Hopeless(Fragile):
+        def bad(self, theta):
+            return np.ones(len(theta), bool)
+
+    for algorithm in ("ga", "nsga2"):
+        with pytest.raises(HydroidError, match="no candidate of the population could be simulated"):
+            fit(make(Hopeless, **{"search.algorithm": algorithm}), lambda state, memo: None, Watcher())
+
+
+def test_a_member_that_is_infinite_somewhere_is_infeasible_throughout_the_memo():
+    problem = make()
+    theta = problem.parameters.from_unit(np.random.default_rng(0).random((6, 9)))
+
+    class Blind(Problem):
+        """Half of the sets have an objective that is no number: the lowest of all, were it compared."""
+
+        def evaluate(self, theta):
+            found = np.arange(1.0, len(theta) + 1)
+            found[::2] = [np.nan, np.inf, -np.inf][: len(found[::2])]
+            return Evaluation(np.tile(found[:, None], (1, 3)), found)
+
+    memo = Memo(make(Blind))
+    memo.evaluate(theta)
+    assert memo.infeasible == 3
+    np.testing.assert_array_equal(memo.best, theta[1])
+    again = Memo(memo.problem)
+    again.restore(*memo.arrays())
+    assert again.infeasible == 3
+    np.testing.assert_array_equal(again.best, theta[1])

@@ -1,0 +1,210 @@
+"""The shoulder as a pendulum, twice: on MuJoCo under the actuator plugin, and in plain equations under Radau.
+
+The plain side shares no code with hydroid: it integrates plungers, oil and arm together, (4) to (9), with
+rtol 1e-8, restarted at every change of the command.
+"""
+
+from itertools import pairwise
+from math import cos, inf, log, radians, sin, sqrt
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from scipy.integrate import Radau
+
+from hydroid.hydraulics.actuator import Actuator
+from hydroid.hydraulics.parameters import LINEAR, ActuatorParameters, Linkages
+from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
+
+INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, radians(-15.0)
+START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
+A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
+LINKAGE = Linkages(
+    np.array([LINEAR]),
+    *np.array([[A], [B], [THETA0], [sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))], [STROKE]]),
+)
+TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
+TEN = {
+    "area_a": 1000.0, "area_b": 750.0, "current_max": 0.9, "current_min": 0.3, "onset_a": 1.4, "onset_b": 1.2,
+    "force_1": 8.0, "force_2": 0.7, "stroke_1": 0.8, "stroke_2": 12.0,
+}  # fmt: skip
+
+
+def parameters(settings: HydraulicSettings, **values: object) -> ActuatorParameters:
+    """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
+    base = settings.model_dump() | {"flow_limit": settings.flow_limit or inf} | TRUTH
+    si = {name: np.array([[base[name] * factor]]) for name, (_, factor) in HYDRAULIC_UNITS.items()}
+    return ActuatorParameters(**si).with_values({k: np.reshape(v, (-1, 1)) for k, v in values.items()})
+
+
+def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
+    """Feasible sets from the whole search space, 0.25 to 2.5 times the article's ten, (count,) each."""
+    rows: list[np.ndarray] = []
+    while len(rows) < count:
+        row = np.array(list(TEN.values())) * rng.uniform(0.25, 2.5, len(TEN))
+        f1, f2, x1, x2 = row[6:]
+        if f1 > f2 and x2 > x1 and f1 / f2 < (x2 / x1) ** 2:
+            rows.append(row)
+    return dict(zip(TEN, np.array(rows).T, strict=True))
+
+
+def pulses(rng: np.random.Generator, samples: int, shortest: int = 20, longest: int = 120) -> np.ndarray:
+    """Pseudo-random commands [%], (samples,): pulses of random size and length, a third of them rests."""
+    command = np.zeros(samples)
+    at = 0
+    while at < samples:
+        length = int(rng.integers(shortest, longest))
+        command[at : at + length] = rng.choice([-1.0, 1.0, 0.0], p=[0.35, 0.35, 0.3]) * rng.uniform(20, 100)
+        at += length
+    return command
+
+
+def pendulum() -> mujoco.MjModel:
+    """The shoulder with all that hangs on it, as one rigid body without joint limits."""
+    own = INERTIA - MASS * CENTRE**2
+    at = f"{CENTRE * cos(TILT)} 0 {CENTRE * sin(TILT)}"
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{PERIOD}" gravity="0 0 -{GRAVITY}"/><worldbody><body>
+        <joint axis="0 -1 0" stiffness="{STIFFNESS}" springref="{np.degrees(START)}"/>
+        <inertial pos="{at}" mass="{MASS}" diaginertia="{own} {own} {own}"/></body></worldbody></mujoco>"""
+    )
+
+
+def simulate(
+    p: ActuatorParameters,
+    command: np.ndarray,
+    settings: HydraulicSettings,
+    steps: int = 1,
+    observe: list | None = None,
+    damping: float = DAMPING,
+    start: float = START,
+) -> np.ndarray:
+    """Angles [rad], (n, T + 1), under commands (T,), with `steps` MuJoCo steps a sample."""
+    model = pendulum()
+    model.opt.timestep = PERIOD / steps
+    n = len(p)
+    batch = Batch(model, n, 1)
+    angle, velocity = batch.bind("qpos"), batch.bind("qvel")
+    mass, bias, applied = batch.bind("M"), batch.bind("qfrc_bias"), batch.bind("qfrc_applied")
+    armature = batch.expand("dof_armature")
+    angle[:] = start
+    batch.forward()
+    actuator = Actuator(p, LINKAGE, damping, model.opt.timestep, settings)
+    spring = STIFFNESS * (start - START)
+    state = actuator.start(angle, bias + spring)
+    out = np.empty((n, len(command) + 1))
+    out[:, 0] = start
+    for t, u in enumerate(command):
+        for _ in range(steps):
+            applied[:], armature[:] = actuator.advance(state, [u], angle, velocity, mass)
+            batch.step()
+            angle[:] = actuator.close(state, velocity, mass)
+        out[:, t + 1] = angle[:, 0]
+        if observe is not None:
+            observe.append((actuator.observe(state, angle), velocity.copy()))
+    return out
+
+
+def reference(
+    p: ActuatorParameters, command: np.ndarray, rtol: float = 1e-8
+) -> tuple[np.ndarray, np.ndarray]:
+    """One candidate in plain equations: angles [rad], (T + 1,), and chamber pressures [Pa], (T + 1, 2)."""
+    v = {name: float(getattr(p, name)[0, 0]) for name in HYDRAULIC_UNITS}
+    ratio = sqrt(v["force_1"] / v["force_2"])
+    gap = (v["stroke_2"] - ratio * v["stroke_1"]) / (ratio - 1)
+    coil = v["force_1"] * (v["stroke_1"] + gap) ** 2 / v["rated_current"] ** 2
+    beta, gain = v["bulk_modulus"], v["flow_coefficient"] * sqrt(2 / v["density"])
+    shortest = float(LINKAGE.shortest[0])
+
+    def geometry(q: float) -> tuple[float, float]:
+        length = sqrt(A * A + B * B - 2 * A * B * cos(q + THETA0))
+        return length - shortest, A * B * sin(q + THETA0) / length
+
+    def volumes(x: float) -> tuple[float, float]:
+        dead = v["dead_volume"]
+        return max(dead + v["area_a"] * x, 0.1 * dead), max(dead + v["area_b"] * (STROKE - x), 0.1 * dead)
+
+    def flow(area: float, drop: float) -> float:
+        return gain * area * drop / (drop**2 + v["transition_pressure"] ** 2) ** 0.25
+
+    def current(voltage: float) -> float:
+        return v["current_min"] + min(voltage, 10.0) / 10.0 * (v["current_max"] - v["current_min"])
+
+    def pressures(z: np.ndarray, x: float) -> tuple[float, float]:
+        va, vb = volumes(x)
+        return max(beta * (z[4] - log(va)), v["vapour_pressure"]), max(
+            beta * (z[5] - log(vb)), v["vapour_pressure"]
+        )
+
+    def slope(drive_a: float, drive_b: float):
+        ps, pt, m = v["supply_pressure"], v["tank_pressure"], v["plunger_mass"]
+
+        def f(_: float, z: np.ndarray) -> list[float]:
+            xa, ua, xb, ub, _, _, q, w = z
+            x, r = geometry(q)
+            va, vb = volumes(x)
+            pa, pb = pressures(z, x)
+            spool = xa - xb
+            share = min(
+                max(abs(spool) - v["overlap_a" if spool > 0 else "overlap_b"], 0) / v["slot_width"], 1
+            )
+            area = v["opening_a" if spool > 0 else "opening_b"] * share ** v["opening_exponent"]
+            ahead, back = (
+                v["leakage"] + (area if spool > 0 else 0),
+                v["leakage"] + (area if spool <= 0 else 0),
+            )
+            qa = flow(ahead, ps - pa) - flow(back, pa - pt)
+            qb = flow(back, ps - pb) - flow(ahead, pb - pt)
+            speed = r * w
+            force = v["area_a"] * pa - v["area_b"] * pb
+            if x > STROKE and speed > 0:
+                force -= v["stop_penetration"] * (x - STROKE) * speed
+            if x < 0 and speed < 0:
+                force -= v["stop_penetration"] * -x * speed
+            force -= v["dry_friction"] * speed / sqrt(speed**2 + 1e-6)
+            weight = MASS * GRAVITY * CENTRE * cos(q + TILT)
+            turn = (r * force - weight - DAMPING * w - STIFFNESS * (q - START)) / INERTIA
+            push_a = drive_a / (xa + gap) ** 2 - v["plunger_damping"] * ua - v["plunger_stiffness"] * xa
+            push_b = drive_b / (xb + gap) ** 2 - v["plunger_damping"] * ub - v["plunger_stiffness"] * xb
+            return [ua, push_a / m, ub, push_b / m, qa / va, qb / vb, w, turn]
+
+        return f
+
+    x0, r0 = geometry(START)
+    force = MASS * GRAVITY * CENTRE * cos(START + TILT) / r0
+    low = max(v["tank_pressure"], (v["area_a"] * v["tank_pressure"] - force) / v["area_b"])
+    high = min(v["supply_pressure"], (v["area_a"] * v["supply_pressure"] - force) / v["area_b"])
+    pb = max(low, min(high, 50e5))
+    pa = (force + v["area_b"] * pb) / v["area_a"]
+    at_rest = np.roots([1, 2 * gap, gap**2, -coil * v["current_min"] ** 2 / v["plunger_stiffness"]])
+    rest = float(max(at_rest[abs(at_rest.imag) < 1e-9].real))
+    va, vb = volumes(x0)
+    z = np.array([rest, 0, rest, 0, pa / beta + log(va), pb / beta + log(vb), START, 0.0])
+    atol = np.array([1e-11, 1e-9, 1e-11, 1e-9, 1e-11, 1e-11, 1e-10, 1e-9])
+    states = np.empty((len(command) + 1, 8))
+    states[0] = z
+    edges = [0, *(np.flatnonzero(np.diff(command)) + 1), len(command)]
+    for first, last in pairwise(edges):
+        u = float(command[first])
+        ia = current(v["onset_a"] + u * (v["full_a"] - v["onset_a"]) / 100 if u > 0 else 0.0)
+        ib = current(v["onset_b"] - u * (v["full_b"] - v["onset_b"]) / 100 if u < 0 else 0.0)
+        solver = Radau(
+            slope(coil * ia**2, coil * ib**2),
+            0.0,
+            states[first],
+            (last - first) * PERIOD,
+            rtol=rtol,
+            atol=atol,
+        )
+        wanted = 1
+        while solver.status == "running":
+            solver.step()
+            dense = solver.dense_output()
+            while first + wanted <= last and wanted * PERIOD <= solver.t + 1e-12:
+                states[first + wanted] = dense(wanted * PERIOD)
+                wanted += 1
+        assert solver.status == "finished"
+        assert wanted == last - first + 1
+    assert states[:, [0, 2]].min() >= 0
+    both = np.array([pressures(s, geometry(s[6])[0]) for s in states])
+    return states[:, 6], both

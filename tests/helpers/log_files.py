@@ -1,0 +1,46 @@
+"""Small logs for the tests of the log room: two joints, the second continuous."""
+
+from pathlib import Path
+
+import numpy as np
+
+from hydroid.log import Finding, Log, check_log, read_log
+from hydroid.settings.log import LogSettings
+
+RIG = Path(__file__).parents[2] / "examples" / "logs"
+RIG_RANGES = np.deg2rad(
+    [(-50, 50), (-30, 90), (-120, 0), (-90, 90), (-50, 50), (-np.inf, np.inf), (0, 60)],
+)
+RANGES = np.array([(-0.5, 1.5), (-np.inf, np.inf)])
+NAMES = ("time_s", "u1_pct", "u2_pct", "q1_deg", "q2_deg")
+SETTINGS = LogSettings()
+
+
+def cells(rows: int = 80, period: float = 0.01) -> np.ndarray:
+    """A valid log as the file holds it: time [s], two commands [%], two angles [deg], shape (rows, 5)."""
+    time = np.arange(rows) * period
+    u = [np.round(60 * np.sign(np.sin(20 * time + 0.3)), 2), np.round(30 * np.cos(9 * time), 2)]
+    q = [10 + 9 * np.sin(3 * time), 200 * np.sin(2 * time)]
+    return np.round(np.stack([time, *u, *q], axis=1), 4)
+
+
+def lines(values: np.ndarray) -> list[list[str]]:
+    """Header and cells as text."""
+    return [list(NAMES), *([format(x, ".10g") for x in row] for row in values)]
+
+
+def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
+    path.write_text("\n".join(separator.join(row) for row in rows) + "\n", encoding="utf-8")
+    return path
+
+
+def read(path: Path, settings: LogSettings = SETTINGS, **options: object) -> tuple[Log, list[Finding]]:
+    return read_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
+
+
+def faults(path: Path, settings: LogSettings = SETTINGS, **options: object) -> list[Finding]:
+    """Errors only."""
+    log, findings = check_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
+    errors = [finding for finding in findings if finding.level == "error"]
+    assert (log is None) == bool(errors)
+    return errors

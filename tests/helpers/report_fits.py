@@ -1,0 +1,157 @@
+"""Fits made by hand for the report's tests: any shape of problem, no simulation."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hydroid.fitting.fit import Estimate, Fit
+from hydroid.log import Log
+from hydroid.parameters import Parameter, ParameterSet
+from hydroid.problem.channels import make_channels
+from hydroid.problem.norms import overall_objective
+from hydroid.problem.priors import Priors
+from hydroid.problem.problem import Evaluation, Problem
+from hydroid.problem.segments import segment_objectives
+from hydroid.run.folder import RunFolder
+from hydroid.search.least_squares import Ending, Refinement
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings, ParameterSettings
+from hydroid.uncertainty.covariance import Uncertainty, judge
+from hydroid.uncertainty.directions import identifiability
+from hydroid.uncertainty.jacobian import Jacobian, relative_scale
+from hydroid.uncertainty.noise import channel_noise
+
+MODEL = {"K": (0.05, 0.5), "D": (50.0, 500.0), "M1": (1.0, 10.0), "M2": (1.5, 12.75)}
+
+
+def make_problem(
+    sources: tuple[str, ...] = ("a.csv",),
+    outputs: tuple[int, ...] = (2,),
+    segments: int = 4,
+    parameters: dict[str, tuple[float, float]] = MODEL,
+    fixed: dict[str, float] | None = None,
+    samples: int = 120,
+    **objective: Any,
+) -> Problem:
+    """A problem with everything a report looks at, and no model behind it."""
+    problem = object.__new__(Problem)
+    one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
+    how = {"segments": {"equal": segments}} | objective
+    problem.settings = FitSettings(
+        parameters=dict.fromkeys(parameters, one), outputs=list(outputs), objective=how
+    )
+    fixed = fixed or {}
+    problem.parameters = ParameterSet(
+        tuple(Parameter(name, "kg", low, high, fixed.get(name)) for name, (low, high) in parameters.items())
+    )
+    rng = np.random.default_rng(3)
+    logs = []
+    for number, source in enumerate(sources):
+        time = np.arange(samples + 10 * number) * 0.01
+        command = np.repeat(rng.uniform(-90, 90, (len(time) // 10 + 1, 7)), 10, axis=0)[: len(time)]
+        logs.append(Log(source, time, command, np.cumsum(command, axis=0) * 1e-4 + 0.3, 0.01))
+    problem.logs = tuple(logs)
+    problem.outputs = [joint - 1 for joint in outputs]
+    channels = [log.angle[:, k] for log in logs for k in problem.outputs]
+    problem.measured = np.concatenate(channels)
+    problem.channels = make_channels(logs, problem.outputs, [[]] * len(logs), problem.settings.objective)
+    problem.priors = Priors({}, problem.parameters)
+    starts = np.cumsum([0, *map(len, channels)])
+    problem.bounds = np.array(
+        [
+            (start + len(c) * s // segments, start + len(c) * (s + 1) // segments)
+            for c, start in zip(channels, starts[:-1], strict=True)
+            for s in range(segments)
+        ]
+    )
+    return problem
+
+
+def make_fit(
+    problem: Problem,
+    names: tuple[str, ...] = ("average", "utopia", "best", "refined"),
+    diverged: tuple[str, ...] = (),
+    effects: tuple[float, ...] | None = None,
+    front: int = 6,
+    seed: int = 0,
+) -> Fit:
+    """A fit whose estimates are the measured angles with a smooth error, or NaN where diverged."""
+    rng = np.random.default_rng(seed)
+    parameters = problem.parameters
+    free = int(parameters.free.sum())
+    estimates = {}
+    for name in names:
+        size = np.nan if name in diverged else rng.uniform(0.002, 0.03)
+        waves = [
+            size * np.sin(log.time * rng.uniform(2, 9))[:, None] * np.ones(len(problem.outputs))
+            for log in problem.logs
+        ]
+        responses = tuple(
+            log.angle[:, problem.outputs] - wave for log, wave in zip(problem.logs, waves, strict=True)
+        )
+        error = np.concatenate([wave.T.ravel() for wave in waves])[None]
+        how = problem.settings.objective
+        estimates[name] = Estimate(
+            name,
+            parameters.from_unit(rng.uniform(0.1, 0.9, (1, free)))[0],
+            segment_objectives(error, problem.measured, problem.bounds, how)[0],
+            float(overall_objective(error, problem.measured, how)[0]),
+            float(np.sqrt(np.mean(error**2))),
+            responses,
+        )
+    final = "refined" if "refined" in names else names[0]
+    uncertain = make_uncertainty(problem, estimates[final].theta, effects)
+    segments = rng.uniform(0.005, 0.2, (front, len(problem.bounds)))
+    evaluations = np.arange(1, 8) * 20.0
+    best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
+    history = np.column_stack([np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5])
+    refined = Refinement(np.full(free, 0.5), 1.0, 0.1, 40, 5, Ending.STEP) if "refined" in names else None
+    return Fit(
+        estimates,
+        final,
+        (
+            parameters.from_unit(rng.uniform(0, 1, (front, free))),
+            Evaluation(segments, segments.max(axis=1, initial=0)),
+        ),
+        history,
+        refined,
+        uncertain,
+        identifiability(problem, uncertain),
+    )
+
+
+def make_uncertainty(
+    problem: Problem, theta: np.ndarray, effects: tuple[float, ...] | None = None
+) -> Uncertainty:
+    """What a problem with independent parameters of these effects [rad] would say, its noise 0.1 deg."""
+    rng = np.random.default_rng(1)
+    size = np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(theta))
+    waves = np.linalg.qr(rng.normal(size=(len(problem.measured), len(theta))))[0].T
+    slopes = 100 * size[:, None] * waves * np.sqrt(len(problem.measured))
+    slopes[~problem.parameters.free] = np.nan
+    residual = rng.normal(0, np.deg2rad(0.1), len(problem.measured))
+    at = Jacobian(
+        residual,
+        slopes,
+        np.zeros((len(theta), 0)),
+        relative_scale(problem.parameters, theta),
+        np.zeros_like(slopes),
+        unit=1.0,
+    )
+    noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
+    return judge(problem, theta, at, noise)
+
+
+class Folder(RunFolder):
+    """A run folder that knows what it is without having been begun."""
+
+    def settings(self, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
+        return make_problem().settings
+
+    def identity(self) -> dict[str, Any]:
+        return {"hydroid": "0", "mujoco": "4", "logs": {"a.csv": "f" * 64}}
+
+
+def folder(path: Path) -> RunFolder:
+    return Folder(path)

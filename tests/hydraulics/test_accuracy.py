@@ -1,0 +1,62 @@
+"""The plugin against Radau on the full coupled equations; at length in benchmarks/hydraulic_accuracy.py."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hydraulic_reference import draw, parameters, pulses, reference, simulate
+
+from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.settings.hydraulics import HydraulicSettings
+
+SETTINGS = HydraulicSettings()
+
+
+def errors(p: ActuatorParameters, command: np.ndarray, exact: np.ndarray, **steps: int) -> np.ndarray:
+    """Error of every candidate [deg], (n, T + 1)."""
+    settings = HydraulicSettings(substeps=steps.get("substeps", SETTINGS.substeps))
+    return np.degrees(simulate(p, command, settings, steps.get("steps", 1)) - exact)
+
+
+def test_default_settings_hold_the_bound_over_the_search_space():
+    rng = np.random.default_rng(21)
+    command, p = pulses(rng, 300), parameters(SETTINGS, **draw(rng, 4))
+    exact = np.array([reference(p[i : i + 1], command)[0] for i in range(4)])
+    error = errors(p, command, exact)
+    assert np.ptp(exact, axis=1).max() > np.radians(10)
+    assert np.median(np.sqrt((error**2).mean(axis=1))) < 0.1
+    assert abs(error).max() < 0.5
+
+
+def test_pressures_follow_the_reference():
+    command, p = pulses(np.random.default_rng(22), 200), parameters(SETTINGS)
+    seen: list = []
+    simulate(p, command, SETTINGS, observe=seen)
+    pressure = np.array([o.pressure[0, 0] for o, _ in seen])
+    _, exact = reference(p, command)
+    assert np.sqrt(((pressure - exact[1:]) ** 2).mean()) < 0.5e5
+
+
+def test_refinement_is_first_order_or_better():
+    rng = np.random.default_rng(23)
+    command, p = pulses(rng, 200), parameters(SETTINGS)
+    exact = reference(p, command)[0]
+    sizes = [np.sqrt((errors(p, command, exact, steps=k) ** 2).mean()) for k in (1, 2, 4, 8)]
+    assert all(b < 0.6 * a for a, b in pairwise(sizes)), sizes
+
+
+@pytest.mark.parametrize(
+    "optional",
+    [
+        {"overlap_a": 0.2, "overlap_b": 0.3, "opening_exponent": 1.6, "opening_b": 0.3},
+        {"dry_friction": 500.0, "leakage": 0.002, "supply_pressure": 180.0},
+        {"plunger_mass": 0.1, "plunger_damping": 15.0, "bulk_modulus": 3000.0},
+    ],
+)
+def test_optional_physics_agrees_too(optional: dict[str, float]):
+    command, p = pulses(np.random.default_rng(24), 200), parameters(SETTINGS, **optional)
+    exact, _ = reference(p, command)
+    error = errors(p, command, exact[None])
+    assert np.ptp(exact) > np.radians(3)
+    assert np.sqrt((error**2).mean()) < 0.05
+    assert abs(error).max() < 0.2

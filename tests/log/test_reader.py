@@ -1,0 +1,278 @@
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from log_files import NAMES, RANGES, RIG, RIG_RANGES, cells, faults, lines, read, save
+
+from hydroid.errors import LogError
+from hydroid.log import check_log, read_log
+from hydroid.settings.log import LogSettings
+
+
+@pytest.mark.parametrize("name", ["rig_shoulder_1", "rig_shoulder_2", "rig_all_joints_1"])
+def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
+    walls = []
+    for _ in range(3):
+        start = time.perf_counter()
+        log, findings = read_log(RIG / f"{name}.csv", LogSettings(), RIG_RANGES, outputs=[2])
+        walls.append(time.perf_counter() - start)
+    assert findings == []
+    assert min(walls) < 0.3
+    raw = np.loadtxt(RIG / f"{name}.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(log.command, raw[:, 1:8])
+    np.testing.assert_allclose(log.angle, np.deg2rad(raw[:, 8:]), rtol=1e-15, atol=1e-300)
+    np.testing.assert_allclose(log.time, raw[:, 0], atol=1e-12)
+    assert (log.driven == raw[:, 1:8].any(axis=0)).all()
+    assert log.measured.all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 80),
+    st.integers(0, 4),
+    st.floats().map(repr)
+    | st.floats(-120, 120).map(lambda x: f"{x:.3f}")
+    | st.sampled_from(
+        ["", " ", "nan", "NaN", "inf", "-inf", "1e3", "1_0", "1,5", "--", "#N/A", "0x1F", "1e999", "٣"]
+    )
+    | st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=8),
+)
+def test_one_bad_cell_is_named_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory, row: int, column: int, text: str
+) -> None:
+    rows = lines(cells())
+    rows[row][column] = text
+    file = save(tmp_path_factory.getbasetemp() / "bad.csv", rows)
+    errors, line = faults(file), row + 1
+    where = {(error.line, error.column) for error in errors}
+    if len(",".join(rows[row]).split(",")) != 5 or '"' in text:
+        assert {(line, ""), (line, NAMES[column])} & where or '"' in text
+        return
+    value = float(text) if text.strip() and "_" not in text and _is_float(text) else np.nan
+    if column == 0:
+        near = {(line + k, "time_s") for k in (0, 1)}
+        assert near & where if not np.isfinite(value) and row not in (1, 80) else where <= near
+    elif not abs(value) < 1e100:
+        assert (line, NAMES[column]) in where
+    elif column < 3:
+        assert where == ({(line, NAMES[column])} if abs(value) > 100 + 1e-6 else set())
+    elif column == 3:
+        low, high = np.rad2deg(RANGES[0]) + np.array([-1, 1])
+        assert where == ({(line, NAMES[column])} if not low <= value <= high else set())
+    else:
+        assert where <= {(line, NAMES[column]), (line + 1, NAMES[column])}
+        far = min(abs(value - cells()[r - 1, 4]) for r in (row - 1, row + 1) if 1 <= r <= 80)
+        assert where or far < 405
+    if not errors and column in (1, 2):
+        assert read(file)[0].command[row - 1, column - 1] == np.clip(value, -100, 100)
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ("column", "text", "fine"),
+    [
+        (3, "-29.6", True),  # the range is -28.65 to 85.94 deg, and the margin 1 deg
+        (3, "-29.7", False),
+        (3, "86.9", True),
+        (3, "87", False),
+        (1, "100", True),
+        (1, "100.01", False),
+        (1, "-100.01", False),
+        (2, "1_0", False),
+        (2, "1e1", True),
+        (2, "#N/A", False),
+        (2, "٣", True),
+        (2, "3,", False),
+        (2, "3,4", False),
+    ],
+)
+def test_the_edge_of_what_a_cell_may_hold(column: int, text: str, fine: bool, tmp_path: Path) -> None:
+    rows = lines(cells())
+    rows[40][column] = text
+    errors = faults(save(tmp_path / "log.csv", rows))
+    torn = "," in text
+    assert [(e.line, e.column) for e in errors] == ([] if fine else [(41, "" if torn else NAMES[column])])
+
+
+def edited(tmp_path: Path, edit, rows: int = 80) -> Path:
+    table = lines(cells(rows))
+    edit(table)
+    return save(tmp_path / "log.csv", table)
+
+
+def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
+    def spoil(rows: list[list[str]]) -> None:
+        rows[10][1] = "120"
+        rows[12][2] = ""
+        rows[14][3] = "91"
+        rows[16][3] = "x"
+        rows[20] = rows[20][:3]
+        rows[30][4] = "-"
+
+    path = edited(tmp_path, spoil)
+    found = {(fault.line, fault.column) for fault in faults(path)}
+    assert found == {(11, "u1_pct"), (13, "u2_pct"), (15, "q1_deg"), (17, "q1_deg"), (21, ""), (31, "q2_deg")}
+    with pytest.raises(LogError, match=r"log\.csv, line 21: .*5 cells"):
+        read(path)
+
+
+def test_a_fault_in_many_rows_is_one_finding_that_counts_them(tmp_path: Path) -> None:
+    def spoil(rows: list[list[str]]) -> None:
+        for row in rows[5:]:
+            row[1] = "NaN"
+
+    (fault,) = faults(edited(tmp_path, spoil))
+    assert (fault.line, fault.column) == (6, "u1_pct")
+    assert "75 more rows, to line 81" in fault.what
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "said"),
+    [
+        (lambda t: np.delete(t, np.s_[30:34], axis=0), 32, "--repair"),
+        (lambda t: np.delete(t, np.s_[30:60], axis=0), 32, "cut the log into two"),
+        (lambda t: np.insert(t, 30, t[29], axis=0), 32, "does not increase"),
+        (lambda t: t[::-1], 3, "does not increase"),
+        (lambda t: t[:20], None, "fewer than 0.5 s"),
+        (lambda t: t[:0], None, "0 samples"),
+        (lambda t: t * [1000, 1, 1, 1, 1], None, "log.time.unit"),
+        (lambda t: t * [0.001, 1, 1, 1, 1], None, "log.time.unit"),
+    ],
+)
+def test_faults_of_time(change, line: int | None, said: str, tmp_path: Path) -> None:
+    (fault,) = faults(save(tmp_path / "log.csv", lines(change(cells()))))
+    assert fault.line == line
+    assert said in str(fault)
+
+
+def test_time_in_milliseconds_and_from_any_start(tmp_path: Path) -> None:
+    values = cells()
+    plain, _ = read(save(tmp_path / "a.csv", lines(values)))
+    values[:, 0] = 1000 * values[:, 0] + 1_700_000_000_000
+    rows = [list(NAMES), *([f"{row[0]:.3f}", *(f"{x:.10g}" for x in row[1:])] for row in values)]
+    log, findings = read(save(tmp_path / "b.csv", rows), LogSettings.model_validate({"time": {"unit": "ms"}}))
+    assert findings == []
+    np.testing.assert_array_equal(log.time, plain.time)
+    np.testing.assert_array_equal(log.angle, plain.angle)
+
+
+def test_clock_times_are_refused_clearly(tmp_path: Path) -> None:
+    def stamp(rows: list[list[str]]) -> None:
+        for k, row in enumerate(rows[1:]):
+            row[0] = f"2024-05-01T12:00:00.{k:02d}"
+
+    fault = faults(edited(tmp_path, stamp))[0]
+    assert (fault.line, fault.column) == (2, "time_s")
+    assert "not a date or clock time" in fault.hint
+
+
+def test_a_missing_column_names_what_there_is_and_the_nearest(tmp_path: Path) -> None:
+    def rename(rows: list[list[str]]) -> None:
+        rows[0][2], rows[0][3] = "U2_pct", "shoulder"
+
+    (fault,) = faults(edited(tmp_path, rename))
+    assert "'u2_pct' (command of joint 2, did you mean 'U2_pct'?)" in fault.what
+    assert "'q1_deg' (angle of joint 1)" in fault.what
+    assert "it has: time_s, u1_pct, U2_pct, shoulder, q2_deg" in fault.hint
+
+
+def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: Path) -> None:
+    path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 4)) for row in rows])
+    assert len(faults(path)) == 1
+    mapping = {"joints": {1: {"angle": None}, 2: {"command": None}}}
+    log, findings = read(path, LogSettings.model_validate(mapping))
+    assert findings == []
+    assert log.driven.tolist() == [True, False]
+    assert log.measured.tolist() == [False, True]
+    with pytest.raises(LogError, match="output joint 1 has no angle column"):
+        read(path, LogSettings.model_validate(mapping), outputs=[1])
+
+
+def test_commands_alone_are_enough_where_angles_are_not_required(tmp_path: Path) -> None:
+    path = edited(tmp_path, lambda rows: [row.__delitem__(slice(3, 5)) for row in rows])
+    log, _ = read(path, angles_required=False)
+    assert not log.measured.any()
+    assert log.driven.all()
+
+
+def test_ambiguous_columns_are_refused(tmp_path: Path) -> None:
+    def twice(rows: list[list[str]]) -> None:
+        rows[0][2] = "u1_pct"
+
+    assert "2 columns of this name" in " ".join(f.what for f in faults(edited(tmp_path, twice)))
+    copied = LogSettings.model_validate({"joints": {2: {"angle": {"column": "q1_deg"}}}})
+    (fault,) = faults(edited(tmp_path, lambda rows: None), copied)
+    assert "angle of joint 1 and angle of joint 2" in fault.what
+
+
+def test_columns_that_are_not_mapped_may_hold_anything(tmp_path: Path) -> None:
+    def add(rows: list[list[str]]) -> None:
+        for row in rows:
+            row.insert(2, "note")
+            row.append("")
+
+    log, findings = read(edited(tmp_path, add))
+    assert findings == []
+    np.testing.assert_array_equal(log.command, cells()[:, 1:3])
+
+
+def test_two_columns_scale_and_offset_make_one_command(tmp_path: Path) -> None:
+    """4 to 20 mA, one column a direction; the angle in rad, logged the other way around."""
+    values, table = cells(), lines(cells())
+    for row, (_, u1, _, q1, _) in zip(table[1:], values, strict=True):
+        row[1:4] = [f"{4 + 0.16 * max(s * u1, 0):.12g}" for s in (1, -1)] + [f"{1 - np.deg2rad(q1):.12g}"]
+    mapping = {
+        1: {
+            "command": {"column": ["u1_pct", "u2_pct"], "scale": 6.25, "offset": -25},
+            "angle": {"unit": "rad", "scale": -1, "offset": 1},
+        },
+        2: {"command": None},
+    }
+    log, _ = read(save(tmp_path / "log.csv", table), LogSettings.model_validate({"joints": mapping}))
+    np.testing.assert_allclose(log.command[:, 0], values[:, 1], atol=1e-9)
+    np.testing.assert_allclose(log.angle[:, 0], np.deg2rad(values[:, 3]), atol=1e-9)
+    table[40][2] = "3.9"
+    (fault,) = faults(save(tmp_path / "log.csv", table), LogSettings.model_validate({"joints": mapping}))
+    assert (fault.line, fault.column) == (41, "u2_pct")
+    assert "allowed are 0 to 100 %" in fault.what
+
+
+def test_without_a_time_column_only_that_is_said(tmp_path: Path) -> None:
+    (fault,) = faults(edited(tmp_path, lambda rows: [row.__delitem__(0) for row in rows]))
+    assert (fault.line, fault.column) == (1, "time_s")
+
+
+def test_an_uneven_sample_period_is_warned_of(tmp_path: Path) -> None:
+    values = cells()
+    values[40, 0] += 0.003
+    _, findings = read(save(tmp_path / "log.csv", lines(values)))
+    assert [(f.level, f.line, f.column) for f in findings] == [("warning", 42, "time_s"), ("note", None, "")]
+
+
+def test_a_log_that_drives_nothing_is_warned_of(tmp_path: Path) -> None:
+    _, findings = read(save(tmp_path / "log.csv", lines(cells() * [1, 0, 0, 1, 1])))
+    assert [(f.level, f.what) for f in findings] == [("warning", "no joint is driven")]
+
+
+def test_constant_channels_are_warned_of(tmp_path: Path) -> None:
+    values = cells()
+    values[:, 1], values[:, 4] = 40, 7
+    log, findings = check_log(save(tmp_path / "log.csv", lines(values)), LogSettings(), RANGES, outputs=[1])
+    assert log is not None
+    assert {(f.level, f.column) for f in findings} == {("warning", "u1_pct"), ("warning", "q2_deg")}
+
+
+def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
+    settings = LogSettings.model_validate({"joints": {5: None}})
+    with pytest.raises(LogError, match=r"log\.joints\.5: the arm has joints 1 to 2"):
+        read(edited(tmp_path, lambda rows: None), settings)

@@ -1,0 +1,135 @@
+"""Channels: weights of joints, chamber pressures, and logs with a payload."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid.arm.payload import add_payload
+from hydroid.errors import SettingsError
+from hydroid.jobs import fit_logs, load_settings
+from hydroid.log import read_log, write_log
+from hydroid.problem.problem import Problem
+from hydroid.simulating import simulate_log
+
+MECHANICAL = {"D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+HYDRAULIC = MECHANICAL | {
+    "A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2,
+    "F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0,
+}  # fmt: skip
+FIXED = {f"parameters.{name}.fixed": value for name, value in MECHANICAL.items()}
+PRESSURE = {"log.pressure": {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"}}
+
+
+@pytest.fixture(scope="module")
+def hydraulic():
+    changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": {"equal": 3}}
+    settings = load_settings("fit-hyd", changes)
+    log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
+    return settings, settings.arm, simulate_log(settings, log, HYDRAULIC, "truth")
+
+
+def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
+    settings, arm, log = hydraulic
+    problem = Problem(settings, [log])
+    assert [c.quantity for c in problem.channels] == ["angle", "pressure_a", "pressure_b"]
+    truth = problem.parameters.vector(HYDRAULIC, "truth")
+    rows = problem.residuals(truth[None])
+    assert rows.shape == (1, 3 * len(log.time))
+    assert np.abs(rows).max() < 1e-12
+    assert problem.evaluate(truth[None]).segments.shape == (1, 3 + 2)
+
+
+def test_a_pressure_error_counts_its_weight(hydraulic):
+    settings, arm, log = hydraulic
+    off = replace(log, pressure=log.pressure + 3e5)
+    truth_of = lambda problem: problem.parameters.vector(HYDRAULIC, "truth")[None]  # noqa: E731
+    problem = Problem(settings, [off])
+    rows = problem.residuals(truth_of(problem))[0]
+    for channel in problem.channels[1:]:
+        assert np.rad2deg(rows[channel.rows]) == pytest.approx(0.1 * 3.0)
+    assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
+
+
+def test_the_level_that_angles_leave_open_is_felt_by_pressures(hydraulic):
+    """With both areas changed in proportion the angle stays near; a pressure gauge sees the difference."""
+    settings, arm, log = hydraulic
+    problem = Problem(settings, [log])
+    truth = problem.parameters.vector(HYDRAULIC, "truth")
+    moved = truth.copy()
+    names = problem.parameters.names
+    moved[[names.index("A_A"), names.index("A_B")]] *= 1.1
+    rows = problem.residuals(moved[None])[0]
+    assert all(np.abs(rows[c.rows]).max() > np.deg2rad(0.1) for c in problem.channels[1:])
+
+
+def test_pressures_do_not_change_the_angles(hydraulic):
+    settings, arm, log = hydraulic
+    without = settings.model_copy(
+        update={"objective": settings.objective.model_copy(update={"pressure_weight": 0})}
+    )
+    sets = Problem(settings, [log]).parameters.from_unit(np.random.default_rng(0).random((5, 10)))
+    with_, bare = (Problem(s, [log]).responses(sets)[0] for s in (settings, without))
+    assert np.array_equal(with_.angle, bare.angle, equal_nan=True)
+    assert bare.pressure is None
+
+
+def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
+    settings, _, log = hydraulic
+    columns = {"log.joints": {j: {"pressure": None} for j in (1, 3, 4, 5, 6, 7)}}
+    settings = load_settings("fit-hyd", FIXED | PRESSURE | columns)
+    write_log(tmp_path / "log.csv", log, settings.log)
+    assert "pA2,pB2" in (tmp_path / "log.csv").read_text().splitlines()[0]
+    ranges = np.stack([arm.lower, arm.upper], axis=1)
+    again, _ = read_log(tmp_path / "log.csv", settings.log, ranges)
+    assert again.pressure[:, 1] == pytest.approx(log.pressure[:, 1], rel=1e-8)
+    assert np.isnan(again.pressure[:, 0]).all()
+
+
+def mechanical(**changes):
+    settings = load_settings("article-mech", {"objective.segments": {"equal": 2}} | changes)
+    log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0])
+    return settings, settings.arm, log, {"K": 0.2} | MECHANICAL
+
+
+def test_weights_scale_the_residuals_of_their_joint():
+    settings, arm, log, truth = mechanical(outputs=[2, 3])
+    weighted, *_ = mechanical(outputs=[2, 3], **{"objective.weights": {3: 0.25}})
+    one, other = Problem(settings, [log]), Problem(weighted, [log])
+    theta = one.parameters.vector(truth, "truth")[None]
+    plain, scaled = one.residuals(theta)[0], other.residuals(theta)[0]
+    shoulder, elbow = (c.rows for c in one.channels)
+    assert np.array_equal(scaled[shoulder], plain[shoulder])
+    assert scaled[elbow] == pytest.approx(0.25 * plain[elbow])
+    assert other.rms(scaled[None]) == pytest.approx(one.rms(plain[None]))
+
+
+def test_a_payload_pulls_on_the_shoulder_with_its_weight_times_its_lever(arm, spec):
+    """Stretched forward the payload's place is 0.5 + 0.4 + 0.15 + 0.12 + 0.23 m before the shoulder."""
+    held = []
+    for model in (spec.compile(), add_payload(spec, arm, 5.0).compile()):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        held.append(data.qfrc_bias.copy())
+    assert held[1][1] - held[0][1] == pytest.approx(5.0 * 9.81 * 1.40, rel=1e-12)
+
+
+def test_a_payload_slows_the_arm_of_its_log_alone():
+    settings, arm, log, truth = mechanical(payloads={"steps": 5.0})
+    other = replace(log, source="elsewhere/other.csv")
+    loaded, bare = (simulate_log(settings, x, truth, "t").angle[50, 1] for x in (log, other))
+    assert abs(loaded - log.angle[0, 1]) < abs(bare - log.angle[0, 1])
+    with pytest.raises(SettingsError, match="no place for a payload"):
+        simulate_log(
+            settings.model_copy(update={"arm": arm.model_copy(update={"payload": None})}), log, truth, "t"
+        )
+
+
+def test_a_payload_of_no_log_is_refused(tmp_path):
+    settings, arm, log, truth = mechanical(payloads={"heavy.csv": 5.0})
+    write_log(tmp_path / "light.csv", simulate_log(settings, log, truth, "t"), settings.log)
+    with pytest.raises(SettingsError, match="none of the logs"):
+        fit_logs(settings, [tmp_path / "light.csv"], tmp_path / "out", None, print)  # type: ignore[arg-type]
+    assert not (tmp_path / "out").exists()

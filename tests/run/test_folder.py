@@ -1,0 +1,338 @@
+"""Faults of the run folder: what was good stays good, and the user is told in a line."""
+
+import errno
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid import jobs
+from hydroid.errors import RunError
+from hydroid.files import write_atomic
+from hydroid.fitting.search import SearchState
+from hydroid.jobs import fit_logs, load_settings
+from hydroid.log import write_log
+from hydroid.problem.problem import Memo, Problem
+from hydroid.run import lock
+from hydroid.run.checkpoint import DAMAGED, PREVIOUS
+from hydroid.run.folder import RunFolder
+from hydroid.run.lock import locked
+from hydroid.search.algorithm import Population
+from hydroid.simulating import simulate_log
+
+SMALL = {
+    "search.algorithm": "ga",
+    "search.ga.population": 6,
+    "search.ga.generations": 3,
+    "refinement": None,
+    "objective.segments": {"equal": 2},
+}
+TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+class Watcher:
+    """Stops a fit after so many generations."""
+
+    def __init__(self, stop_at: int = 0) -> None:
+        self.stop_at = stop_at
+
+    def generation(self, row) -> None:
+        if row[0] == self.stop_at:
+            raise KeyboardInterrupt
+
+    def refining(self, simulated: int) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Settings, arm, log and problem of a small fit."""
+    settings = load_settings("article-mech", SMALL)
+    log = step_log(settings.arm.pose("study"), [60.0, -80.0])
+    path = tmp_path_factory.mktemp("log") / "log.csv"
+    write_log(path, simulate_log(settings, log, TRUTH, "truth"), settings.log)
+    return settings, settings.arm, path, Problem(settings, [log])
+
+
+@pytest.fixture(autouse=True)
+def _no_report(monkeypatch):
+    """Figures take longer than all else here."""
+    monkeypatch.setattr(jobs, "write_report", lambda *_: [])
+
+
+@pytest.fixture
+def folder(made, tmp_path) -> RunFolder:
+    """A run that has begun, with two checkpoints of one and of two generations."""
+    settings, arm, path, _ = made
+    folder = RunFolder(tmp_path / "run")
+    folder.begin(settings, [path])
+    for generations in (1, 2):
+        folder.save(*state_of(made, generations))
+    return folder
+
+
+def state_of(made, generations: int) -> tuple[SearchState, Memo]:
+    rng = np.random.default_rng(generations)
+    memo = Memo(made[-1])
+    memo.restore(rng.random((20, 9)), rng.random((20, 3)))
+    population = Population(rng.integers(0, 2, (6, 144)).astype(bool), rng.random((6, 1)))
+    return SearchState(population, rng.bit_generator.state, rng.random((generations, 6))), memo
+
+
+def same(checkpoint, made, generations: int) -> bool:
+    state, memo = state_of(made, generations)
+    pairs = [
+        (checkpoint.state.population.chromosomes, state.population.chromosomes),
+        (checkpoint.state.population.objectives, state.population.objectives),
+        (checkpoint.state.history, state.history),
+        *zip(checkpoint.memo, memo.arrays(), strict=True),
+    ]
+    return checkpoint.state.rng == state.rng and all(np.array_equal(a, b) for a, b in pairs)
+
+
+@contextmanager
+def files_up_to(size: int):
+    """A real fault of the operating system's: no file may grow beyond `size` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_a_checkpoint_comes_back_as_it_was(folder, made):
+    assert same(folder.checkpoint(), made, 2)
+
+
+def test_flipped_bits_never_change_a_checkpoint(folder, made):
+    """Wherever a bit flips: the newest to its last bit, where the zip does not care, or the one before it."""
+    file, previous = folder.path / "checkpoint.npz", folder.path / PREVIOUS
+    whole, before = file.read_bytes(), previous.read_bytes()
+    rng = np.random.default_rng(0)
+    fallen = 0
+    for place in rng.integers(0, len(whole), 300):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        file.write_bytes(damaged)
+        checkpoint = folder.checkpoint()
+        fallen += not file.exists()
+        assert same(checkpoint, made, 2 if file.exists() else 1)
+        assert previous.read_bytes() == before
+    assert fallen > 200
+
+
+@pytest.mark.parametrize("share", [0, 0.01, 0.5, 0.999])
+def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, made, share, caplog):
+    file = folder.path / "checkpoint.npz"
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(share * len(whole))])
+    assert same(folder.checkpoint(), made, 1)
+    assert "damaged" in caplog.text
+    assert "before it" in caplog.text
+    assert (folder.path / DAMAGED).exists()
+    folder.save(*state_of(made, 3))  # the damaged one must not take the good one's place
+    assert same(folder.checkpoint(), made, 3)
+    (folder.path / "checkpoint.npz").write_bytes(b"")
+    assert same(folder.checkpoint(), made, 1)
+
+
+def test_a_crash_between_the_two_renamings_loses_nothing(folder, made):
+    (folder.path / "checkpoint.npz").unlink()
+    assert same(folder.checkpoint(), made, 1)
+
+
+def test_where_none_is_whole_the_run_says_so(folder):
+    for name in ("checkpoint.npz", PREVIOUS):
+        (folder.path / name).write_bytes(b"PK")
+    with pytest.raises(RunError, match=r"is damaged .* remove the run's checkpoints"):
+        folder.checkpoint()
+    assert (folder.path / "checkpoint.npz").read_bytes() == b"PK"  # left for whoever can mend it
+
+
+def test_the_checkpoint_of_another_run_is_refused(folder, made, tmp_path):
+    settings, arm, path, _ = made
+    other = RunFolder(tmp_path / "other")
+    search = settings.search.model_copy(update={"seed": 2})
+    other.begin(settings.model_copy(update={"search": search}), [path])
+    shutil.copy(folder.path / "checkpoint.npz", other.path)
+    with pytest.raises(RunError, match="another run's"):
+        other.checkpoint()
+
+
+def full_at_fsync(monkeypatch):
+    """A full disk behind a network is told as late as this."""
+
+    def fsync(handle: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+
+
+@pytest.mark.parametrize("fault", ["no room", "at fsync"])
+def test_a_full_disk_leaves_both_checkpoints(folder, made, fault, monkeypatch):
+    before = content(folder.path)
+    state = state_of(made, 3)
+    if fault == "no room":
+        with files_up_to(1000), pytest.raises(RunError, match=r"checkpoint\.npz: cannot be written"):
+            folder.save(*state)
+    else:
+        full_at_fsync(monkeypatch)
+        with pytest.raises(RunError, match="No space left"):
+            folder.save(*state)
+    assert content(folder.path) == before
+    assert same(folder.checkpoint(), made, 2)
+
+
+def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_path):
+    settings, arm, path, _ = made
+    fit_logs(settings, [path], tmp_path / "whole", Watcher(), print)
+    with pytest.raises(KeyboardInterrupt):
+        fit_logs(settings, [path], tmp_path / "run", Watcher(stop_at=2), print)
+    with files_up_to(4000), pytest.raises(RunError, match="cannot be written"):
+        fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+    assert len(RunFolder(tmp_path / "run").checkpoint().state.history) == 2
+    fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+    for name in ("checkpoint.npz", "estimate.yaml", "model/fitted.xml"):
+        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
+    settings, arm, path, _ = made
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match=r"file/run: cannot be written \(Not a directory\)"):
+        fit_logs(settings, [path], tmp_path / "file" / "run", Watcher(), print)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_refused_before_anything_is_simulated(folder, made):
+    settings, arm, path, _ = made
+    folder.path.chmod(0o555)
+    with pytest.raises(RunError, match=r"cannot be written \(Permission denied\)"):
+        fit_logs(settings, [path], folder.path, Watcher(1), print, resume=True)
+    folder.path.chmod(0o755)
+    assert same(folder.checkpoint(), made, 2)
+
+
+def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
+    settings, arm, path, _ = made
+    (tmp_path / "thesis.tex").write_text("mine")
+    for resume in (False, True):
+        with pytest.raises(RunError, match="holds no run"):
+            fit_logs(settings, [path], tmp_path, Watcher(), print, resume=resume)
+    assert content(tmp_path) == {"thesis.tex": b"mine"}
+
+
+def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
+    settings, arm, path, _ = made
+    folder = RunFolder(tmp_path)
+    with locked(tmp_path):
+        folder.begin(settings, [path])
+    (tmp_path / "run.json").unlink()
+    (tmp_path / ".config.yaml.abc.part").write_text("half")
+    fit_logs(settings, [path], tmp_path, Watcher(), print, resume=True)
+    assert folder.identity()["status"] == "done"
+    assert not list(tmp_path.rglob(".*.part"))
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "arm.yaml", "model/arm.xml"])
+def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, made, name):
+    settings, arm, path, _ = made
+    folder.check(settings, [path])
+    file = folder.path / name
+    file.write_text(file.read_text() + "\n")
+    with pytest.raises(RunError, match=f"{name}: has changed since the run began"):
+        folder.check(settings, [path])
+
+
+def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
+    settings, arm, path, _ = made
+    joint = arm.joints[0].model_copy(update={"name": "elsewhere"})
+    with pytest.raises(RunError, match=r"an arm with joints|an arm with .*name"):
+        folder.check(
+            settings.model_copy(update={"arm": arm.model_copy(update={"joints": (joint, *arm.joints[1:])})}),
+            [path],
+        )
+    model = tmp_path / "model.xml"
+    text = arm.model.read_text().replace('meshdir="', f'meshdir="{arm.model.parent}/')
+    model.write_text(text)
+    with pytest.raises(RunError, match="another model"):
+        folder.check(settings.model_copy(update={"arm": arm.model_copy(update={"model": model})}), [path])
+
+
+def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
+    settings, arm, path, _ = made
+    with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
+        fit_logs(settings, [path], tmp_path / "run", Watcher(), print)
+    fit_logs(settings, [path], tmp_path / "run", Watcher(), print)
+
+
+def test_a_killed_process_leaves_no_lock(tmp_path):
+    code = f"""
+import pathlib, time
+from hydroid.run.lock import locked
+with locked(pathlib.Path({str(tmp_path)!r})):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "held\n"
+    with pytest.raises(RunError, match=f"in use by process {process.pid} on "), locked(tmp_path):
+        pass
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    with locked(tmp_path):
+        pass
+
+
+def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):
+    def flock(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(lock.fcntl, "flock", flock)
+    with locked(tmp_path):
+        pass
+    assert "no lock on this file system" in caplog.text
+
+
+def test_a_run_tells_its_course_in_its_log(made, tmp_path):
+    settings, arm, path, _ = made
+    with pytest.raises(KeyboardInterrupt):
+        fit_logs(settings, [path], tmp_path / "run", Watcher(stop_at=2), print)
+    fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+    lines = (tmp_path / "run" / "run.log").read_text().splitlines()
+    for words in (
+        "mujoco",
+        f"process {os.getpid()}",
+        "seed 1",
+        str(path),
+        "checkpoint: generation 2 of 4",
+        "interrupted",
+        "resumed after generation 2",
+        "checkpoint: generation 4 of 4",
+        "done in",
+    ):
+        assert any(words in line for line in lines), words
+    times, levels = zip(*(line.split()[:2] for line in lines), strict=True)
+    assert set(levels) == {"INFO"}
+    assert all(len(time) == len("2026-01-01T00:00:00+0000") for time in times)
+
+
+def test_what_is_kept_is_the_content_before(tmp_path):
+    file, kept = tmp_path / "a", tmp_path / "b"
+    for text in ("1", "2", "3"):
+        write_atomic(file, text, keep=kept)
+    assert (file.read_text(), kept.read_text()) == ("3", "2")

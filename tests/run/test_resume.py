@@ -1,0 +1,100 @@
+"""Runs that are killed and resumed end as if nobody had touched them (100 of them: `make kill-resume`)."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
+SHORT = ["--quiet", "--set", "search.ga.population=10", "--algorithm", "ga"]
+OWN = {".lock", "run.log", "checkpoint.previous.npz"}
+"""files of a run that tell of its course"""
+
+
+def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
+    """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after every generation."""
+    log = cwd / "log.csv"
+    if not log.exists():
+        log.write_text("\n".join(LOG.read_text().splitlines()[:601]) + "\n")
+    code = "import hydroid.cli.app as a, hydroid.fitting.search as s; s.SAVE_EVERY = 0; a.main()"
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "fit-mech",
+        "log.csv",
+        *map(str, options),
+        "--out",
+        out,
+        "--resume",
+    ]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def finish(process: "subprocess.Popen[str]", code: int = 0) -> str:
+    out, errors = process.communicate(timeout=120)
+    assert process.returncode == code, out + errors
+    return errors
+
+
+def wait_for(process: "subprocess.Popen[str]", file: Path) -> None:
+    while not file.exists() and process.poll() is None:
+        time.sleep(1e-3)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    found = (p for p in folder.rglob("*") if p.is_file() and p.name not in OWN)
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in found}
+
+
+def test_killed_runs_end_the_same(tmp_path: Path):
+    options = [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"]
+    finish(start(tmp_path, *options, out="whole"))
+    for met in ("run.json", "checkpoint.npz", "refinement.journal"):
+        process = start(tmp_path, *options, out="killed")
+        wait_for(process, tmp_path / "killed" / met)
+        time.sleep(0.02)
+        process.kill()
+        process.communicate()
+        assert process.returncode == -signal.SIGKILL
+        assert not (tmp_path / "killed" / "estimate.yaml").exists()
+    finish(start(tmp_path, *options, out="killed"))
+    assert content(tmp_path / "killed") == content(tmp_path / "whole")
+
+
+def test_a_clusters_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path):
+    options = [*SHORT, "--set", "search.ga.generations=4000"]
+    process = start(tmp_path, *options, out="run")
+    wait_for(process, tmp_path / "run" / "checkpoint.npz")
+    errors = finish(start(tmp_path, *options, out="run"), 2)
+    assert f"run: is in use by process {process.pid} on " in errors
+    assert len(errors.splitlines()) == 1
+    for _ in range(3):  # clusters repeat themselves
+        process.send_signal(signal.SIGUSR1)
+        time.sleep(0.01)
+    assert "--resume" in finish(process, 130)
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"
+    lines = (tmp_path / "run" / "run.log").read_text().splitlines()
+    assert "checkpoint: generation" in lines[-2]
+    assert "interrupted" in lines[-1]
+    assert not list((tmp_path / "run").rglob(".*.part"))
+
+
+def test_the_runs_log_is_shown_where_it_is_asked_for(tmp_path: Path):
+    options = ["-v", *SHORT[1:], "--set", "search.ga.generations=1", "--no-refinement"]
+    errors = finish(start(tmp_path, *options, out="run")).splitlines()
+    log = (tmp_path / "run" / "run.log").read_text().splitlines()
+    assert [line for line in errors if " INFO " in line] == log
+    assert any("done in" in line for line in log)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_one_line(tmp_path: Path):
+    (tmp_path / "run").mkdir(mode=0o555)
+    errors = finish(start(tmp_path, *SHORT, out="run"), 2)
+    assert errors.startswith("hydroid: run: cannot be written (Permission denied)")

@@ -1,0 +1,322 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hydroid.search.least_squares import Ending, least_squares
+from hydroid.settings.search import RefinementSettings
+
+SETTINGS = RefinementSettings()
+
+
+def rosenbrock(points):
+    """Rosenbrock's valley, its bottom at (0.75, 0.75)."""
+    x, y = (4 * points - 2).T
+    return np.stack((10 * (y - x**2), 1 - x), axis=1)
+
+
+def linear(singular, truth, rows=400, offset=0.0, seed=0):
+    """Residuals linear in the parameters, with these singular values."""
+    rng = np.random.default_rng(seed)
+    left = np.linalg.qr(rng.normal(size=(rows, len(singular))))[0]
+    right = np.linalg.qr(rng.normal(size=(len(singular), len(singular))))[0]
+    matrix = left * singular @ right.T
+    # einsum sums each row by itself, so that a batch is the same as its candidates, as it is for a simulation
+    return (lambda x: np.einsum("np,rp->nr", x - truth, matrix) + offset), matrix
+
+
+def oscillator(points):
+    """A response that depends on its parameters over several decades, and not on the last one at all."""
+    t = np.linspace(0, 10, 300)
+    gain, damping, stiffness, tail, _ = points.T[:, :, None]
+    wave = np.exp(-(0.1 + damping) * t) * np.sin((1 + stiffness) * t)
+    return gain * wave + 1e-4 * tail * np.cos(3 * t)
+
+
+@pytest.mark.parametrize("start", [[0.2, 0.9], [0.0, 0.0], [1.0, 0.0], [0.01, 0.99]])
+def test_finds_the_bottom_of_rosenbrocks_valley(start):
+    result = least_squares(np.array(start), rosenbrock, SETTINGS)
+    np.testing.assert_allclose(result.point, 0.75, atol=1e-9)
+    assert result.ending.converged
+    assert result.cost_after < 1e-18 < result.cost_before
+
+
+def test_a_problem_over_six_decades_is_solved_to_its_weakest_direction():
+    truth = np.array([0.3, 0.6, 0.4, 0.7, 0.5, 0.2])
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), truth)
+    result = least_squares(np.full(6, 0.5), residuals, SETTINGS)
+    np.testing.assert_allclose(result.point, truth, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_curved_problem_over_six_decades_is_solved_too(seed):
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(0.3, 0.7, 6)
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), truth)
+
+    def curved(x):
+        return residuals(x + 0.5 * (x - truth) ** 2)
+
+    result = least_squares(np.clip(truth + rng.uniform(-0.3, 0.3, 6), 0, 1), curved, SETTINGS)
+    np.testing.assert_allclose(result.point, truth, atol=1e-8)
+
+
+@pytest.mark.parametrize("unit", [2.0**-60, 2.0**-20, 2.0**30])
+def test_the_unit_of_the_residual_does_not_matter(unit):
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4))
+    start = np.linspace(0.3, 0.6, 6)
+    here, there = (
+        least_squares(start, residuals, SETTINGS),
+        least_squares(start, lambda x: unit * residuals(x), SETTINGS),
+    )
+    assert (here.point == there.point).all()
+    assert there.cost_after == unit**2 * here.cost_after
+    assert (here.evaluations, here.ending) == (there.evaluations, there.ending)
+
+
+def test_no_point_is_simulated_twice_in_a_row():
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4), offset=1e-3 * np.sin(np.arange(400)))
+    tried = []
+
+    def watched(x):
+        if len(x) == 1:
+            tried.append(x[0].tobytes())
+        return residuals(x)
+
+    least_squares(np.full(6, 0.5), watched, SETTINGS)
+    assert all(a != b for a, b in pairwise(tried))
+
+
+def test_no_step_below_the_tolerance_is_simulated():
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4))
+    tried = []
+
+    def watched(x):
+        if len(x) == 1:
+            tried.append(x[0])
+        return residuals(x)
+
+    least_squares(np.full(6, 0.5), watched, RefinementSettings(step_tolerance=1e-9))
+    costs = [float((residuals(x[None]) ** 2).sum()) for x in tried]
+    for k in range(1, len(tried)):
+        origin = tried[int(np.argmin(costs[:k]))]
+        assert np.linalg.norm(tried[k] - origin) >= 1e-9 * np.linalg.norm(origin)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_nonlinear_response_is_recovered_and_the_parameter_without_effect_stays(seed):
+    truth = np.array([0.4, 0.3, 0.7, 0.6, 0.5])
+    start = np.clip(truth + np.random.default_rng(seed).uniform(-0.15, 0.15, 5), 0, 1)
+    measured = oscillator(truth[None])
+    result = least_squares(start, lambda x: measured - oscillator(x), SETTINGS)
+    assert result.point[4] == start[4]
+    np.testing.assert_allclose(result.point[:4], truth[:4], atol=1e-8)
+    assert result.ending.converged
+
+
+def test_an_effect_that_is_only_rounding_is_none():
+    truth = np.array([0.4, 0.6, 0.5])
+    strong, _ = linear([3.0, 1.0], truth[:2])
+
+    def residuals(x):
+        # (r + a) - a rounds to multiples of 2^-46, and where it does so depends on the third parameter
+        noise = 64 + np.pi * x[:, 2:]
+        return (strong(x[:, :2]) + noise) - noise
+
+    start = np.array([0.2, 0.2, 0.313])
+    probe = residuals(start + 2.0**-26 * np.array([[0, 0, 0], [0, 0, 1]]))
+    assert (probe[0] != probe[1]).any()
+    result = least_squares(start, residuals, SETTINGS)
+    assert result.point[2] == start[2]
+    np.testing.assert_allclose(result.point[:2], truth[:2], atol=1e-10)
+
+
+def test_a_parameter_without_effect_changes_nothing_for_the_others():
+    truth = np.array([0.3, 0.6, 0.4, 0.7, 0.5, 0.2])
+    residuals, _ = linear(10.0 ** -np.arange(0, 6), truth)
+    start = np.linspace(0.3, 0.6, 6)
+    alone = least_squares(start, residuals, SETTINGS)
+    joined = least_squares(np.insert(start, 2, 0.77), lambda x: residuals(np.delete(x, 2, axis=1)), SETTINGS)
+    assert joined.point[2] == 0.77
+    np.testing.assert_allclose(np.delete(joined.point, 2), alone.point, atol=1e-9)
+    assert joined.evaluations - alone.evaluations <= joined.iterations + 1  # one more a Jacobian
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_what_lies_on_a_bound_is_neither_stepped_over_nor_stuck_at(seed):
+    rng = np.random.default_rng(seed)
+    residuals, _ = linear(rng.uniform(0.1, 2, 5), rng.uniform(-1, 2, 5), seed=seed)
+    seen = []
+
+    def watched(x):
+        seen.append(x)
+        return residuals(x)
+
+    assert least_squares(rng.random(5), watched, SETTINGS).ending.converged
+    assert np.vstack(seen).min() >= 0
+    assert np.vstack(seen).max() <= 1
+
+
+def test_bounds_hold_and_the_rest_is_optimal_on_them():
+    truth = np.array([1.4, 0.5, -0.3])
+    residuals, matrix = linear([2.0, 1.0, 0.5], truth)
+    result = least_squares(np.full(3, 0.5), residuals, SETTINGS)
+    assert ((result.point >= 0) & (result.point <= 1)).all()
+    # first-order conditions of a box: no slope inside, slope outwards on the bounds
+    slope = matrix.T @ residuals(result.point[None])[0]
+    inside = (result.point > 1e-12) & (result.point < 1 - 1e-12)
+    assert not inside.all()
+    np.testing.assert_allclose(slope[inside], 0, atol=1e-8)
+    assert (slope[result.point >= 1 - 1e-12] <= 0).all()
+    assert (slope[result.point <= 1e-12] >= 0).all()
+
+
+@pytest.mark.parametrize("rank", [1, 2, 3])
+def test_a_rank_deficient_problem_is_fitted_as_well_as_it_can_be(rank):
+    singular = np.array([1.0, 0.3, 0.1, 0.03])
+    singular[rank:] = 0
+    residuals, _ = linear(singular, np.full(4, 0.45))
+    result = least_squares(np.array([0.2, 0.6, 0.5, 0.3]), residuals, SETTINGS)
+    assert result.cost_after < 1e-18 * result.cost_before
+    assert result.ending.converged
+
+
+def test_with_noise_it_ends_at_the_least_squares_solution_without_trying_forever():
+    offset = np.random.default_rng(1).normal(0, 1e-2, 400)
+    truth = np.array([0.4, 0.5, 0.6])
+    residuals, matrix = linear([5.0, 1.0, 0.2], truth, offset=offset)
+    result = least_squares(np.full(3, 0.2), residuals, SETTINGS)
+    exact = truth - np.linalg.lstsq(matrix, offset, rcond=None)[0]
+    np.testing.assert_allclose(result.point, exact, atol=1e-7)
+    assert result.ending.converged
+    assert result.evaluations < 60
+
+
+@settings(deadline=None)  # the first refinement of a process is slow
+@given(seed=st.integers(0, 2**32), failing=st.floats(0, 1))
+def test_never_worse_than_the_start_and_always_inside(seed, failing):
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(-0.3, 1.3, 3)
+    mix = rng.normal(size=(3, 20))
+
+    def residuals(x):
+        rows = np.sin(3 * (x - truth)) @ mix + 0.01 * np.sin(40 * x.sum(axis=1, keepdims=True))
+        rows[np.cos(12 * x).sum(axis=1) > 3 - 2 * failing] = (
+            np.nan
+        )  # scattered regions that cannot be simulated
+        return rows
+
+    start = rng.random(3)
+    result = least_squares(start, residuals, RefinementSettings(iterations=20))
+    before = 0.5 * float((residuals(start[None]) ** 2).sum())
+    if result.ending is Ending.START_FAILED:
+        assert not np.isfinite(before)
+        assert (result.point == start).all()
+        return
+    after = 0.5 * float((residuals(result.point[None]) ** 2).sum())
+    assert result.cost_before == pytest.approx(before, rel=1e-12)
+    assert result.cost_after == pytest.approx(after, rel=1e-12)
+    assert result.cost_after <= result.cost_before
+    assert ((result.point >= 0) & (result.point <= 1)).all()
+
+
+def fails_where(condition, residuals):
+    def failing(x):
+        rows = residuals(x)
+        rows[condition(x)] = np.nan
+        return rows
+
+    return failing
+
+
+def test_a_failing_forward_step_is_taken_backwards():
+    truth = np.array([0.2, 0.3])
+    residuals, _ = linear([1.0, 0.4], truth)
+    start = np.array([0.45, 0.3])
+    result = least_squares(start, fails_where(lambda x: x[:, 0] > 0.45, residuals), SETTINGS)
+    np.testing.assert_allclose(result.point, truth, atol=1e-9)
+
+
+def test_failures_on_both_sides_end_it_with_the_best_point_so_far():
+    residuals = fails_where(lambda x: (x[:, 0] != 0.45) & (x[:, 0] > 0.44), rosenbrock)
+    start = np.array([0.45, 0.3])
+    result = least_squares(start, residuals, SETTINGS)
+    assert result.ending is Ending.JACOBIAN_FAILED
+    assert not result.ending.converged
+    assert (result.point == start).all()
+    assert result.cost_after == result.cost_before
+
+
+def test_a_bound_is_not_stepped_over_when_the_inner_step_fails():
+    residuals, _ = linear([1.0, 0.4], np.array([0.2, 0.3]))
+    seen = []
+
+    def watched(x):
+        seen.append(x)
+        return fails_where(lambda x: x[:, 1] < 1, residuals)(x)
+
+    result = least_squares(np.array([0.5, 1.0]), watched, SETTINGS)
+    assert result.ending is Ending.JACOBIAN_FAILED
+    assert np.vstack(seen).max() <= 1
+
+
+@pytest.mark.filterwarnings("error")
+def test_failing_trial_steps_are_rejected():
+    truth = np.array([0.9, 0.75])
+    residuals = fails_where(lambda x: x[:, 0] > 0.6, linear([1.0, 0.7], truth)[0])
+    result = least_squares(np.array([0.1, 0.1]), residuals, SETTINGS)
+    assert result.cost_after < 0.3 * result.cost_before
+    assert result.point[0] <= 0.6
+
+
+def test_a_start_that_fails_is_named():
+    result = least_squares(np.full(2, 0.5), lambda x: np.full((len(x), 5), np.nan), SETTINGS)
+    assert result.ending is Ending.START_FAILED
+    assert (result.evaluations, result.iterations, result.cost_after) == (1, 0, np.inf)
+
+
+def test_a_perfect_start_stays():
+    residuals, _ = linear([1.0, 0.5], np.array([0.5, 0.25]))
+    result = least_squares(np.array([0.5, 0.25]), residuals, SETTINGS)
+    assert (result.point == [0.5, 0.25]).all()
+    assert result.ending is Ending.GRADIENT
+
+
+def test_nothing_with_any_effect_ends_at_once():
+    result = least_squares(np.array([0.3, 0.8]), lambda x: np.ones((len(x), 5)), SETTINGS)
+    assert result.ending is Ending.GRADIENT
+    assert (result.point == [0.3, 0.8]).all()
+
+
+def test_iterations_run_out():
+    result = least_squares(np.array([0.1, 0.9]), rosenbrock, RefinementSettings(iterations=2))
+    assert result.ending is Ending.ITERATIONS
+    assert result.iterations == 2
+    assert result.cost_after < result.cost_before
+
+
+def test_a_long_tolerance_is_met_by_a_short_step():
+    result = least_squares(np.array([0.1, 0.9]), rosenbrock, RefinementSettings(step_tolerance=0.5))
+    assert result.ending is Ending.STEP
+
+
+def test_every_simulated_member_is_counted_and_nothing_is_printed(capfd):
+    seen = []
+
+    def counted(x):
+        seen.append(len(x))
+        return rosenbrock(x)
+
+    result = least_squares(np.array([0.2, 0.9]), counted, SETTINGS)
+    assert result.evaluations == sum(seen)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_arguments_are_left_alone():
+    start = np.array([0.2, 0.9])
+    start.flags.writeable = False
+    least_squares(start, rosenbrock, SETTINGS)
+    assert start.tolist() == [0.2, 0.9]

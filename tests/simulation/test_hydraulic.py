@@ -1,0 +1,211 @@
+"""Stage 2 as the fit sees it: commands in, angles out, through the whole chain beside MuJoCo."""
+
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import candidates as arms
+from conftest import step_log
+
+from hydroid.hydraulics.actuator import Actuator
+from hydroid.hydraulics.parameters import Linkages, nominal_parameters
+from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.simulation import SimulationSettings
+from hydroid.simulation import Candidates, HydraulicSimulation
+from hydroid.simulation.hydraulic import mass_entries
+from hydroid.simulation.population import Population, quiet_mujoco
+from hydroid.simulation.record import Record
+from hydroid.simulation.rollout import compile_rollout, roll
+
+JOINTS = range(7)
+SHOULDER = [1]
+
+
+def simulation(spec, arm, log, outputs=SHOULDER, hydraulics=None, **settings) -> HydraulicSimulation:
+    chosen = SimulationSettings(**settings)
+    record = Record(spec, arm, log, list(outputs), chosen)
+    return HydraulicSimulation(record, arm, hydraulics or HydraulicSettings(), chosen)
+
+
+def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:
+    """Random arms with actuators whose areas, currents and calibration differ too."""
+    rng = np.random.default_rng(seed)
+    actuators = nominal_parameters(arm, HydraulicSettings(**hydraulics), JOINTS, n)
+    for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
+        getattr(actuators, name)[:] *= rng.uniform(0.7, 1.4, (n, 1))
+    return Candidates(arms(arm, n, seed), actuators)
+
+
+@pytest.fixture(scope="module")
+def steps(arm):
+    return step_log(arm.pose("study"), [60.0, -80.0, 0.0, 30.0, -40.0])
+
+
+@pytest.mark.parametrize("other", ["locked", "passive", "measured"])
+def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, steps, other):
+    everyone = candidates(arm, 7)
+    together = simulation(spec, arm, steps, other_joints=other, threads=1).simulate(everyone).angle
+    assert np.ptp(together, axis=1).min() > np.deg2rad(1)
+    for settings in ({"threads": 2}, {"threads": 3, "chunk_mib": 1}):
+        again = simulation(spec, arm, steps, other_joints=other, **settings).simulate(everyone).angle
+        np.testing.assert_array_equal(again, together)
+    alone = simulation(spec, arm, steps, other_joints=other).simulate(everyone[slice(3, 4)]).angle
+    np.testing.assert_array_equal(alone, together[3:4])
+
+
+def test_with_shut_valves_and_no_leakage_the_arm_stands_for_a_minute(spec, arm):
+    log = step_log(arm.pose("study"), [0.0], dwell=60.0)
+    everyone = candidates(arm, 3, leakage=0.0)
+    response = simulation(spec, arm, log, other_joints="passive").simulate(everyone)
+    assert response.feasible.all()
+    assert np.abs(response.angle[:, :, 0] - arm.pose("study")[1]).max() < 1e-6
+
+
+def test_the_answer_converges_with_mujocos_step(spec, arm, steps):
+    everyone = candidates(arm, 4)
+    angle = [simulation(spec, arm, steps, steps_per_sample=s).simulate(everyone).angle for s in (1, 2, 4, 16)]
+    errors = [np.abs(a - angle[-1]).max() for a in angle[:-1]]
+    assert errors[0] < np.deg2rad(0.3)
+    assert errors[2] < 0.5 * errors[0]
+
+
+def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, steps):
+    everyone = candidates(arm, 2)
+    stiff = replace(everyone.arm, stiffness=np.where(np.arange(7) == 1, everyone.arm.stiffness, 1e5))
+    stiff = replace(stiff, damping=np.where(np.arange(7) == 1, everyone.arm.damping, 1e4))
+    locked = simulation(spec, arm, steps).simulate(everyone).angle
+    passive = simulation(spec, arm, steps, other_joints="passive").simulate(
+        Candidates(stiff, everyone.actuators)
+    )
+    np.testing.assert_allclose(passive.angle, locked, atol=np.deg2rad(0.1))
+
+
+def test_only_products_that_the_chain_knows_matter(spec, arm, steps):
+    """F1, F2, x1, x2 act through two numbers, and the currents' scale trades with them: null directions."""
+    one = candidates(arm, 2)
+    assert one.actuators is not None
+    a = one.actuators
+    ratio = np.sqrt(a.force_1 / a.force_2)
+    gap = (a.stroke_2 - ratio * a.stroke_1) / (ratio - 1)
+    coil = a.force_1 * (a.stroke_1 + gap) ** 2
+    x1, x2 = a.stroke_1 * 1.5, a.stroke_2 * 0.6
+    along = replace(
+        a, stroke_1=x1, stroke_2=x2, force_1=4 * coil / (x1 + gap) ** 2, force_2=4 * coil / (x2 + gap) ** 2
+    )
+    along = replace(along, current_max=a.current_max / 2, current_min=a.current_min / 2)
+    run = simulation(spec, arm, steps).simulate
+    np.testing.assert_allclose(run(Candidates(one.arm, along)).angle, run(one).angle, atol=1e-9)
+
+
+def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
+    spec, arm, steps, capfd, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    everyone = candidates(arm, 3)
+    run = simulation(spec, arm, steps).simulate
+    healthy = run(everyone).angle
+    assert everyone.actuators is not None
+    capfd.readouterr()
+    force = everyone.actuators.force_2.copy()
+    force[1] = 100.0  # the force would grow with the stroke
+    response = run(Candidates(everyone.arm, replace(everyone.actuators, force_2=force)))
+    np.testing.assert_array_equal(response.feasible, [True, False, True])
+    np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
+    assert np.isnan(response.angle[1]).all()
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()
+    nobody = run(Candidates(everyone.arm, replace(everyone.actuators, force_2=np.full((3, 7), 100.0))))
+    assert not nobody.feasible.any()
+
+
+def test_the_trace_explains_the_motion(spec, arm, steps):
+    """Oil into chamber A over its area is the rod's way; no pressure is below vapour."""
+    one = candidates(arm, 1, leakage=0.0, bulk_modulus=8e5)
+    run = simulation(spec, arm, steps)
+    angle = run.simulate(one).angle[0, :, 0]
+    trace = run.trace(one)
+    assert list(trace.joints) == [2]
+    assert trace.pressure.shape == (len(steps.time), 1, 2)
+    assert trace.pressure.min() >= 0
+    from hydroid.arm.linkage import linkage
+
+    cylinder = linkage(arm.joints[1])
+    way = cylinder.travel(angle) - cylinder.travel(angle[:1])
+    assert one.actuators is not None
+    oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.actuators.area_a[0, 1]
+    assert np.ptp(way) > 2e-3
+    np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
+
+
+def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, steps):
+    """Step by step in Python, with delayed commands."""
+    one = candidates(arm, 1, delay=0.033)
+    run = simulation(spec, arm, steps, [1, 3], HydraulicSettings(delay=0.033), other_joints="passive")
+    together = run.simulate(one).angle[0]
+    record = run.record
+    population = Population(record.arm, 1, 1)
+    balance = population.start(one.arm, record.joints, record.pose)
+    model = copy(record.arm.model)
+    data = mujoco.MjData(model)
+    population.copy(0, model, data)
+    model.dof_damping[:] = 0.0
+    assert one.actuators is not None
+    actuator = Actuator(
+        one.actuators,
+        Linkages.of(arm, JOINTS, [1, 3]),
+        one.arm.damping,
+        0.01,
+        HydraulicSettings(delay=0.033),
+        mass_entries(model),
+    )
+    state = actuator.start(data.qpos[None], balance)
+    angle = [data.qpos.copy()]
+    for command in steps.command[:-1]:
+        torque, armature = actuator.advance(state, command, data.qpos[None], data.qvel[None], data.M[None])
+        data.qfrc_applied[:], model.dof_armature[:] = torque[0], record.arm.model.dof_armature + armature[0]
+        mujoco.mj_step(model, data)
+        data.qpos[:] = actuator.close(state, data.qvel[None], data.M[None])[0]
+        angle.append(data.qpos.copy())
+    assert np.ptp(together[:, 0]) > np.deg2rad(1)
+    np.testing.assert_array_equal(together, np.array(angle)[:, [1, 3]])
+
+
+def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    everyone = candidates(arm, 3)
+    run = simulation(spec, arm, steps, other_joints="passive", threads=1)
+    healthy = run.simulate(everyone).angle
+    stiffness = everyone.arm.stiffness.copy()
+    stiffness[1, 4] = 1e9  # MuJoCo's spring is explicit in the angle: at 0.01 s it blows up
+    capfd.readouterr()
+    response = run.simulate(Candidates(replace(everyone.arm, stiffness=stiffness), everyone.actuators))
+    np.testing.assert_array_equal(response.feasible, [True, False, True])
+    assert np.isnan(response.angle[1]).all()
+    np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()
+
+
+def test_single_steps_are_the_whole_record(spec, arm, steps):
+    """As the viewer does it: with a delay, and joints that follow the log."""
+    one = candidates(arm, 1, delay=0.033)
+    run = simulation(spec, arm, steps, hydraulics=HydraulicSettings(delay=0.033), other_joints="measured")
+    whole = run.simulate(one).angle[0, :, 0]
+    live = run.begin(one)
+    with quiet_mujoco():
+        for command, angle in zip(run.command, whole, strict=False):
+            assert live.position[0, 1] == angle
+            live.step(command)
+    assert live.healthy
+
+
+def test_compiling_is_announced_only_when_it_happens(spec, arm, steps):
+    compile_rollout(lambda: None)
+    said: list[str] = []
+    compile_rollout(lambda: said.append("compiling"))
+    assert not said
+    simulation(spec, arm, steps, other_joints="measured").simulate(candidates(arm, 1))
+    assert len(roll.signatures) == 1  # what was made ready is what is used

@@ -1,0 +1,194 @@
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import candidates, step_log
+from scipy.integrate import solve_ivp
+
+from hydroid.settings.simulation import SimulationSettings
+from hydroid.simulation import ArmParameters, Candidates, MechanicalSimulation
+from hydroid.simulation.record import Record
+
+SHOULDER = [1]
+
+
+class Simulation(MechanicalSimulation):
+    """With the arm's parameters alone."""
+
+    def simulate(self, parameters: ArmParameters):
+        return super().simulate(Candidates(parameters))
+
+
+def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
+    chosen = SimulationSettings(**settings)
+    return Simulation(Record(spec, arm, log, list(outputs), chosen), chosen)
+
+
+@pytest.mark.parametrize("other", ["locked", "passive"])
+def test_without_commands_the_arm_stands_for_a_minute(spec, arm, other):
+    log = step_log(arm.pose("study"), [0.0], dwell=60.0)
+    response = simulation(spec, arm, log, range(7), other_joints=other).simulate(candidates(arm, 5))
+    assert response.feasible.all()
+    # gravity's gradient is a spring that may be unstable; rounding must not have grown to anything
+    assert np.abs(response.angle - arm.pose("study")).max() < 1e-9
+
+
+def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
+    parameters = candidates(arm, 1)
+    response = simulation(spec, arm, study_log, range(7), other_joints="passive").simulate(parameters)
+    own = spec.copy()
+    for name, mass, nominal in zip(arm.link_names, parameters.mass[0], arm.masses, strict=True):
+        body = own.body(name)
+        body.fullinertia = np.asarray(body.fullinertia) * mass / nominal
+        body.mass = mass
+    own.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+    model = own.compile()
+    model.dof_damping[:], model.jnt_stiffness[:] = parameters.damping[0], parameters.stiffness[0]
+    pose = study_log.angle[0]
+    model.qpos_spring[:] = pose
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_forward(model, data)
+    balance = data.qfrc_bias.copy()
+    angle = [pose]
+    for command in study_log.command[:-1]:
+        data.qfrc_applied[:] = balance + parameters.gain[0] * command
+        mujoco.mj_step(model, data)
+        angle.append(data.qpos.copy())
+    assert np.ptp(np.array(angle)[:, 1]) > np.deg2rad(2)  # it moves
+    np.testing.assert_allclose(response.angle[0], np.array(angle), atol=1e-9)
+
+
+def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
+    """Against Radau on I q'' = K u + tau0 - g(q) - D q' - S (q - q0), with first order in the step."""
+    parameters = candidates(arm, 1)
+    model = spec.copy().compile()
+    for name, mass, nominal in zip(arm.link_names, parameters.mass[0], arm.masses, strict=True):
+        body = model.body(name).id
+        model.body_inertia[body] *= mass / nominal
+        model.body_mass[body] = mass
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+    data = mujoco.MjData(model)
+    pose = study_log.angle[0]
+    mass_matrix = np.empty((7, 7))
+
+    def gravity_and_inertia(q: float) -> tuple[float, float]:
+        data.qpos[:] = pose
+        data.qpos[1] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, mass_matrix)
+        return data.qfrc_bias[1], mass_matrix[1, 1]
+
+    balance, _ = gravity_and_inertia(pose[1])
+    gain, damping, stiffness = (x[0, 1] for x in (parameters.gain, parameters.damping, parameters.stiffness))
+
+    def motion(t, y, u):
+        bias, inertia = gravity_and_inertia(y[0])
+        torque = gain * u + balance - bias - damping * y[1] - stiffness * (y[0] - pose[1])
+        return [y[1], torque / inertia]
+
+    state, reference = [pose[1], 0.0], [pose[1]]
+    for k in range(5):  # one interval of constant command after the other
+        u = study_log.command[100 * k, 1]
+        times = np.linspace(0, 1, 101)
+        solution = solve_ivp(motion, (0, 1), state, "Radau", times, args=(u,), rtol=1e-10, atol=1e-12)
+        reference.extend(solution.y[0, 1:])
+        state = solution.y[:, -1]
+    errors = []
+    for steps in (1, 2, 4, 8):
+        angle = simulation(spec, arm, study_log, steps_per_sample=steps).simulate(parameters).angle[0, :, 0]
+        errors.append(np.abs(angle - reference[:-1]).max())
+    assert errors[0] < np.deg2rad(0.1)
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(orders, 1.0, atol=0.1)
+
+
+@pytest.mark.parametrize("other", ["locked", "passive"])
+def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, study_log, other):
+    one = candidates(arm, 3)
+    scaled = ArmParameters(*(1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)))
+    run = simulation(spec, arm, study_log, other_joints=other).simulate
+    np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
+
+
+def test_the_first_link_has_no_effect_on_the_shoulder(spec, arm, study_log):
+    one = candidates(arm, 3)
+    mass = one.mass.copy()
+    mass[:, 0] *= 3.0
+    run = simulation(spec, arm, study_log, other_joints="passive").simulate
+    np.testing.assert_allclose(run(replace(one, mass=mass)).angle, run(one).angle, atol=1e-12)
+
+
+@pytest.mark.parametrize("other", ["locked", "passive", "measured"])
+def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other):
+    parameters = candidates(arm, 11)
+    together = simulation(spec, arm, study_log, other_joints=other, threads=1).simulate(parameters).angle
+    for settings in ({"threads": 2}, {"threads": 5, "chunk_mib": 1}):
+        other_run = simulation(spec, arm, study_log, other_joints=other, **settings)
+        np.testing.assert_array_equal(other_run.simulate(parameters).angle, together)
+    alone = simulation(spec, arm, study_log, other_joints=other)
+    # large after small and small after large: the buffers of one call leave nothing to the next
+    for rows in (slice(3, 5), slice(0, 11), slice(7, 8)):
+        np.testing.assert_array_equal(alone.simulate(parameters[rows]).angle, together[rows])
+
+
+def test_memory_for_a_chunk_is_bounded(spec, arm, study_log):
+    small = simulation(spec, arm, study_log, other_joints="passive", chunk_mib=1)
+    assert small.record.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
+    assert simulation(spec, arm, study_log, other_joints="passive").record.chunk > small.record.chunk
+
+
+def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, study_log, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parameters = candidates(arm, 4)
+    damping, stiffness = parameters.damping.copy(), parameters.stiffness.copy()
+    damping[2], stiffness[2] = 0.0, 1e9  # explicit at 0.01 s: blows up
+    run = simulation(spec, arm, study_log, other_joints="passive").simulate
+    healthy = run(parameters)
+    response = run(replace(parameters, damping=damping, stiffness=stiffness))
+    np.testing.assert_array_equal(response.feasible, [True, True, False, True])
+    assert np.isnan(response.angle[2]).all()
+    np.testing.assert_array_equal(response.angle[[0, 1, 3]], healthy.angle[[0, 1, 3]])
+    np.testing.assert_array_equal(run(parameters).angle, healthy.angle)  # and nothing is left of it
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()
+
+
+def test_prescribed_joints_give_the_shoulder_the_motion_they_had(spec, arm):
+    """Move every joint, then prescribe all but the shoulder: it must move as it did, coupling included."""
+    log = step_log(arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
+    command = log.command.copy()
+    command[:, 2] = -command[:, 1]
+    command[:, 3] = 0.5 * command[:, 1]
+    moved = replace(log, command=command)
+    parameters = candidates(arm, 1)
+    free = simulation(spec, arm, moved, range(7), other_joints="passive").simulate(parameters).angle[0]
+    assert np.ptp(free[:, 2]) > np.deg2rad(2)
+    only_shoulder = replace(log, angle=free)  # its commands drive the shoulder alone
+    errors = []
+    for steps in (1, 8):
+        settings = {"measured_cutoff_hz": 50.0, "steps_per_sample": steps}
+        run = simulation(spec, arm, only_shoulder, other_joints="measured", **settings)
+        errors.append(np.abs(run.simulate(parameters).angle[0, :, 0] - free[:, 1]).max())
+    locked = simulation(spec, arm, only_shoulder).simulate(parameters).angle[0, :, 0]
+    assert errors[0] < 0.02 * np.abs(locked - free[:, 1]).max()
+    assert errors[0] < np.deg2rad(0.01)
+
+
+def test_prescribed_joints_that_stand_still_are_locked_joints(spec, arm, study_log):
+    parameters = candidates(arm, 2)
+    locked = simulation(spec, arm, study_log).simulate(parameters).angle
+    still = simulation(spec, arm, study_log, other_joints="measured").simulate(parameters).angle
+    np.testing.assert_allclose(still, locked, atol=1e-6)
+
+
+def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
+    log = step_log(arm.pose("study"), [20.0, 20.0, 20.0])
+    parameters = candidates(arm, 1)
+    torque = 20.0 * parameters.gain[0, 1]
+    holding = replace(parameters, friction=np.full_like(parameters.friction, 3 * torque))
+    run = simulation(spec, arm, log).simulate
+    moved = np.ptp(run(parameters).angle)
+    assert np.ptp(run(holding).angle) < 0.05 * moved

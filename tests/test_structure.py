@@ -1,0 +1,88 @@
+"""Data walks one way: no room imports one that stands after it."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1] / "hydroid"
+
+# a room may import rooms of a lower layer, and itself
+LAYERS = [
+    {"errors", "__init__"},
+    {"assets", "files", "parameters", "settings"},
+    {"log", "arm", "hydraulics"},
+    {"simulation", "search", "execution", "parallel"},
+    {"problem"},
+    {"plant"},
+    {"uncertainty"},
+    {"fitting", "experiment"},
+    {"run"},
+    {"report"},
+    {"simulating"},
+    {"jobs"},
+    {"studies", "collect"},
+    {"viewer"},
+    {"api"},
+    {"cli"},
+    {"__main__"},
+]
+LEVEL = {room: level for level, rooms in enumerate(LAYERS) for room in rooms}
+FILES = sorted(ROOT.rglob("*.py"))
+
+
+def room(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported_rooms(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text())
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names.add(node.module or "")
+            names |= {f"{node.module}.{alias.name}" for alias in node.names if node.module == "hydroid"}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return {name.split(".")[1] for name in names if name.startswith("hydroid.")} & LEVEL.keys()
+
+
+def test_every_file_belongs_to_a_room():
+    assert {room(path) for path in FILES} <= LEVEL.keys()
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_upward_import(path: Path):
+    here = room(path)
+    upward = {other for other in imported_rooms(path) if LEVEL[other] > LEVEL[here]}
+    beside = {other for other in imported_rooms(path) if LEVEL[other] == LEVEL[here] and other != here}
+    assert not upward, f"{here} imports {upward}"
+    # within a layer rooms do not know each other, but for the small ones at the bottom
+    assert not beside or LEVEL[here] <= 1, f"{here} imports its neighbour {beside}"
+
+
+def test_the_search_knows_no_robot():
+    allowed = {"errors", "settings", "search"}
+    for path in (ROOT / "search").glob("*.py"):
+        assert imported_rooms(path) <= allowed, path
+        text = path.read_text()
+        assert "mujoco" not in text or path.name == "least_squares.py", path
+
+
+def test_the_execution_knows_no_robot():
+    for path in (ROOT / "execution").glob("*.py"):
+        assert imported_rooms(path) <= {"errors", "settings", "execution"}, path
+
+
+def test_the_command_line_imports_nothing_heavy():
+    heavy = {"numpy", "mujoco", "scipy", "matplotlib", "numba", "trimesh", "pydantic", "rich", "jinja2"}
+    for path in (ROOT / "cli").glob("*.py"):
+        if path.stem in ("running", "progress"):  # imported by a command when it runs
+            continue
+        tree = ast.parse(path.read_text())
+        top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        for node in top:
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+            assert not {n.split(".")[0] for n in names} & heavy, path
+            assert all(not n.startswith("hydroid.") or n.startswith("hydroid.cli") for n in names), path

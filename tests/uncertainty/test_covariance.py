@@ -1,0 +1,290 @@
+"""Uncertainty by laws: closed forms of linear problems, known noise, how often intervals cover the truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+
+from hydroid.errors import SettingsError
+from hydroid.parameters import Parameter, ParameterSet
+from hydroid.problem.channels import Channel
+from hydroid.problem.priors import Priors
+from hydroid.settings.fit import FitSettings, ParameterSettings
+from hydroid.settings.priors import PriorSettings
+from hydroid.uncertainty.covariance import judge, uncertainty
+from hydroid.uncertainty.intervals import REACH, THRESHOLD, bootstrap, profile
+from hydroid.uncertainty.jacobian import jacobian
+from hydroid.uncertainty.noise import FLOOR, Noise, channel_noise, fit_noise
+
+DEG = np.deg2rad(1.0)
+AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
+
+
+class Linear:
+    """A problem whose residuals are linear in its parameters: y - X theta, channel after channel."""
+
+    def __init__(
+        self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **objective
+    ):
+        self.columns, self.measured, self.simulated = columns, measured, 0
+        names = "abcdefgh"[: len(theta)]
+        self.parameters = ParameterSet(
+            tuple(
+                Parameter(n, "kg", -9 * abs(t) * unit, 11 * abs(t) * unit, t * unit if n in fixed else None)
+                for n, t in zip(names, theta, strict=True)
+            )
+        )
+        self.unit = unit
+        one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
+        self.settings = FitSettings(
+            parameters=dict.fromkeys(names, one), objective={"segments": {"equal": 1}} | objective
+        )
+        statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
+        self.priors = Priors(statements, self.parameters)
+        edges = np.linspace(0, len(measured), len(weights) + 1).astype(int)
+        self.channels = tuple(
+            Channel(i, 2, "angle", 0, measured[a:b], w, slice(a, b))
+            for i, (a, b, w) in enumerate(zip(edges[:-1], edges[1:], weights, strict=True))
+        )
+        self.weight = np.repeat(weights, np.diff(edges))
+
+    def residuals(self, theta):
+        self.simulated += len(theta)
+        return self.weight * (self.measured - theta / self.unit @ self.columns)
+
+
+def slow(count, samples=1000, seed=0):
+    """Slow signals as regressors, like an arm's responses."""
+    rng = np.random.default_rng(seed)
+    walk = np.cumsum(rng.normal(size=(count, samples)), axis=1) / np.sqrt(samples)
+    return walk
+
+
+def ar1(rng, samples, phi, level):
+    out = np.empty(samples)
+    out[0] = rng.normal(0, level)
+    for i, e in enumerate(rng.normal(0, level * np.sqrt(1 - phi**2), samples - 1), start=1):
+        out[i] = phi * out[i - 1] + e
+    return out
+
+
+def least_squares(columns, measured):
+    return np.linalg.lstsq(columns.T, measured)[0]
+
+
+THETA = np.array([1.0, -2.0, 3.0])
+
+
+def white_problem(**how):
+    columns, rng = slow(3), np.random.default_rng(1)
+    measured = THETA @ columns + rng.normal(0, 0.1 * DEG, columns.shape[1])
+    return Linear(columns, measured, THETA, **how), least_squares(columns, measured)
+
+
+def test_a_given_white_noise_gives_the_textbook_covariance():
+    problem, theta = white_problem(noise_deg=0.2)
+    found = uncertainty(problem, theta)
+    expected = (0.2 * DEG) ** 2 * np.linalg.inv(problem.columns @ problem.columns.T)
+    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-7)
+    outer = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    sign = np.sign(np.outer(theta, theta))  # relative changes of a negative parameter count the other way
+    np.testing.assert_allclose(found.correlation * np.abs(sign), expected / outer, atol=1e-6)
+    assert problem.simulated == 1 + 4 * 3
+
+
+def test_the_sandwich_is_right_where_weights_and_noise_do_not_match():
+    weights, levels = (1.0, 5.0), np.array([0.1, 0.4]) * DEG
+    columns, rng = slow(3), np.random.default_rng(2)
+    scatter = np.repeat(levels, 500)
+    problem = Linear(columns, THETA @ columns + rng.normal(0, scatter), THETA, weights=weights)
+    weight = problem.weight
+    bread = np.linalg.inv(columns * weight**2 @ columns.T)
+    expected = bread @ (columns * weight**4 * scatter**2 @ columns.T) @ bread
+    at = jacobian(problem, THETA)
+    noise = tuple(Noise(500, w * s, np.empty(0), "settings") for w, s in zip(weights, levels, strict=True))
+    found = judge(problem, THETA, at, noise)
+    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-6)
+
+
+def test_a_unit_changes_no_relative_deviation():
+    (one, theta), (other, _) = white_problem(), white_problem(unit=1000.0)
+    a, b = uncertainty(one, theta), uncertainty(other, 1000 * theta)
+    np.testing.assert_allclose(a.relative, b.relative, rtol=1e-9)
+    np.testing.assert_allclose(1000 * a.interval, b.interval, rtol=1e-9)
+
+
+def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
+    columns = slow(4)
+    columns[1], columns[2] = 2 * columns[0], 0.0  # a and b trade, c does nothing
+    theta = np.array([1.0, 2.0, 3.0, 4.0])
+    rng = np.random.default_rng(3)
+    problem = Linear(columns, theta @ columns + rng.normal(0, 0.1 * DEG, 1000), theta, noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    assert found.flags[:3] == (("not determined",), ("not determined",), ("no effect on the outputs",))
+    assert np.isinf(found.interval[:3]).all()
+    assert not found.flags[3]
+    pair = columns[[0, 3]]
+    expected = 0.1 * DEG * np.sqrt(np.linalg.inv(pair @ pair.T)[1, 1])
+    assert found.standard_deviation[3] == pytest.approx(expected, rel=1e-6)
+    fixed = Linear(columns, problem.measured, theta, fixed="b", noise_deg=0.1)
+    assert uncertainty(fixed, theta).flags == ((), ("held fixed",), ("no effect on the outputs",), ())
+
+
+def test_a_statement_is_one_more_measurement():
+    columns = slow(3)
+    columns[1] = columns[0]
+    theta, rng = np.array([1.0, 2.0, 4.0]), np.random.default_rng(4)
+    measured = theta @ columns + rng.normal(0, 0.1 * DEG, 1000)
+    known = {"sum": {"of": ["a", "c"], "value": 5.0, "sd": 0.05}}
+    problem = Linear(columns, measured, theta, known=known, noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    statement = np.array([[1.0, 0.0, 1.0]]) / 0.05
+    information = columns @ columns.T / (0.1 * DEG) ** 2 + statement.T @ statement
+    # the residual's level, by which the statement was weighed, is the noise to about 2 %
+    np.testing.assert_allclose(
+        found.standard_deviation, np.sqrt(np.diag(np.linalg.inv(information))), rtol=1e-3
+    )
+    assert found.flags == ((), (), ())
+    assert uncertainty(Linear(columns, measured, theta), theta).flags[0] == ("not determined",)
+
+
+def test_a_bound_takes_the_interval():
+    problem, theta = white_problem(noise_deg=0.1)
+    at = theta.copy()
+    at[2] = problem.parameters.upper[2]
+    found = uncertainty(problem, at)
+    assert found.flags[2] == ("at upper bound",)
+    assert np.isnan(found.interval[2]).all()
+    assert np.isfinite(found.interval[:2]).all()
+
+
+def test_a_derivative_that_depends_on_its_step_is_said():
+    problem, theta = white_problem()
+    smooth = problem.residuals
+    jump = 1e-5 * problem.columns[0]
+    problem.residuals = lambda t: smooth(t) + np.where(t[:, :1] > theta[0], 1.0, 0.0) * jump
+    found = jacobian(problem, theta)
+    assert found.doubt[0] > 0.01
+    assert (found.doubt[1:] < 1e-6).all()
+    # the wider of the two steps counts: it feels the jump less
+    error = found.slopes[0] + theta[0] * problem.columns[0]
+    np.testing.assert_allclose(error, -jump / 2e-3 * np.sign(error @ -jump), rtol=1e-3, atol=1e-6)
+
+
+def test_derivatives_at_a_bound_stay_inside():
+    problem, theta = white_problem()
+    seen = []
+    inner = problem.residuals
+    problem.residuals = lambda t: (seen.append(t), inner(t))[1]
+    at = theta.copy()
+    at[0], at[2] = problem.parameters.upper[0], problem.parameters.lower[2]
+    found = jacobian(problem, at)
+    points = np.vstack(seen)
+    assert (points <= problem.parameters.upper).all()
+    assert (points >= problem.parameters.lower).all()
+    np.testing.assert_allclose(found.slopes, -problem.columns * np.abs(at)[:, None], atol=1e-8)
+
+
+@pytest.mark.parametrize("reflection", [[], [-AR1], [0.5, -0.3, 0.8]])
+def test_the_autocovariance_and_its_whitening_belong_together(reflection):
+    noise = Noise(60, 2.0, np.array(reflection))
+    covariance = toeplitz(noise.autocovariance)
+    white = noise.whitened(np.eye(60))  # rows L^-1 e_i
+    np.testing.assert_allclose(white.T @ white @ np.ones(60), white.T @ (white @ np.ones(60)))
+    np.testing.assert_allclose(white @ white.T @ covariance, np.eye(60), atol=1e-9)
+    rows = slow(3, 60)
+    np.testing.assert_allclose(noise.covariance_of(rows), rows @ covariance @ rows.T, rtol=1e-9)
+
+
+def test_a_first_order_process_has_the_textbook_autocovariance():
+    noise = Noise(200, 3.0, np.array([-AR1]))
+    np.testing.assert_allclose(noise.autocovariance, 9 * AR1 ** np.arange(200), rtol=1e-9)
+    assert noise.correlation_time == pytest.approx(15, abs=1)
+    # the variance of the mean of 200 such samples, directly
+    variance = toeplitz(noise.autocovariance).mean()
+    assert noise.effective_sample_size == pytest.approx(9 / variance)
+    assert Noise(200, 3.0, np.empty(0)).effective_sample_size == 200
+
+
+def test_a_known_process_is_found_and_whitened():
+    rng = np.random.default_rng(5)
+    series = ar1(rng, 20_000, AR1, 0.1 * DEG)
+    noise = fit_noise(series)
+    assert 1 <= len(noise.reflection) <= 8
+    assert -noise.reflection[0] == pytest.approx(AR1, abs=0.005)
+    assert noise.level == pytest.approx(0.1 * DEG, rel=0.05)
+    white = noise.whitened(series[None])[0]
+    assert np.mean(white**2) == pytest.approx(1, rel=0.03)
+    lagged = [np.mean(white[k:] * white[:-k]) for k in range(1, 6)]
+    assert np.abs(lagged).max() < 0.03
+    assert len(fit_noise(rng.normal(size=20_000)).reflection) <= 8
+
+
+def test_noise_is_taken_from_settings_residual_or_floor():
+    problem, _ = white_problem()
+    (channel,) = problem.channels
+    how, rng = problem.settings.objective, np.random.default_rng(6)
+    residual = rng.normal(0, 0.3 * DEG, 1000)
+    assert channel_noise(channel, residual, how).source == "residual"
+    assert channel_noise(channel, 1e-6 * residual, how).level == FLOOR["angle"]
+    given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
+    assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
+    weighted = channel_noise(
+        replace(channel, weight=3.0), residual, how.model_copy(update={"noise_deg": 0.7})
+    )
+    assert weighted.level == pytest.approx(2.1 * DEG)
+
+
+@pytest.mark.parametrize("phi", [0.0, AR1])
+def test_intervals_cover_the_truth_as_often_as_they_say(phi):
+    """400 linear fits, noise estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""
+    columns, hits, rng = slow(3, 1500, seed=7), [], np.random.default_rng(8)
+    deviations, estimates = [], []
+    for _ in range(400):
+        measured = THETA @ columns + ar1(rng, 1500, phi, 0.1 * DEG)
+        theta = least_squares(columns, measured)
+        found = uncertainty(Linear(columns, measured, THETA), theta)
+        hits.append((found.interval[:, 0] <= THETA) & (found.interval[:, 1] >= THETA))
+        deviations.append(found.standard_deviation)
+        estimates.append(theta)
+    cover = np.mean(hits, axis=0)
+    assert (cover > 0.92).all(), cover
+    assert (cover < 0.98).all(), cover
+    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1)
+
+
+def test_the_profile_of_a_linear_problem_is_its_parabola():
+    problem, theta = white_problem(noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    one = profile(problem, found, "b")
+    deviation = found.standard_deviation[1]
+    np.testing.assert_allclose(one.deviance, ((one.values - theta[1]) / deviation) ** 2, atol=2e-3)
+    np.testing.assert_allclose(one.values[[0, -1]], theta[1] + REACH * deviation * np.array([-1, 1]))
+    half = np.sqrt(THRESHOLD) * deviation
+    np.testing.assert_allclose(one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4)
+    with pytest.raises(SettingsError, match="no free parameter 'z'"):
+        profile(problem, found, "z")
+
+
+def test_the_profile_of_what_is_not_determined_has_no_end():
+    columns = slow(3)
+    columns[1] = columns[0]
+    problem = Linear(columns, THETA @ columns + np.random.default_rng(0).normal(0, DEG, 1000), THETA)
+    found = uncertainty(problem, THETA)
+    assert profile(problem, found, "a").interval == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize("phi", [0.0, AR1])
+def test_the_bootstrap_spreads_as_the_linear_look_says(phi):
+    columns, rng = slow(3, 6000, seed=7), np.random.default_rng(11)
+    measured = THETA @ columns + ar1(rng, 6000, phi, 0.1 * DEG)
+    theta = least_squares(columns, measured)
+    problem = Linear(columns, measured, THETA)
+    found = uncertainty(problem, theta)
+    drawn = bootstrap(problem, found, 400, 1, lambda *_: None)
+    assert drawn.shape == (400, 3)
+    # blocks of finite length miss a part of slow noise, the more the longer it lasts
+    np.testing.assert_allclose(drawn.std(axis=0), found.standard_deviation, rtol=0.1 if phi == 0 else 0.25)
+    np.testing.assert_allclose(drawn.mean(axis=0), theta, atol=3 * found.standard_deviation.max())
+    np.testing.assert_array_equal(drawn, bootstrap(problem, found, 400, 1, lambda *_: None))

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test demo bench article article-hyd accuracy many-parameters design-study coverage fuzz kill-resume slurm wheel meshes model clean
+.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -15,8 +15,11 @@ check: setup  ## formatter, linter, type checker
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 
-test: setup
-	$(BIN)/pytest
+test: setup  ## the fast tests: four minutes on two cores
+	$(BIN)/pytest -m "not slow"
+
+test-slow: setup  ## killed processes, clusters, thousands of files
+	$(BIN)/pytest -m slow
 
 demo: setup  ## both stages on one log of the virtual rig, and the other log to judge them by
 	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."
@@ -27,9 +30,13 @@ demo: setup  ## both stages on one log of the virtual rig, and the other log to 
 	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
 		--fit runs/demo/ga --fit runs/demo/nsga2 --fit runs/demo/hyd --out runs/demo/validation
 
-bench: setup  ## what a simulation costs, and what hydroid adds to it (docs/measured.md)
+bench: setup  ## the time to an answer, what a simulation costs, and what hydroid adds to it (docs/measured.md)
+	$(BIN)/python benchmarks/answer.py
 	$(BIN)/python benchmarks/throughput.py
-	$(BIN)/python benchmarks/scaling.py --dask
+	$(BIN)/python benchmarks/scaling.py
+
+structure: setup  ## size and shape of the code
+	$(BIN)/python benchmarks/structure.py
 
 article: setup  ## the article's simulated study over ten seeds (docs/measured.md); half an hour
 	$(BIN)/python benchmarks/article_mech.py

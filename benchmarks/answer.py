@@ -2,8 +2,8 @@
 
     python benchmarks/answer.py [--repeats 5]
 
-Wall-clock seconds of whole processes on this machine; run it with nothing else on the machine's cores. The parts of
-each fit are what the run itself measured (`seconds` in its run.json).
+Wall-clock seconds of whole processes on this machine; run it with nothing else on the machine's cores. The
+parts of each fit are what the run itself measured (`seconds` in its run.json).
 """
 
 import argparse
@@ -37,6 +37,7 @@ def seconds(*arguments: str, status: int = 0) -> float:
 def demo(folder: Path) -> None:
     """Run the demo of the Makefile; print each command's time and the parts of each fit."""
     runs = {name: str(folder / name) for name in ("ga", "nsga2", "hyd")}
+    fits = [f"--fit={run}" for run in runs.values()]
     commands = {
         "stage 1, GA": ("fit-mech", LOGS[0], "--algorithm", "ga", "--out", runs["ga"]),
         "stage 1, NSGA-II": ("fit-mech", LOGS[0], "--algorithm", "nsga2", "--out", runs["nsga2"]),
@@ -44,7 +45,7 @@ def demo(folder: Path) -> None:
         "validation": (
             "validate",
             *LOGS,
-            *(f"--fit={run}" for run in runs.values()),
+            *fits,
             "--out",
             str(folder / "v"),
         ),

@@ -2,9 +2,9 @@
 
     python benchmarks/structure.py [FOLDER ...]
 
-Each folder is a checkout; the default is this one. One column per checkout. Lines are physical lines. A function's
-arguments are all but `self` and `cls`; the command line's own functions, whose arguments are its options, are
-counted apart.
+Each folder is a checkout; the default is this one. One column per checkout. Lines are physical lines. A
+function's arguments are all but `self` and `cls`; the command line's own functions, whose arguments are its
+options, are counted apart.
 """
 
 import ast
@@ -92,7 +92,8 @@ def measure(checkout: Path) -> dict[str, str]:
     lines = [len(path.read_text().splitlines()) for path in trees]
     every = [(path, f) for path, tree in trees.items() for f in functions(tree)]
     lengths = [(f.end_lineno or f.lineno) - f.lineno + 1 for _, f in every]
-    wide = [path for path, f in every if arguments(f) > MOST_ARGUMENTS]
+    wide = ["cli" in path.parts for path, f in every if arguments(f) > MOST_ARGUMENTS]
+    more = f"functions with more than {MOST_ARGUMENTS} arguments"
     elsewhere = {
         name: sum(len(p.read_text().splitlines()) for p in (checkout / name).rglob("*.py"))
         for name in ("tests", "benchmarks")
@@ -106,8 +107,8 @@ def measure(checkout: Path) -> dict[str, str]:
         "functions": f"{len(every):,}",
         "median function": f"{statistics.median(lengths):g}",
         "largest function": f"{max(lengths)}",
-        f"functions with more than {MOST_ARGUMENTS} arguments, outside cli/": f"{sum('cli' not in p.parts for p in wide)}",
-        f"functions with more than {MOST_ARGUMENTS} arguments, in cli/": f"{sum('cli' in p.parts for p in wide)}",
+        f"{more}, outside cli/": f"{wide.count(False)}",
+        f"{more}, in cli/": f"{wide.count(True)}",
         "classes": f"{classes}",
         "settings": setting_count(checkout),
         "import cycles": f"{cycles(package, trees)}",

@@ -1,0 +1,306 @@
+"""The kinds of files that hydroid reads, and the command that reads each.
+
+A damaged file is accepted, or refused with one printable line; anything else is a defect of hydroid. An accepted
+log is also read by an independent reader, and must hold the same numbers.
+"""
+
+import contextlib
+import csv
+import io
+import json
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import trimesh
+import typer
+import yaml
+from damage import TOKENS, VALUES, change_tree, damage
+
+import hydroid
+from hydroid.cli.app import app
+from hydroid.errors import HydroidError
+
+ROOT = Path(__file__).parents[2]
+LOGS = ROOT / "examples" / "logs"
+TINY = ("--algorithm=ga", "--set=search.ga={population: 4, generations: 1}", "--no-refinement", "--quiet")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file.
+
+    seeds: intact files. place: the path of a file below a room's folder. command: what reads it. tree: whether it
+    is YAML or JSON, whose values are damaged too. check: looks at an accepted one.
+    """
+
+    name: str
+    seeds: Callable[[], Sequence[bytes]]
+    place: str
+    command: Callable[[Path, bytes], Sequence[str]]
+    tree: bool = False
+    check: Callable[[Path, bytes], None] | None = None
+
+    def make(self, seed: int) -> bytes:
+        """Return the damaged file of a seed."""
+        rng = Random(f"{self.name} {seed}")
+        data = rng.choice(self.seeds())
+        if self.tree and rng.random() < 0.5:
+            text = yaml.safe_dump(change_tree(rng, yaml.safe_load(data)), sort_keys=False, allow_unicode=True)
+            return text.encode("utf-8", "surrogatepass")
+        return damage(rng, data)
+
+    def read(self, room: Path, data: bytes) -> bool:
+        """Return whether a file is accepted; False where it is refused in one line. All else raises."""
+        path = room / self.place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+        refusal = run(self.command(room, data))
+        if refusal is None and self.check is not None:
+            self.check(path, data)
+        return refusal is None
+
+
+def run(arguments: Sequence[str]) -> str | None:
+    """Run a command in this process; return why it refused its input, or None.
+
+    Raises:
+        AssertionError: the refusal is not one printable line.
+    """
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = app(list(arguments), standalone_mode=False)
+        except HydroidError as refusal:
+            text = str(refusal)
+            assert text.isprintable(), ascii(text)
+            assert 0 < len(text) < 2000, text
+            return text
+        except typer.Exit as end:
+            code = end.exit_code
+    for line in (out.getvalue() + err.getvalue()).splitlines():
+        assert line.replace("\t", " ").isprintable(), ascii(line)
+    return out.getvalue() if code else None
+
+
+@cache
+def logs() -> tuple[bytes, ...]:
+    """Short logs in the dialects that are recognised."""
+    plain, turning = (
+        b"\n".join((LOGS / name).read_bytes().splitlines()[:82]) + b"\n"
+        for name in ("rig_shoulder_1.csv", "rig_all_joints_1.csv")
+    )
+    text = turning.decode()
+    rows = [line.split(",") for line in text.splitlines()]
+    quoted = "\r\n".join(",".join(f'"{cell}"' for cell in row) for row in rows)
+    comma = "sep=;\n" + text.replace(",", ";").replace(".", ",")
+    noted = "# a rig\n\n" + "\n".join(line + ",note" for line in text.splitlines())
+    slow = "\n".join(",".join(row) for row in [rows[0], *rows[1::3]])
+    return (plain, turning, *(t.encode() for t in (quoted, comma, noted, slow)), text.encode("utf-16"))
+
+
+def check_log(path: Path, data: bytes) -> None:
+    """Compare what hydroid reads from a log of the default layout with an independent reading."""
+    log = hydroid.read_logs([path], hydroid.load_settings("fit-mech"))[0]
+    names, cells = _cells(data)
+    time = cells[:, names.index("time_s")]
+    assert (np.diff(time) > 0).all()
+    assert abs(time[-1] - time[0] - log.time[-1]) < 0.011
+    near = np.abs(time - time[0] - 0.01 * np.arange(len(time))).max() <= 0.000101
+    at = log.time if near and len(time) == len(log.time) else time - time[0]
+    for joint in range(log.joints):
+        command, angle = (
+            cells[:, names.index(f"{n}{joint + 1}_{u}")] for n, u in (("u", "pct"), ("q", "deg"))
+        )
+        held = np.clip(command[np.searchsorted(at, log.time + 1e-8, side="right") - 1], -100, 100)
+        np.testing.assert_allclose(log.command[:, joint], held, atol=1e-12)
+        line = np.interp(log.time, at, np.unwrap(np.radians(angle)) if joint == 5 else np.radians(angle))
+        turns = 2 * np.pi * np.rint((log.angle[:, joint] - line) / (2 * np.pi)) if joint == 5 else 0.0
+        np.testing.assert_allclose(log.angle[:, joint] - turns, line, atol=1e-9)
+
+
+def _cells(data: bytes) -> tuple[list[str], np.ndarray]:
+    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    try:
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = [x for x in lines if x.strip(" \t,;|") and not x.strip(" \t,;").startswith(("#", "sep="))]
+    for separator in ",;\t|":
+        names = [name.strip() for name in next(csv.reader([lines[0]], delimiter=separator))]
+        if "time_s" in names:
+            rows = [next(csv.reader([line], delimiter=separator)) for line in lines[1:]]
+            decimal = "." if separator == "," else ","
+            wanted = [i for i, n in enumerate(names) if n == "time_s" or n.endswith(("_pct", "_deg"))]
+            cells = [[float(row[i].replace(decimal, ".")) for i in wanted] for row in rows]
+            return [names[i] for i in wanted], np.array(cells)
+    raise AssertionError("no separator gives a column time_s")
+
+
+@cache
+def configs() -> tuple[bytes, ...]:
+    """Shipped settings, and one that uses what they leave out."""
+    shown = {
+        "parameters": {
+            "K": {"quantity": "gain", "bounds": [0.1, 1]},
+            "D": {"quantity": "damping", "fixed": 200},
+        },
+        "log": {"joints": {4: {"command": {"scale": 0.5}}, 7: None}, "delay_s": 0.1},
+        "priors": {"gain": {"of": {"K": 1}, "value": 0.4, "sd": 0.1}},
+        "objective": {"norm": 2, "weights": {2: 3.0}, "segments": {"times": [0.2, 0.5]}},
+        "search": {"algorithm": "ga", "seed": 7},
+        "refinement": None,
+    }
+    shipped = [(ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("fit-mech", "fit-hyd")]
+    return (*shipped, yaml.safe_dump(shown, sort_keys=False).encode())
+
+
+def overrides() -> tuple[bytes, ...]:
+    """Settings as --set has them, with values of all kinds."""
+    keys = [
+        "search.seed",
+        "outputs",
+        "parameters.K.bounds",
+        "log.joints.4.command",
+        "objective.segments",
+        "log.delay_s",
+    ]
+    values = [*TOKENS, *(json.dumps(v, default=str) for v in VALUES), "3", "[2,3]", "{times: [1,2]}"]
+    return tuple(f"{key}={value}".encode("utf-8", "surrogatepass") for key in keys for value in values)
+
+
+@cache
+def arms() -> tuple[bytes, ...]:
+    """An arm of two boxes."""
+    cylinder = {"kind": "linear", "a": 0.25, "b": 0.065, "theta0": 90, "stroke": 100, "area_a": 800}
+    cylinder |= {"area_b": 600, "max_opening": 0.35, "towards": [-1, 0, 0]}
+    rotary = {"kind": "rotary", "displacement": 10, "max_opening": 0.2}
+    joint = {"axis": [0, -1, 0], "at": [0, 0, 0.1], "range": [-50, 50]}
+    links = [{"name": n, "mesh": "rod.stl", "mass": 2.0} for n in ("upper", "fore")]
+    arm = {"name": "two", "model": "two.xml", "meshes": ".", "base": {"mesh": "base.stl"}, "links": links}
+    arm |= {"joints": [{"name": n, **joint, "actuator": a} for n, a in (("s", cylinder), ("e", rotary))]}
+    return (yaml.safe_dump(arm | {"poses": {"home": [0, 0]}}, sort_keys=False).encode(),)
+
+
+@cache
+def boxes() -> dict[str, bytes]:
+    """Meshes of the arm of two boxes."""
+    base, rod = trimesh.creation.box((0.2, 0.2, 0.1)), trimesh.creation.box((0.5, 0.06, 0.04))
+    return {"base.stl": base.export(file_type="stl"), "rod.stl": rod.export(file_type="stl")}
+
+
+def build(room: Path, data: bytes) -> Sequence[str]:
+    """Return the command that builds the arm's model from its YAML and its meshes."""
+    for name, content in {**boxes(), "arm.yaml": arms()[0]}.items():
+        if not (room / "arm" / name).exists():
+            (room / "arm" / name).write_bytes(content)
+    return ("build-model", "--arm", str(room / "arm" / "arm.yaml"), "--out", str(room / "built.xml"))
+
+
+def models() -> tuple[bytes, ...]:
+    """The shipped MJCF, its meshes by their full path."""
+    text = (ROOT / "models" / "hydrolek.xml").read_text()
+    return (text.replace('meshdir="../meshes"', f'meshdir="{ROOT / "meshes"}"').encode(),)
+
+
+def simulate(room: Path, data: bytes) -> Sequence[str]:
+    """Return the command that simulates with the room's values and model, where it has them."""
+    (room / "log.csv").write_bytes(logs()[0])
+    values = room / "values.yaml"
+    given = values if values.exists() else ROOT / "examples" / "article" / "truth.yaml"
+    arm = yaml.safe_load((ROOT / "configs" / "hydrolek.yaml").read_text())
+    arm |= {
+        "model": str(
+            room / "model.xml" if (room / "model.xml").exists() else ROOT / "models" / "hydrolek.xml"
+        )
+    }
+    (room / "arm.yaml").write_text(yaml.safe_dump(arm | {"meshes": str(ROOT / "meshes")}))
+    own = f"--set=arm={room / 'arm.yaml'}"
+    return (
+        "simulate",
+        str(room / "log.csv"),
+        "--params",
+        str(given),
+        "--out",
+        str(room / "out.csv"),
+        own,
+        "--quiet",
+    )
+
+
+@cache
+def finished(folder: Path) -> Path:
+    """Return a finished run in a folder, fitted once."""
+    log = folder / "log.csv"
+    log.write_bytes(logs()[0])
+    assert run(("fit-mech", str(log), "--out", str(folder / "run"), *TINY)) is None
+    return folder / "run"
+
+
+def run_kinds(folder: Path) -> Iterator[Kind]:
+    """Yield the kinds that need a finished run, which is made in `folder`: its own files."""
+
+    def copied(room: Path) -> Path:
+        shutil.copytree(finished(folder), room / "run", dirs_exist_ok=True)
+        return room / "run"
+
+    def command(name: str) -> Callable[[Path, bytes], Sequence[str]]:
+        def arguments(room: Path, data: bytes) -> Sequence[str]:
+            (copied(room) / name).write_bytes(data)
+            if name == "checkpoint.npz":
+                return ("fit-mech", "--resume", "--out", str(room / "run"), "--quiet")
+            return (
+                "validate",
+                str(folder / "log.csv"),
+                "--fit",
+                str(room / "run"),
+                "--json",
+                f"--out={room / 'v'}",
+            )
+
+        return arguments
+
+    for name in ("run.json", "config.yaml", "arm.yaml", "estimate.yaml", "checkpoint.npz"):
+        seeds = cache(lambda name=name: ((finished(folder) / name).read_bytes(),))
+        yield Kind(name, seeds, f"run/{name}", command(name), tree=name.endswith((".yaml", ".json")))
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("log", logs, "log.csv", lambda room, _: ("check", str(room / "log.csv")), check=check_log),
+        Kind(
+            "config",
+            configs,
+            "c.yaml",
+            lambda room, _: ("check", _log(room), "--config", str(room / "c.yaml")),
+            True,
+        ),
+        Kind(
+            "set",
+            overrides,
+            "set",
+            lambda room, data: ("check", _log(room), "--set", data.decode("utf-8", "replace")),
+        ),
+        Kind("arm", arms, "arm/arm.yaml", build, True),
+        Kind("mesh", lambda: (boxes()["rod.stl"],), "arm/rod.stl", build),
+        Kind(
+            "values",
+            lambda: ((ROOT / "examples/article/truth.yaml").read_bytes(),),
+            "values.yaml",
+            simulate,
+            True,
+        ),
+        Kind("model", models, "model.xml", simulate),
+    )
+}
+
+
+def _log(room: Path) -> str:
+    (room / "log.csv").write_bytes(logs()[0])
+    return str(room / "log.csv")

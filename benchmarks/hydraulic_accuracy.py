@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from hydraulic_arm import DrivenArm, scatter
 from hydraulic_reference import draw, parameters, pulses, reference, simulate
 
-from hydroid.hydraulics.parameters import nominal_parameters
+from hydroid.hydraulics.records import nominal_parameters
 from hydroid.settings.arm import load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arm.linkage import pivots
 from hydroid.arm.mesh import MassProperties, mass_properties
+from hydroid.arm.pivots import pivots
 from hydroid.arm.quiet import quiet_mujoco
 from hydroid.arm.scene import CHROME, PAINT, STEEL, add_scene
 from hydroid.errors import ModelError

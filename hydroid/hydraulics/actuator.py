@@ -18,10 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydroid.hydraulics import kernel
-from hydroid.hydraulics.balance import holding_pressures
-from hydroid.hydraulics.cylinder import oil_pressure, triangle, volume
-from hydroid.hydraulics.parameters import LINEAR, NONE, ActuatorParameters, Array, Linkages
-from hydroid.hydraulics.records import JOINT, coefficients
+from hydroid.hydraulics.cylinder import holding_pressures, oil_pressure, triangle, volume
+from hydroid.hydraulics.records import JOINT_STATE, LINEAR, NONE, Array, Records, coefficients
 from hydroid.hydraulics.solenoid import resting_stroke
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -31,7 +29,7 @@ class ActuatorState:
     """Plungers, oil and recent commands of a population; `advance` and `close` change it in place."""
 
     joints: NDArray[np.void]
-    """shape (n, J), of JOINT"""
+    """shape (n, J), of JOINT_STATE"""
     commands: Array
     """the recent ones, newest last [%], shape (H, J)"""
 
@@ -54,8 +52,9 @@ class Actuator:
     """All actuators of a population on one model.
 
     Args:
-        parameters: of n candidates; the coil of an infeasible one has no force, its spool never moves.
-        linkages: of the J joints.
+        parameters: of n candidates, from `records.nominal_parameters`, shape (n, J); the coil of an
+            infeasible one has no force, its spool never moves.
+        linkages: of the J joints, from `records.linkages`.
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
         settings: sub-steps, plunger dynamics, start level.
@@ -67,14 +66,14 @@ class Actuator:
 
     def __init__(
         self,
-        parameters: ActuatorParameters,
-        linkages: Linkages,
+        parameters: Records,
+        linkages: Records,
         damping: ArrayLike,
         period: float,
         settings: HydraulicSettings,
         entries: NDArray[np.intp] | None = None,
     ) -> None:
-        self.shape = parameters.area_a.shape
+        self.shape = parameters.shape
         joints = self.shape[1]
         driven = linkages.kind != NONE
         order = np.argsort(driven, stable=True)
@@ -108,7 +107,7 @@ class Actuator:
             self._level,
         )
         fill_a, fill_b = _fills(c, angle)
-        z = np.zeros(self.shape, JOINT)
+        z = np.zeros(self.shape, JOINT_STATE)
         z["oil_a"] = pressure_a + c["bulk_modulus"] * fill_a
         z["oil_b"] = pressure_b + c["bulk_modulus"] * fill_b
         rest = resting_stroke(c["coil"] * c["current_min"] ** 2, c["gap"], c["plunger_stiffness"])
@@ -133,10 +132,10 @@ class Actuator:
         """
         state.commands[:-1] = state.commands[1:]
         state.commands[-1] = command
-        torque, armature = np.empty(self.shape), np.empty(self.shape)
         angle, velocity, mass = (np.ascontiguousarray(x) for x in (angle, velocity, mass))
-        kernel.advance(self.plugin, state.joints, state.commands, angle, velocity, mass, torque, armature)
-        return torque, armature
+        exchange = kernel.Exchange(angle, velocity, mass, np.empty(self.shape), np.empty(self.shape))
+        kernel.advance(self.plugin, state.joints, state.commands, exchange)
+        return exchange.torque, exchange.armature
 
     def close(self, state: ActuatorState, velocity: Array, mass: Array) -> Array:
         """Take over what MuJoCo's step made of the look-ahead.

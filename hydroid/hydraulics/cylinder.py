@@ -17,29 +17,14 @@ from typing import Any
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, select
+from hydroid.settings import linkage
 
 SLIDING = 1e-3
 """speed [m/s, or rad/s] above which dry friction is nearly full; ours"""
 SMALLEST = 0.1
 """part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
 
-
-@compilable
-def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any) -> Any:
-    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq, the geometry of `hydroid.arm.linkage`.
-
-    Args:
-        angle: of the joint [rad].
-        a: distance of one pivot from the joint's axis [m].
-        b: distance of the other [m].
-        theta0: angle between the pivots at joint angle 0 [rad].
-        shortest: the cylinder's length with the rod fully in [m].
-    """
-    theta = angle + theta0
-    cosine = a * b * np.cos(theta)
-    length = np.sqrt(a * a + b * b - 2.0 * cosine)
-    arm = a * b * np.sin(theta) / length
-    return length - shortest, arm, (cosine - arm * arm) / length
+triangle = compilable(linkage.triangle)
 
 
 @compilable
@@ -75,3 +60,26 @@ def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
 def friction_damping(speed: Any, friction: Any) -> Any:
     """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
     return friction / np.sqrt(speed * speed + SLIDING * SLIDING)
+
+
+def holding_pressures(
+    force: Any, area_a: Any, area_b: Any, supply: Any, tank: Any, level: Any
+) -> tuple[Any, Any]:
+    """Chamber pressures p_A, p_B [Pa] that hold the arm at the start of a run, elementwise (ours).
+
+    They satisfy A_A p_A − A_B p_B = force. Balance leaves their common level open: p_B is `level`,
+    raised or lowered until both pressures lie between tank and supply. For a load too heavy for that, the
+    nearest pressures that hold it are returned, one of them above supply.
+
+    Args:
+        force: A_A p_A − A_B p_B [N]; of a rotary actuator the torque [N·m].
+        area_a: A_A [m²], or D_m [m³/rad].
+        area_b: A_B, likewise.
+        supply: p_S [Pa].
+        tank: p_T [Pa].
+        level: wanted p_B [Pa].
+    """
+    low = np.maximum(tank, (area_a * tank - force) / area_b)
+    high = np.minimum(supply, (area_a * supply - force) / area_b)
+    pressure_b = np.maximum(low, np.minimum(high, level))
+    return (force + area_b * pressure_b) / area_a, pressure_b

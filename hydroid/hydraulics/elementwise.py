@@ -30,7 +30,7 @@ def power(base: Any, exponent: Any) -> Any:
 
 
 @compilable
-def implicit_share(speed: Any) -> Any:
+def implicit_weight(speed: Any) -> Any:
     """Weight of the new state in a linearised step, from rate times step (dimensionless).
 
     One half, the second-order trapezoidal rule, while the step resolves the rate; towards one, backward

@@ -1,19 +1,18 @@
 """One joint of one candidate during a look-ahead: what the compiled loops of `kernel` do with it.
 
-c is its record of coefficients, z what it carries from step to step, w its scratch pad (`records` lists
-their fields). Compiled code only: plain numpy belongs to the components, whose laws are called here.
+c is its record of COEFFICIENTS, z its JOINT_STATE, w its SCRATCH space: `hydroid.hydraulics.records` lists
+their fields. Only compiled code calls these functions; the components' laws, called here, also work on numpy.
 """
 
 from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.amplifier import coil_current
-from hydroid.hydraulics.calibration import side_voltage
+from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.cylinder import friction_damping, stop_damping, triangle, volume
-from hydroid.hydraulics.elementwise import compilable, implicit_share
-from hydroid.hydraulics.parameters import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import plunger_share, plunger_step, resting_stroke
+from hydroid.hydraulics.elementwise import compilable, implicit_weight
+from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
+from hydroid.hydraulics.solenoid import plunger_step, plunger_weight, resting_stroke
 from hydroid.hydraulics.valve import opening, port_flow, spool
 
 
@@ -44,27 +43,17 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
 
 
 @compilable
-def command(c: Any, w: Any, commands: Any, newest: int, joint: int, period: float, substeps: int) -> None:
-    """Drives before and after the delayed command changes, `fresh` sub-steps into this step."""
+def command(c: Any, w: Any, recent: Any, period: float, substeps: int) -> None:
+    """Drives before and after the delayed command changes, `fresh` sub-steps into this step.
+
+    `recent` holds the joint's commands up to now, newest last [%].
+    """
     late = np.floor(c.delay / period)
     w.fresh = (c.delay / period - late) * substeps
-    place = newest - int(late)
-    w.new_a, w.new_b = drives(c, commands[place, joint])
-    w.old_a, w.old_b = drives(c, commands[place - 1, joint])
-    w.plunger_share = plunger_share(c.plunger_mass, c.plunger_damping, c.plunger_stiffness, period / substeps)
-
-
-@compilable
-def _plunger(c: Any, w: Any, stroke: float, speed: float, drive: float, step: float) -> Any:
-    mass, damping, stiffness = c.plunger_mass, c.plunger_damping, c.plunger_stiffness
-    return plunger_step(stroke, speed, drive, c.gap, mass, damping, stiffness, step, w.plunger_share)
-
-
-@compilable
-def _chamber_flow(c: Any, pressure: float, pump_area: float, tank_area: float) -> Any:
-    supply, tank = c.supply_pressure, c.tank_pressure
-    transition, limit = c.transition_pressure, c.flow_limit
-    return port_flow(pressure, pump_area, tank_area, supply, tank, c.conductance, transition, limit)
+    place = recent.size - 1 - int(late)
+    w.new_a, w.new_b = drives(c, recent[place])
+    w.old_a, w.old_b = drives(c, recent[place - 1])
+    w.plunger_weight = plunger_weight(c, period / substeps)
 
 
 @compilable
@@ -78,28 +67,26 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
         z.stroke_b = resting_stroke(drive_b, c.gap, c.plunger_stiffness)
         return spool(z.stroke_a, z.stroke_b)
     before = spool(z.stroke_a, z.stroke_b)
-    z.stroke_a, z.speed_a = _plunger(c, w, z.stroke_a, z.speed_a, drive_a, step)
-    z.stroke_b, z.speed_b = _plunger(c, w, z.stroke_b, z.speed_b, drive_b, step)
+    z.stroke_a, z.speed_a = plunger_step(z.stroke_a, z.speed_a, drive_a, step, w.plunger_weight, c)
+    z.stroke_b, z.speed_b = plunger_step(z.stroke_b, z.speed_b, drive_b, step, w.plunger_weight, c)
     return 0.5 * (before + spool(z.stroke_a, z.stroke_b))
 
 
 @compilable
 def meter(c: Any, w: Any, displacement: float) -> None:
     """Flows into both chambers and how they fall with pressure."""
-    area = opening(
-        displacement, c.opening_a, c.opening_b, c.slot_width, c.overlap_a, c.overlap_b, c.opening_exponent
-    )
+    area = opening(displacement, c)
     ahead, back = c.leakage, c.leakage  # pump to A and B to tank, pump to B and A to tank
     if displacement > 0.0:
         ahead += area
     else:
         back += area
     # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
-    w.wet_a = 1.0 if w.pressure_a > c.vapour_pressure else 0.0
-    w.wet_b = 1.0 if w.pressure_b > c.vapour_pressure else 0.0
-    w.pushed_a, w.pushed_b = max(w.pressure_a, c.vapour_pressure), max(w.pressure_b, c.vapour_pressure)
-    w.q_a, w.g_a = _chamber_flow(c, w.pushed_a, ahead, back)
-    w.q_b, w.g_b = _chamber_flow(c, w.pushed_b, back, ahead)
+    w.filled_a = 1.0 if w.pressure_a > c.vapour_pressure else 0.0
+    w.filled_b = 1.0 if w.pressure_b > c.vapour_pressure else 0.0
+    w.pushing_a, w.pushing_b = max(w.pressure_a, c.vapour_pressure), max(w.pressure_b, c.vapour_pressure)
+    w.inflow_a, w.relief_a = port_flow(w.pushing_a, ahead, back, c)
+    w.inflow_b, w.relief_b = port_flow(w.pushing_b, back, ahead, c)
 
 
 @compilable
@@ -114,43 +101,47 @@ def load(c: Any, w: Any, damping: float, step: float) -> None:
         rub = stop_damping(travel, arm * w.speed, c.stroke, c.stop_penetration)
     else:
         volume_a, volume_b, rub = c.dead_volume, c.dead_volume, 0.0
-    w.resist = damping + arm * arm * (rub + friction_damping(arm * w.speed, c.dry_friction))
-    w.arm_a, w.arm_b = arm * c.area_a, arm * c.area_b
+    w.drag = damping + arm * arm * (rub + friction_damping(arm * w.speed, c.dry_friction))
+    w.lever_a, w.lever_b = arm * c.area_a, arm * c.area_b
     w.rate_a, w.rate_b = step * c.bulk_modulus / volume_a, step * c.bulk_modulus / volume_b
-    relax_a, relax_b = w.wet_a * w.rate_a * w.g_a, w.wet_b * w.rate_b * w.g_b
-    w.share_a, w.share_b = implicit_share(relax_a), implicit_share(relax_b)
-    w.give_a = w.rate_a / (1.0 + w.share_a * relax_a)
-    w.give_b = w.rate_b / (1.0 + w.share_b * relax_b)
-    w.stiff = w.wet_a * w.arm_a * w.arm_a * w.give_a + w.wet_b * w.arm_b * w.arm_b * w.give_b
-    w.share = implicit_share(max(np.sqrt(step * w.stiff / w.inertia), step * w.resist / w.inertia))
-    w.push = w.arm_a * w.pushed_a - w.arm_b * w.pushed_b
-    w.push += w.share * (w.wet_a * w.arm_a * w.give_a * w.q_a - w.wet_b * w.arm_b * w.give_b * w.q_b)
+    relax_a, relax_b = w.filled_a * w.rate_a * w.relief_a, w.filled_b * w.rate_b * w.relief_b
+    w.weight_a, w.weight_b = implicit_weight(relax_a), implicit_weight(relax_b)
+    w.rise_a = w.rate_a / (1.0 + w.weight_a * relax_a)
+    w.rise_b = w.rate_b / (1.0 + w.weight_b * relax_b)
+    w.stiffness = (
+        w.filled_a * w.lever_a * w.lever_a * w.rise_a + w.filled_b * w.lever_b * w.lever_b * w.rise_b
+    )
+    w.weight = implicit_weight(max(np.sqrt(step * w.stiffness / w.inertia), step * w.drag / w.inertia))
+    w.push = w.lever_a * w.pushing_a - w.lever_b * w.pushing_b
+    w.push += w.weight * (
+        w.filled_a * w.lever_a * w.rise_a * w.inflow_a - w.filled_b * w.lever_b * w.rise_b * w.inflow_b
+    )
 
 
 @compilable
 def coast(z: Any, w: Any, damping: float, step: float) -> None:
     """The load of a joint without actuator, the same in all sub-steps."""
-    w.resist, w.stiff, w.push = damping, 0.0, z.hold
-    w.share = implicit_share(step * damping / w.inertia)
+    w.drag, w.stiffness, w.push = damping, 0.0, z.hold
+    w.weight = implicit_weight(step * damping / w.inertia)
 
 
 @compilable
 def settle(c: Any, z: Any, w: Any, gain: float, step: float) -> None:
     """Take over a velocity gain [rad/s]: pressures, oil, way and torque of the sub-step."""
-    mean = w.speed + w.share * gain
+    mean = w.speed + w.weight * gain
     if c.kind != NONE:
-        rise_a = w.give_a * (w.q_a - w.arm_a * mean)
-        rise_b = w.give_b * (w.q_b + w.arm_b * mean)
-        mean_a = w.q_a - w.share_a * w.wet_a * w.g_a * rise_a
-        mean_b = w.q_b - w.share_b * w.wet_b * w.g_b * rise_b
-        w.pressure_a += rise_a
-        w.pressure_b += rise_b
+        gain_a = w.rise_a * (w.inflow_a - w.lever_a * mean)
+        gain_b = w.rise_b * (w.inflow_b + w.lever_b * mean)
+        mean_a = w.inflow_a - w.weight_a * w.filled_a * w.relief_a * gain_a
+        mean_b = w.inflow_b - w.weight_b * w.filled_b * w.relief_b * gain_b
+        w.pressure_a += gain_a
+        w.pressure_b += gain_b
         z.oil_a += w.rate_a * mean_a
         z.oil_b += w.rate_b * mean_b
         w.flow_a += mean_a
         w.flow_b += mean_b
-        w.oil_stiffness += w.stiff / step
-    w.torque += w.push - (w.share * w.stiff + w.resist) * mean
-    w.resistance += w.resist
+        w.oil_stiffness += w.stiffness / step
+    w.torque += w.push - (w.weight * w.stiffness + w.drag) * mean
+    w.resistance += w.drag
     w.way += step * mean
     w.speed += gain

@@ -12,7 +12,7 @@ velocities of all joints. The result is each joint's way, its mean torque τ* an
 
 MuJoCo then finds the true new velocity v from true forces; the torque answers a difference, which grows over
 the step, by −κ (v − v*) in the mean, κ = h C / 6 + D / 2 with C the stiffness of the oil [N·m/rad]. To be
-solved for v at once, κ is lent to MuJoCo as an inertia:
+solved for v at once, κ is added to MuJoCo's inertia:
 
     M (v − v₀)/h = τ* − κ (v − v*) + …   is   (M + h κ) (v − v₀)/h = τ* + κ (v* − v₀) + …
 
@@ -21,7 +21,7 @@ that is strong throws the arm about. After the step `close` puts the joint at q 
 e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped solution, of
 second order in the sub-step and stable for any stiffness; their change is first order in MuJoCo's step.
 
-Every candidate is computed from its own numbers in a fixed order: neither threads nor chunks change a bit of it.
+Every candidate is computed from its own numbers in a fixed order, so neither threads nor chunks change a bit.
 """
 
 import hashlib
@@ -33,15 +33,15 @@ from numba import njit
 
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
-from hydroid.hydraulics.records import WORK
+from hydroid.hydraulics.records import SCRATCH
+from hydroid.settings import linkage
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
 """means of t²/2 and t over a unit step: what a velocity error growing from 0 to 1 does to oil and way"""
 
 # numba keys its cache on one file; as a default argument, the text of all these files is part of the key
-SOURCE = int.from_bytes(
-    hashlib.sha256(b"".join(p.read_bytes() for p in sorted(Path(__file__).parent.glob("*.py")))).digest()[:7]
-)
+_FILES = [*sorted(Path(__file__).parent.glob("*.py")), Path(linkage.__file__)]
+SOURCE = int.from_bytes(hashlib.sha256(b"".join(p.read_bytes() for p in _FILES)).digest()[:7])
 
 
 @compilable
@@ -97,7 +97,7 @@ class Pad(NamedTuple):
     """Scratch space of one look-ahead."""
 
     joints: Any
-    """(J,), of WORK"""
+    """(J,), of SCRATCH"""
     common: Any
     """what the matrices of all sub-steps share, (J, J); joints in the plugin's order"""
     matrix: Any
@@ -108,28 +108,40 @@ class Pad(NamedTuple):
 def make_pad(joints: int) -> Pad:
     """Return scratch space for so many joints."""
     square = (joints, joints)
-    return Pad(np.zeros(joints, WORK), np.empty(square), np.empty(square), np.empty(joints))
+    return Pad(np.zeros(joints, SCRATCH), np.empty(square), np.empty(square), np.empty(joints))
+
+
+class Exchange(NamedTuple):
+    """What MuJoCo and the actuators of one candidate, or of n, tell each other at a step."""
+
+    angle: Any
+    """[rad], (J,) or (n, J)"""
+    velocity: Any
+    """[rad/s], (J,) or (n, J)"""
+    mass: Any
+    """MuJoCo's `M` [kg·m²], (nC,) or (n, nC)"""
+    torque: Any
+    """answer: damping included [N·m], (J,) or (n, J)"""
+    armature: Any
+    """answer: [kg·m²], (J,) or (n, J)"""
 
 
 @compilable
 def look_ahead(
-    plugin: Plugin,
-    candidate: int,
-    state: Any,
-    pad: Pad,
-    commands: Any,
-    newest: int,
-    angle: Any,
-    velocity: Any,
-    mass: Any,
-    torque: Any,
-    armature: Any,
+    plugin: Plugin, candidate: int, state: Any, commands: Any, exchange: Exchange, pad: Pad
 ) -> None:
-    """Look ahead over one step of one candidate: its rows of what `hydroid.hydraulics.actuator` describes.
+    """Look ahead over one step of one candidate; writes the torque and armature of `exchange`.
 
-    `newest` is the row of `commands`, (.., J), that holds now; those before it are its past.
+    Args:
+        plugin: of the population.
+        candidate: which one of it.
+        state: its actuators, (J,) of JOINT_STATE.
+        commands: up to the one that holds now, newest last [%], (.., J).
+        exchange: of this candidate.
+        pad: scratch space.
     """
     coefficients, damping, order, entries, idle, period, substeps = plugin
+    angle, velocity, mass, torque, armature = exchange
     work, common, matrix, gain = pad
     joints = state.shape[0]
     part = 1.0 / substeps
@@ -142,9 +154,9 @@ def look_ahead(
         matrix[a, a] = w.inertia
         if a < idle:
             coast(z, w, damping[candidate, j], step)
-            matrix[a, a] += w.share * step * w.resist
+            matrix[a, a] += w.weight * step * w.drag
         else:
-            command(c, w, commands, newest, j, period, substeps)
+            command(c, w, commands[:, j], period, substeps)
         for b in range(a + 1, joints):
             matrix[a, b] = mass[entries[a, b]]
     # joints without actuator bring the same to all sub-steps: they are eliminated once
@@ -159,10 +171,10 @@ def look_ahead(
             if a >= idle:
                 meter(c, w, move_spool(c, z, w, i, step))
                 load(c, w, damping[candidate, j], step)
-            drag = w.share * w.stiff + w.resist
-            gain[a] = step * (w.push + z.external - drag * w.speed)
+            resistance = w.weight * w.stiffness + w.drag
+            gain[a] = step * (w.push + z.external - resistance * w.speed)
             if a >= idle:
-                matrix[a, a] = common[a, a] + w.share * step * drag
+                matrix[a, a] = common[a, a] + w.weight * step * resistance
                 for b in range(a + 1, joints):
                     matrix[a, b] = common[a, b]
         eliminate(matrix, idle, joints)
@@ -187,7 +199,7 @@ def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) 
     for a in range(order.size):
         z = state[order[a]]
         angle[order[a]] = z.angle + z.way + RAMP_WAY * period * (velocity[order[a]] - z.predicted)
-        # (M + h κ) q̈ − torque is what neither oil nor damping did; M is bound with the lent inertia in it
+        # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M contains h κ
         momentum = 0.0
         for b in range(order.size):
             momentum += mass[entries[a, b]] * (velocity[order[b]] - state[order[b]].velocity)
@@ -195,24 +207,13 @@ def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def advance(
-    plugin: Plugin,
-    state: Any,
-    commands: Any,
-    angle: Any,
-    velocity: Any,
-    mass: Any,
-    torque: Any,
-    armature: Any,
-    source: int = SOURCE,
-) -> None:
+def advance(plugin: Plugin, state: Any, commands: Any, exchange: Exchange, source: int = SOURCE) -> None:
     """Let all candidates look ahead over one step under the last of the commands."""
-    candidates, joints = state.shape
-    pad, newest = make_pad(joints), commands.shape[0] - 1
-    for n in range(candidates):
-        look_ahead(
-            plugin, n, state[n], pad, commands, newest, angle[n], velocity[n], mass[n], torque[n], armature[n]
-        )
+    angle, velocity, mass, torque, armature = exchange
+    pad = make_pad(state.shape[1])
+    for n in range(state.shape[0]):
+        one = Exchange(angle[n], velocity[n], mass[n], torque[n], armature[n])
+        look_ahead(plugin, n, state[n], commands, one, pad)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

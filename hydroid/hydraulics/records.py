@@ -1,49 +1,151 @@
-"""The records that the compiled loops work on: named fields instead of two hundred arguments."""
+"""Structured arrays of the hydraulics: what an actuator is, what it carries from step to step, scratch space.
 
-from dataclasses import fields
+A population's parameters are a record array, shape (n, J), with one field per quantity of
+`hydroid.settings.hydraulics` in SI: `parameters.area_a` is an array, shape (n, J), and `parameters[i, j]`
+one actuator. Of a rotary actuator area_a and area_b are displacements [m³/rad], dead_volume is the constant
+volume of a chamber, and dry_friction a torque [N·m]. flow_limit is inf where there is none.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.hydraulics.parameters import ActuatorParameters, Linkages
-from hydroid.hydraulics.solenoid import force_curve
+from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
-from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.arm import Arm, Joint
+from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.settings.linkage import LinearActuator
+
+Array = NDArray[np.float64]
+Records: TypeAlias = np.recarray[Any, Any]
+
+NONE, LINEAR, ROTARY = 0, 1, 2
+"""kinds of actuator; a joint with none keeps the constant torque that holds its start pose"""
 
 
-def _record(names: str) -> np.dtype[np.void]:
-    return np.dtype([(name, np.float64) for name in names.split()])
+def _fields(names: str) -> list[tuple[str, type]]:
+    return [(name, np.float64) for name in names.split()]
 
+
+PARAMETERS = np.dtype([(name, np.float64) for name in QUANTITIES])
+"""all quantities of an actuator, in SI"""
+
+LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
+"""how a joint is moved: kind (NONE, LINEAR or ROTARY); pivots' distances a, b [m]; their angle theta0 at
+joint angle 0 [rad]; cylinder length with the rod fully in [m], as at the joint's lower limit; stroke [m]"""
 
 COEFFICIENTS = np.dtype(
-    [(f.name, np.float64) for f in (*fields(ActuatorParameters), *fields(Linkages)) if f.name != "kind"]
-    + [(name, np.float64) for name in ("coil", "gap", "conductance")]
-    + [("kind", np.int64), ("quasi_static", np.int64)]
+    [*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance"), ("quasi_static", np.int64)]
 )
-"""what the kernel reads of an actuator: its parameters, its linkage, and what follows from them"""
+"""what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them"""
 
-JOINT = _record(
-    "stroke_a speed_a stroke_b speed_b oil_a oil_b flow_a flow_b external hold "
-    "angle velocity way predicted torque armature"
+JOINT_STATE = np.dtype(
+    _fields(
+        "stroke_a speed_a stroke_b speed_b "  # plungers [m, m/s]
+        "oil_a oil_b flow_a flow_b "  # oil [Pa] as `cylinder` defines it; mean flows of the last step [m³/s]
+        "external hold "  # torque e that is neither oil nor damping; torque that held the start pose [N·m]
+        "angle velocity "  # at the start of the step [rad, rad/s]
+        "way predicted torque armature"  # of the look-ahead: turn [rad], velocity v*, torque, h κ
+    )
 )
-"""what a joint carries from step to step: plungers, oil, the torque e, and its last look-ahead"""
+"""what a joint carries from step to step"""
 
-WORK = _record(
-    "inertia way speed torque resistance oil_stiffness flow_a flow_b travel arm slope pressure_a pressure_b "
-    "fresh new_a new_b old_a old_b plunger_share wet_a wet_b pushed_a pushed_b q_a q_b g_a g_b "
-    "resist arm_a arm_b rate_a rate_b share_a share_b give_a give_b stiff share push"
+SCRATCH = np.dtype(
+    _fields(
+        # of the whole step: running sums over its sub-steps, and where the joint is
+        "inertia way speed torque resistance oil_stiffness flow_a flow_b "
+        "travel arm slope pressure_a pressure_b "
+        # commands of the step: sub-steps until the newer one acts, and the coils' drives before and after
+        "fresh new_a new_b old_a old_b plunger_weight "
+        # of a sub-step, chambers A and B: whether oil fills them, pressure, inflow, its fall with pressure
+        "filled_a filled_b pushing_a pushing_b inflow_a inflow_b relief_a relief_b "
+        # torque per pressure, pressure per volume, weight of the new state, pressure rise per flow
+        "lever_a lever_b rate_a rate_b weight_a weight_b rise_a rise_b "
+        # of a sub-step, the joint: damping, oil stiffness times step, weight of the new state, torque at rest
+        "drag stiffness weight push"
+    )
 )
-"""a joint's scratch pad during a look-ahead"""
+"""a joint's scratch space during a look-ahead"""
 
 
-def coefficients(
-    parameters: ActuatorParameters, linkages: Linkages, settings: HydraulicSettings
-) -> NDArray[np.void]:
-    """Lay out what the kernel reads of n candidates' J actuators, shape (n, J)."""
-    table = np.zeros(parameters.area_a.shape, COEFFICIENTS)
+def nominal_parameters(
+    arm: Arm, settings: HydraulicSettings, joints: Sequence[int], candidates: int = 1
+) -> Records:
+    """Return what the settings say, the same for all candidates, shape (n, J).
+
+    Args:
+        arm: the arm's settings, for areas and valve openings.
+        settings: the hydraulics.
+        joints: the moving joints, 0-based, in the order of the stepped model.
+        candidates: n.
+    """
+    row = [_nominal(arm.joints[j], settings) for j in joints]
+    return np.tile(np.array(row, PARAMETERS), (candidates, 1)).view(np.recarray)
+
+
+def _nominal(joint: Joint, settings: HydraulicSettings) -> tuple[float, ...]:
+    actuator = joint.actuator
+    values = settings.model_dump()
+    values["flow_limit"] = settings.flow_limit or math.inf
+    values["opening_a"] = values["opening_b"] = actuator.max_opening
+    if isinstance(actuator, LinearActuator):
+        values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
+    else:
+        values["area_a"] = values["area_b"] = actuator.displacement
+        values["dead_volume"] = settings.rotary_volume
+    return tuple(values[q.name] * q.factor for q in QUANTITIES.values())
+
+
+def with_values(parameters: Records, values: Mapping[str, Any]) -> Records:
+    """Return the parameters with some quantities replaced.
+
+    Args:
+        parameters: shape (n, J).
+        values: by name, in the units of QUANTITIES, of shapes that broadcast to (n, J); n may grow from 1.
+    """
+    shape = np.broadcast_shapes(parameters.shape, *(np.shape(v) for v in values.values()))
+    replaced = np.broadcast_to(parameters, shape).copy().view(np.recarray)
+    for name, value in values.items():
+        replaced[name] = np.asarray(value) * QUANTITIES[name].factor
+    return replaced
+
+
+def has_force_curve(parameters: Records) -> NDArray[np.bool_]:
+    """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
+    p = parameters
+    return np.asarray(curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2).all(axis=1), dtype=bool)
+
+
+def linkages(arm: Arm, joints: Sequence[int], driven: Sequence[int]) -> Records:
+    """Return how joints are moved, a record array of LINKAGE, shape (J,).
+
+    Args:
+        arm: the arm's settings.
+        joints: the moving joints, 0-based, in the order of the stepped model.
+        driven: those among them that have a hydraulic actuator; the others get none.
+    """
+    table = np.zeros(len(joints), LINKAGE)
+    for place, j in enumerate(joints):
+        actuator = arm.joints[j].actuator
+        if j not in driven:
+            continue
+        table[place]["kind"] = ROTARY
+        if isinstance(actuator, LinearActuator):
+            shortest = actuator.length(math.radians(arm.joints[j].range[0]))
+            theta0, stroke = math.radians(actuator.theta0), 1e-3 * actuator.stroke
+            table[place] = (LINEAR, actuator.a, actuator.b, theta0, shortest, stroke)
+    return table.view(np.recarray)
+
+
+def coefficients(parameters: Records, linkages: Records, settings: HydraulicSettings) -> NDArray[np.void]:
+    """Lay out what the kernel reads of n candidates' J actuators, of COEFFICIENTS, shape (n, J)."""
+    table = np.zeros(parameters.shape, COEFFICIENTS)
     for source in (parameters, linkages):
-        for f in fields(source):
-            table[f.name] = getattr(source, f.name)
+        for name in source.dtype.names or ():
+            table[name] = source[name]
     p = parameters
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient, p.density)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.elementwise import compilable, implicit_share, select
+from hydroid.hydraulics.elementwise import compilable, implicit_weight, select
 
 
 def curve_exists(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any) -> Any:
@@ -66,44 +66,38 @@ def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
 
 
 @compilable
-def plunger_share(mass: Any, damping: Any, stiffness: Any, step: Any) -> Any:
-    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff."""
-    return implicit_share(step * np.maximum(damping / mass, np.sqrt(3.0 * stiffness / mass)))
+def plunger_weight(c: Any, step: Any) -> Any:
+    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff.
+
+    Args:
+        c: an actuator, with its `plunger_mass`, `plunger_damping`, `plunger_stiffness`.
+        step: [s].
+    """
+    natural = np.sqrt(3.0 * c.plunger_stiffness / c.plunger_mass)
+    return implicit_weight(step * np.maximum(c.plunger_damping / c.plunger_mass, natural))
 
 
 @compilable
-def plunger_step(
-    stroke: Any,
-    speed: Any,
-    drive: Any,
-    gap: Any,
-    mass: Any,
-    damping: Any,
-    stiffness: Any,
-    step: Any,
-    share: Any,
-) -> Any:
+def plunger_step(stroke: Any, speed: Any, drive: Any, step: Any, weight: Any, c: Any) -> Any:
     """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step.
 
     Args:
         stroke: [m].
         speed: [m/s].
         drive: k i² during the step [N·m²].
-        gap: δ [m].
-        mass: m [kg].
-        damping: λ [N·s/m].
-        stiffness: K [N/m].
         step: [s].
-        share: weight of the new state, from `plunger_share`.
+        weight: of the new state, from `plunger_weight`.
+        c: an actuator, with its `gap`, `plunger_mass`, `plunger_damping`, `plunger_stiffness`.
 
     Returns:
         Stroke [m] and speed [m/s] after the step; a plunger that reaches its seat at x = 0 stops there.
     """
-    force = coil_force(drive, stroke, gap)
-    slope = stiffness + 2.0 * force / (stroke + gap)
-    drag = damping + share * step * slope
-    gain = step * (force - stiffness * stroke - drag * speed) / (mass + share * step * drag)
-    after = stroke + step * (speed + share * gain)
+    force = coil_force(drive, stroke, c.gap)
+    slope = c.plunger_stiffness + 2.0 * force / (stroke + c.gap)
+    drag = c.plunger_damping + weight * step * slope
+    net = force - c.plunger_stiffness * stroke - drag * speed
+    gain = step * net / (c.plunger_mass + weight * step * drag)
+    after = stroke + step * (speed + weight * gain)
     speed = speed + gain
     seated = after <= 0.0
     return select(seated, 0.0, after), select(seated, np.maximum(speed, 0.0), speed)

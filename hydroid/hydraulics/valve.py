@@ -25,24 +25,18 @@ def spool(stroke_a: Any, stroke_b: Any) -> Any:
 
 
 @compilable
-def opening(
-    spool: Any, largest_a: Any, largest_b: Any, width: Any, overlap_a: Any, overlap_b: Any, exponent: Any
-) -> Any:
+def opening(spool: Any, c: Any) -> Any:
     """Opening A(x) of both metering edges [m²], without leakage.
 
     Args:
         spool: x [m]; x > 0 opens towards A.
-        largest_a: A_max for x > 0 [m²].
-        largest_b: A_max for x < 0 [m²].
-        width: w, the slot in the sleeve [m].
-        overlap_a: how far x must go before the edges open, x > 0 [m].
-        overlap_b: the same for x < 0 [m].
-        exponent: of the opening in the stroke; 1 is a straight line.
+        c: an actuator, with its `opening_a`, `opening_b`, `slot_width`, `overlap_a`, `overlap_b` and
+            `opening_exponent`.
     """
     towards_a = spool > 0.0
-    bare = np.abs(spool) - select(towards_a, overlap_a, overlap_b)
-    share = np.minimum(np.maximum(bare, 0.0) / width, 1.0)
-    return select(towards_a, largest_a, largest_b) * power(share, exponent)
+    beyond = np.abs(spool) - select(towards_a, c.overlap_a, c.overlap_b)
+    fraction = np.minimum(np.maximum(beyond, 0.0) / c.slot_width, 1.0)
+    return select(towards_a, c.opening_a, c.opening_b) * power(fraction, c.opening_exponent)
 
 
 def conductance(flow_coefficient: Any, density: Any) -> Any:
@@ -60,37 +54,25 @@ def root(drop: Any, transition: Any) -> Any:
 
 
 @compilable
-def port_flow(
-    pressure: Any,
-    pump_area: Any,
-    tank_area: Any,
-    supply: Any,
-    tank: Any,
-    conductance: Any,
-    transition: Any,
-    limit: Any,
-) -> Any:
+def port_flow(pressure: Any, pump_area: Any, tank_area: Any, c: Any) -> Any:
     """Flow into a chamber through its two edges, (7) and (8).
 
     Args:
         pressure: in the chamber [Pa].
         pump_area: opening towards the pump [m²].
         tank_area: opening towards the tank [m²].
-        supply: p_S [Pa].
-        tank: p_T [Pa].
-        conductance: C_q √(2/ρ) [m/(s √Pa)].
-        transition: p_cr [Pa].
-        limit: most that the pump gives [m³/s].
+        c: an actuator, with its `supply_pressure`, `tank_pressure`, `transition_pressure`, `flow_limit` and
+            `conductance`.
 
     Returns:
         Q [m³/s] and -dQ/dp [m³/(s Pa)], which is never negative.
     """
-    into, into_slope = root(supply - pressure, transition)
-    out, out_slope = root(pressure - tank, transition)
-    pumped = conductance * pump_area * into
-    pumped_slope = conductance * pump_area * into_slope
-    spent = pumped >= limit
-    pumped = select(spent, limit, pumped)
-    pumped_slope = select(spent, 0.0, pumped_slope)
-    drained = conductance * tank_area
+    into, into_slope = root(c.supply_pressure - pressure, c.transition_pressure)
+    out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)
+    pumped = c.conductance * pump_area * into
+    pumped_slope = c.conductance * pump_area * into_slope
+    limited = pumped >= c.flow_limit
+    pumped = select(limited, c.flow_limit, pumped)
+    pumped_slope = select(limited, 0.0, pumped_slope)
+    drained = c.conductance * tank_area
     return pumped - drained * out, pumped_slope + drained * out_slope

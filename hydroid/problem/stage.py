@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.parameters import nominal_parameters
+from hydroid.hydraulics.records import nominal_parameters
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings, ParameterSettings
-from hydroid.settings.hydraulics import HYDRAULIC_UNITS
+from hydroid.settings.hydraulics import QUANTITIES
 from hydroid.simulation import ArmParameters, Candidates
 
 
@@ -51,7 +51,7 @@ class Stage:
             if quantity in arm:
                 arm[quantity][:, slots] = theta[:, column, None]
             elif actuators is not None:
-                getattr(actuators, quantity)[:, slots] = theta[:, column, None] * HYDRAULIC_UNITS[quantity][1]
+                actuators[quantity][:, slots] = theta[:, column, None] * QUANTITIES[quantity].factor
         return Candidates(ArmParameters(**arm), actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:

@@ -1,24 +1,28 @@
 """One actuator of a parameter set, ready to be drawn, and its figures as files."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from hydroid.arm.linkage import Cylinder, Rotary, linkage
+import numpy as np
+
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
-from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.hydraulics.records import coefficients, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
+from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.simulation import Candidates
 
 
 @dataclass(frozen=True)
 class ActuatorCard:
-    """One joint's actuator: its parameters in SI as scalars, its linkage, the joint's range [deg]."""
+    """One joint's actuator: its COEFFICIENTS as one record, its linkage, the joint's range [deg]."""
 
     title: str
-    parameters: ActuatorParameters
-    linkage: Cylinder | Rotary
+    parameters: Any
+    linkage: LinearActuator | RotaryActuator
     range: tuple[float, float]
 
 
@@ -31,8 +35,10 @@ def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> A
     if not 1 <= joint <= len(arm.joints):
         raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
     assert candidate.actuators is not None
-    all_joints = candidate.actuators
-    p = ActuatorParameters(**{f.name: getattr(all_joints, f.name)[0, joint - 1] for f in fields(all_joints)})
+    one = candidate.actuators[:1, [joint - 1]].view(np.recarray)
+    p = coefficients(one, linkages(arm, [joint - 1], [joint - 1]), HydraulicSettings()).view(np.recarray)[
+        0, 0
+    ]
     if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
         raise SettingsError(
             f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
@@ -41,7 +47,7 @@ def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> A
             hint="it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
         )
     settings = arm.joints[joint - 1]
-    return ActuatorCard(f"Joint {joint}, {settings.name}", p, linkage(settings), settings.range)
+    return ActuatorCard(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)
 
 
 def write_actuator(out: Path, card: ActuatorCard) -> list[Path]:

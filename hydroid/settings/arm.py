@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.settings.actuator import (
+from hydroid.settings.linkage import (
     STROKE_TOLERANCE,
     Direction,
     LinearActuator,
@@ -201,7 +201,8 @@ def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
         )
     if not np.cross(joint.axis, actuator.towards).any():
         raise ValueError(f"joint {joint.name}: `towards` must not lie along the joint's axis")
-    needed = 1e3 * (actuator.length(math.radians(last)) - actuator.length(math.radians(first)))
+    shortest, longest = actuator.length(np.radians(joint.range))
+    needed = 1e3 * (longest - shortest)
     if actuator.stroke < (1 - STROKE_TOLERANCE) * needed:
         raise ValueError(
             f"joint {joint.name}: a stroke of {actuator.stroke:g} mm is too short for the range, "

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.cluster import ClusterSettings
 from hydroid.settings.design import DesignSettings
-from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
+from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
 from hydroid.settings.load import Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.objective import ObjectiveSettings
@@ -34,7 +34,7 @@ MECHANICAL_UNITS = {
 Joint = Annotated[int, Field(ge=1)]
 
 
-UNITS = MECHANICAL_UNITS | {name: unit for name, (unit, _) in HYDRAULIC_UNITS.items()}
+UNITS = MECHANICAL_UNITS | {q.name: q.unit for q in QUANTITIES.values()}
 """Quantities that a parameter can be, with their units."""
 
 
@@ -143,7 +143,7 @@ class FitSettings(Settings):
         if len(set(self.outputs)) < len(self.outputs):
             raise ValueError("outputs: a joint stands there twice")
         for name, parameter in self.parameters.items():
-            hydraulic = parameter.quantity in HYDRAULIC_UNITS
+            hydraulic = parameter.quantity in QUANTITIES
             if self.stage == "mech" and hydraulic:
                 raise ValueError(f"{name}: stage mech has no {parameter.quantity}; set stage: hyd")
             if self.stage == "hyd" and parameter.quantity == "gain":

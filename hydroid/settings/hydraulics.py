@@ -1,11 +1,12 @@
-"""The hydraulics of an arm, from command to chamber pressure, in the units of a drawing or data sheet.
+"""The hydraulics of an arm, from command to chamber pressure, and the one table of their 35 quantities.
 
-The ten numbers that the article calls true stand here and in the arm's file (areas). All others are ours:
-plausible sizes, not measurements of a HydroLek. Each holds for every actuator of the arm; a parameter of a
-fit sets or frees it joint by joint.
+Each quantity holds for every actuator of the arm; a parameter of a fit sets or frees it joint by joint.
+Units are those of a drawing or data sheet. Values marked as the article's are the ones it calls true. All
+others are ours: plausible sizes, not measurements of a HydroLek.
 """
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -14,116 +15,101 @@ from hydroid.settings.load import Settings
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 
-HYDRAULIC_UNITS: dict[str, tuple[str, float]] = {
-    "area_a": ("mm²", 1e-6),  # of a rotary actuator the displacement, cm³/rad: the same factor
-    "area_b": ("mm²", 1e-6),
-    "opening_a": ("mm²", 1e-6),
-    "opening_b": ("mm²", 1e-6),
-    "onset_a": ("V", 1.0),
-    "full_a": ("V", 1.0),
-    "onset_b": ("V", 1.0),
-    "full_b": ("V", 1.0),
-    "current_max": ("A", 1.0),
-    "current_min": ("A", 1.0),
-    "force_1": ("N", 1.0),
-    "force_2": ("N", 1.0),
-    "stroke_1": ("mm", 1e-3),
-    "stroke_2": ("mm", 1e-3),
-    "rated_current": ("A", 1.0),
-    "plunger_mass": ("kg", 1.0),
-    "plunger_damping": ("N·s/m", 1.0),
-    "plunger_stiffness": ("N/mm", 1e3),
-    "slot_width": ("mm", 1e-3),
-    "overlap_a": ("mm", 1e-3),
-    "overlap_b": ("mm", 1e-3),
-    "opening_exponent": ("", 1.0),
-    "leakage": ("mm²", 1e-6),
-    "flow_coefficient": ("", 1.0),
-    "transition_pressure": ("bar", 1e5),
-    "flow_limit": ("L/min", 1e-3 / 60.0),
-    "supply_pressure": ("bar", 1e5),
-    "tank_pressure": ("bar", 1e5),
-    "vapour_pressure": ("bar", 1e5),
-    "density": ("kg/m³", 1.0),
-    "bulk_modulus": ("bar", 1e5),
-    "dead_volume": ("cm³", 1e-6),
-    "dry_friction": ("N", 1.0),
-    "stop_penetration": ("N·s/m²", 1.0),
-    "delay": ("s", 1.0),
-}
-"""Unit of every quantity of an actuator, and the factor that turns it into SI."""
+SI_FACTORS = {"mm": 1e-3, "mm²": 1e-6, "cm³": 1e-6, "N/mm": 1e3, "bar": 1e5, "L/min": 1e-3 / 60.0}
+"""what one of a unit is in SI; units that are SI already are not listed"""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One physical quantity of an actuator."""
+
+    name: str
+    unit: str
+    meaning: str
+    source: str
+    """of its default: article or ours"""
+
+    @property
+    def factor(self) -> float:
+        """What turns a value in `unit` into SI."""
+        return SI_FACTORS.get(self.unit, 1.0)
+
+
+def _quantity(default: float | None, unit: str, meaning: str, source: str = "ours") -> Any:
+    return Field(default, description=meaning, json_schema_extra={"unit": unit, "source": source})
 
 
 class HydraulicSettings(Settings):
-    """All numbers of the actuator chain but areas and openings, which the arm's file has joint by joint."""
+    """All numbers of the actuator chain except areas and openings, which the arm's file gives by joint."""
 
-    onset_a: float = 1.4
-    """A of equation (2) [V], article"""
-    full_a: float = 10.0
-    """B of (2) [V]"""
-    onset_b: float = 1.2
-    """C of (3) [V], article"""
-    full_b: float = 10.0
-    """D of (3) [V]"""
-    current_max: Positive = 0.9
-    """I_max of (4) [A], article"""
-    current_min: Positive = 0.3
-    """I_min of (4) [A], article"""
-    force_1: Positive = 8.0
-    """solenoid force at stroke_1 and rated current [N], article"""
-    force_2: Positive = 0.7
-    """the same at stroke_2 [N], article"""
-    stroke_1: Positive = 0.8
-    """[mm], article"""
-    stroke_2: Positive = 12.0
-    """[mm], article"""
-    rated_current: Positive = 0.9
-    """[A]"""
-    plunger_mass: Positive = 0.05
-    """m of (5) [kg]"""
-    plunger_damping: NotNegative = 20.0
-    """λ of (5) [N·s/m]"""
-    plunger_stiffness: Positive = 2.0
-    """K of (5) [N/mm]"""
-    plunger_dynamics: bool = True
-    """false: plungers follow their current at once"""
-    slot_width: Positive = 2.0
-    """w of (7): spool travel from first to full opening [mm]"""
-    overlap_a: NotNegative = 0.0
-    """spool travel before anything opens, towards A [mm]"""
-    overlap_b: NotNegative = 0.0
-    """the same towards B [mm]"""
-    opening_exponent: Positive = 1.0
-    """1: the opening grows in proportion to the stroke; above 1: faster towards its end"""
-    leakage: NotNegative = 1e-4
-    """of every metering edge, open or shut [mm²]"""
-    flow_coefficient: Positive = 0.7
-    """C_q of (7)"""
-    transition_pressure: Positive = 0.2
-    """drop below which flow is laminar [bar]"""
-    flow_limit: Positive | None = None
-    """most that the pump gives to one actuator [L/min]; null: no limit"""
-    supply_pressure: Positive = 150.0
-    """[bar]"""
-    tank_pressure: NotNegative = 5.0
-    """[bar]"""
-    vapour_pressure: NotNegative = 0.0
-    """the least a chamber pressure can be [bar]"""
-    density: Positive = 860.0
-    """of the oil [kg/m³]"""
-    bulk_modulus: Positive = 8000.0
-    """β of the oil [bar]; a hundred times as much is the article's stiff oil"""
-    dead_volume: Positive = 30.0
-    """of a cylinder's chamber with the rod at that end, hoses included [cm³]"""
+    onset_a: float = _quantity(1.4, "V", "A of equation (2): voltage at the smallest command", "article")
+    full_a: float = _quantity(10.0, "V", "B of equation (2): voltage at 100 %")
+    onset_b: float = _quantity(1.2, "V", "C of equation (3)", "article")
+    full_b: float = _quantity(10.0, "V", "D of equation (3)")
+    current_max: Positive = _quantity(0.9, "A", "I_max of equation (4)", "article")
+    current_min: Positive = _quantity(0.3, "A", "I_min of equation (4)", "article")
+    force_1: Positive = _quantity(8.0, "N", "F1: solenoid force at x1 and rated current", "article")
+    force_2: Positive = _quantity(0.7, "N", "F2: solenoid force at x2 and rated current", "article")
+    stroke_1: Positive = _quantity(0.8, "mm", "x1: plunger stroke at F1", "article")
+    stroke_2: Positive = _quantity(12.0, "mm", "x2: plunger stroke at F2", "article")
+    rated_current: Positive = _quantity(0.9, "A", "current at which F1 and F2 act")
+    plunger_mass: Positive = _quantity(0.05, "kg", "m of equation (5)")
+    plunger_damping: NotNegative = _quantity(20.0, "N·s/m", "λ of equation (5)")
+    plunger_stiffness: Positive = _quantity(2.0, "N/mm", "K of equation (5)")
+    slot_width: Positive = _quantity(2.0, "mm", "w of equation (7): spool travel from first to full opening")
+    overlap_a: NotNegative = _quantity(0.0, "mm", "spool travel before the valve opens, towards A")
+    overlap_b: NotNegative = _quantity(0.0, "mm", "spool travel before the valve opens, towards B")
+    opening_exponent: Positive = _quantity(
+        1.0, "", "1: opening proportional to spool travel; above 1: it grows faster towards the end"
+    )
+    leakage: NotNegative = _quantity(1e-4, "mm²", "leakage area of every metering edge, open or shut")
+    flow_coefficient: Positive = _quantity(0.7, "", "C_q of equation (7)")
+    transition_pressure: Positive = _quantity(0.2, "bar", "pressure drop below which flow is laminar")
+    flow_limit: Positive | None = _quantity(
+        None, "L/min", "largest flow that the pump gives to one actuator; null: no limit"
+    )
+    supply_pressure: Positive = _quantity(150.0, "bar", "p_S: pressure of the pump")
+    tank_pressure: NotNegative = _quantity(5.0, "bar", "p_T: pressure of the return line")
+    vapour_pressure: NotNegative = _quantity(0.0, "bar", "lowest pressure in a chamber")
+    density: Positive = _quantity(860.0, "kg/m³", "ρ of the oil")
+    bulk_modulus: Positive = _quantity(
+        8000.0, "bar", "β of the oil; 800000 is nearly the article's stiff oil"
+    )
+    dead_volume: Positive = _quantity(
+        30.0, "cm³", "volume of a cylinder's chamber with the rod at that end, hoses included"
+    )
+    dry_friction: NotNegative = _quantity(
+        0.0, "N", "friction of a cylinder's seals; of a rotary actuator in N·m"
+    )
+    stop_penetration: NotNegative = _quantity(
+        1e10, "N·s/m²", "K_p of equation (9): force of the end stops per penetration and speed"
+    )
+    delay: Annotated[float, Field(ge=0, le=5)] = _quantity(0.0, "s", "transport delay of the command")
+
     rotary_volume: Positive = 50.0
-    """of a rotary actuator's chamber [cm³]"""
-    dry_friction: NotNegative = 0.0
-    """of the seals [N]; of a rotary actuator [N·m]"""
-    stop_penetration: NotNegative = 1e10
-    """K_p of (9): force of the stops per penetration and speed [N·s/m²]"""
-    delay: Annotated[float, Field(ge=0, le=5)] = 0.0
-    """transport delay of the command [s]"""
+    """volume of each chamber of a rotary actuator [cm³]"""
+    plunger_dynamics: bool = True
+    """false: plungers are always in equilibrium with their coil and spring"""
     start_pressure: Positive = 50.0
-    """level of the rod side's pressure at the start, which static balance leaves open [bar]"""
+    """pressure on the rod side at the start, where static balance leaves it open [bar]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3
     """sub-steps of valves and oil in one MuJoCo step"""
+
+
+def _quantities() -> dict[str, Quantity]:
+    of_arm = (  # by joint in the arm's file
+        ("area_a", "mm²", "A_A: piston area of chamber A; of a rotary actuator its displacement in cm³/rad"),
+        ("area_b", "mm²", "A_B: the same of chamber B"),
+        ("opening_a", "mm²", "largest opening of the valve, towards A"),
+        ("opening_b", "mm²", "largest opening of the valve, towards B"),
+    )
+    of_settings = [
+        Quantity(name, str(extra["unit"]), field.description or "", str(extra["source"]))
+        for name, field in HydraulicSettings.model_fields.items()
+        if isinstance(extra := field.json_schema_extra, dict)
+    ]
+    return {q.name: q for q in (*(Quantity(*q, "arm's file") for q in of_arm), *of_settings)}
+
+
+QUANTITIES = _quantities()
+"""the 35 quantities by name; parameters of a fit and the kernel's arrays use these names"""

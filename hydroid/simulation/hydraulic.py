@@ -10,14 +10,14 @@ import os
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.parameters import ActuatorParameters, Linkages
+from hydroid.hydraulics.records import has_force_curve, linkages
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
@@ -77,7 +77,7 @@ class HydraulicSimulation:
         self.joints = record.joints[self._columns]
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
         driven = [int(j) for j in self.joints if record.active[j]]
-        self._linkages = Linkages.of(arm, [int(j) for j in self.joints], driven)
+        self._linkages = linkages(arm, [int(j) for j in self.joints], driven)
         self._entries = mass_entries(record.arm.model)[np.ix_(self._columns, self._columns)]
         self.command = np.ascontiguousarray(record.command[:, self._columns])
         none = np.empty((len(self.command), 0))
@@ -109,7 +109,7 @@ class HydraulicSimulation:
         n, samples = len(candidates), 1 + len(self.command) // self._steps
         angle = np.full((n, samples, len(self.record.outputs)), np.nan)
         pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
-        exists = np.flatnonzero(candidates.actuators.feasible)
+        exists = np.flatnonzero(has_force_curve(candidates.actuators))
         if exists.size:
             start, threads = self._start(candidates[exists]), min(self._threads, exists.size)
             free = deque(self._machine() for _ in range(threads))
@@ -134,11 +134,8 @@ class HydraulicSimulation:
         record = self.record
         population = Population(record.arm, len(candidates), self._threads, record.prescribed)
         balance = population.start(candidates.arm, record.joints, record.pose)[:, self._columns]
-        parameters = {
-            f.name: getattr(candidates.actuators, f.name)[:, self.joints] for f in fields(ActuatorParameters)
-        }
         actuator = Actuator(
-            ActuatorParameters(**parameters),
+            candidates.actuators[:, self.joints],  # pyright: ignore[reportArgumentType]  # still a recarray
             self._linkages,
             candidates.arm.damping[:, self.joints],
             record.arm.model.opt.timestep,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
 from hydroid.arm.quiet import quiet_mujoco
-from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.hydraulics.records import Records
 from hydroid.simulation.prescribed import Prescribed
 
 Array = NDArray[np.float64]
@@ -46,13 +46,14 @@ class Candidates:
     """A population: its arms, and in stage 2 their actuators, (n, J) for all joints of the arm."""
 
     arm: ArmParameters
-    actuators: ActuatorParameters | None = None
+    actuators: Records | None = None
 
     def __len__(self) -> int:
         return len(self.arm)
 
     def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Candidates":
-        return Candidates(self.arm[rows], None if self.actuators is None else self.actuators[rows])
+        actuators = None if self.actuators is None else self.actuators[rows]
+        return Candidates(self.arm[rows], actuators)  # pyright: ignore[reportArgumentType]  # still a recarray
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
-from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
-from hydroid.hydraulics.records import COEFFICIENTS, JOINT
+from hydroid.hydraulics.kernel import SOURCE, Exchange, Plugin, look_ahead, make_pad, take_over
+from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
 from hydroid.simulation.population import Array, Population
 from hydroid.simulation.prescribed import Prescribed
 
@@ -129,37 +129,25 @@ def roll(
         arm: an `Arm`, at the start.
         plugin: of the population.
         candidate: which one of it.
-        state: its actuators, shape (J,) of JOINT.
+        state: its actuators, shape (J,) of JOINT_STATE.
         commands: held during each step [%], with those before the start, shape (past + T steps, J).
         torque: of the joints that follow a log, at each step [N·m], shape (T steps, P).
         steps: in a sample.
         angle: receives the angles after each of T samples [rad], shape (T, V).
-        seen: receives the actuators after each of them, shape (T, J) of JOINT; or it is empty.
+        seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
         source: the kernel's, for numba's cache.
     """
     columns, joints = arm.columns, arm.columns.size
     pad, here, speed = make_pad(joints), np.empty(joints), np.empty(joints)
-    lent_torque, lent_armature = np.empty(joints), np.empty(joints)
+    exchange = Exchange(here, speed, arm.mass, np.empty(joints), np.empty(joints))
     past = commands.shape[0] - angle.shape[0] * steps
     for k in range(angle.shape[0] * steps):
         for j in range(joints):
             here[j], speed[j] = arm.angle[columns[j]], arm.velocity[columns[j]]
-        look_ahead(
-            plugin,
-            candidate,
-            state,
-            pad,
-            commands,
-            past + k,
-            here,
-            speed,
-            arm.mass,
-            lent_torque,
-            lent_armature,
-        )
+        look_ahead(plugin, candidate, state, commands[: past + k + 1], exchange, pad)
         for j in range(joints):
-            arm.applied[columns[j]] = lent_torque[j]
-            arm.armature[columns[j]] = arm.own[j] + lent_armature[j]
+            arm.applied[columns[j]] = exchange.torque[j]
+            arm.armature[columns[j]] = arm.own[j] + exchange.armature[j]
         for i in range(arm.follows.size):
             arm.applied[arm.follows[i]] = torque[k, i]
         _mj_step(arm.model, arm.data)
@@ -186,7 +174,7 @@ def compile_rollout(announce: Callable[[], object]) -> None:
         arm = Arm(0, 0, one, one, one, one, one, warnings, column, one, column)
         record, square = np.ones((1, 1), COEFFICIENTS), np.ones((1, 1))
         plugin = Plugin(record, square, order=column, entries=column[None], idle=0, period=0.01, substeps=1)
-        state, nothing = np.zeros(1, JOINT), np.empty((0, 1))
-        roll(arm, plugin, 0, state, nothing, nothing, 1, nothing, np.empty((0, 1), JOINT))
+        state, nothing = np.zeros(1, JOINT_STATE), np.empty((0, 1))
+        roll(arm, plugin, 0, state, nothing, nothing, 1, nothing, np.empty((0, 1), JOINT_STATE))
     finally:
         timer.cancel()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
-from hydroid.hydraulics.records import JOINT
+from hydroid.hydraulics.records import JOINT_STATE
 from hydroid.simulation.population import Array, Population
 from hydroid.simulation.rollout import Machine, roll
 
@@ -64,7 +64,7 @@ class HydraulicRun:
         if arm.follows.size and len(self._servo) < len(command):
             raise ValueError("the log that some joints follow is over")  # compiled code would read on
         angle = np.full((1 + samples, arm.angle.size), np.nan)
-        seen = np.zeros((1 + samples if observe else 1, self._state.size), JOINT)
+        seen = np.zeros((1 + samples if observe else 1, self._state.size), JOINT_STATE)
         angle[0], seen[0] = arm.angle, self._state
         commands = np.concatenate([self._recent, command])
         roll(

@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.parameters import ActuatorParameters, nominal_parameters
+from hydroid.hydraulics.records import nominal_parameters
 from hydroid.jobs import load_settings, read_parameters
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import ArmParameters, Candidates
-
-P = TypeVar("P", ArmParameters, ActuatorParameters)
 
 
 @dataclass(frozen=True)
@@ -73,12 +71,15 @@ def _nominal(settings: FitSettings) -> Candidates:
 
 
 def _filled(candidate: Candidates, nominal: Candidates) -> Candidates:
+    """Put nominal values where there is NaN."""
     assert candidate.actuators is not None
     assert nominal.actuators is not None
-    return Candidates(_known(candidate.arm, nominal.arm), _known(candidate.actuators, nominal.actuators))
-
-
-def _known(values: P, nominal: P) -> P:
-    """Put nominal values where there is NaN."""
-    pairs = {f.name: (getattr(values, f.name), getattr(nominal, f.name)) for f in fields(values)}
-    return replace(nominal, **{name: np.where(np.isnan(v), n, v) for name, (v, n) in pairs.items()})
+    pairs = {
+        f.name: (getattr(candidate.arm, f.name), getattr(nominal.arm, f.name)) for f in fields(candidate.arm)
+    }
+    arm = replace(nominal.arm, **{name: np.where(np.isnan(v), n, v) for name, (v, n) in pairs.items()})
+    actuators = nominal.actuators.copy()
+    for name in actuators.dtype.names or ():
+        given = candidate.actuators[name]
+        actuators[name] = np.where(np.isnan(given), actuators[name], given)
+    return Candidates(arm, actuators)

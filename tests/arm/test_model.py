@@ -4,7 +4,6 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from hydroid.arm.linkage import linkage
 from hydroid.arm.mesh import mass_properties
 from hydroid.arm.model import build_model, load_model, write_model
 from hydroid.errors import MeshError, ModelError
@@ -101,14 +100,14 @@ def test_pivots_are_as_far_apart_as_the_cylinder_is_long(q):
         if joint.actuator.kind != "linear":
             continue
         ends = [data.site(f"{joint.name}_pivot_{end}").xpos for end in ("parent", "child")]
-        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(linkage(joint).length(angle), abs=1e-10)
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(joint.actuator.length(angle), abs=1e-10)
         tendon = MODEL.tendon(f"{joint.name}_cylinder").id
         jacobian = np.zeros((MODEL.ntendon, MODEL.nv))
         mujoco.mju_sparse2dense(
             jacobian, data.ten_J, MODEL.ten_J_rownnz, MODEL.ten_J_rowadr, MODEL.ten_J_colind
         )
         expected = np.zeros(MODEL.nv)
-        expected[MODEL.joint(joint.name).dofadr] = linkage(joint).moment_arm(angle)
+        expected[MODEL.joint(joint.name).dofadr] = joint.actuator.moment_arm(angle)
         np.testing.assert_allclose(jacobian[tendon], expected, atol=1e-9)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.parameters import ActuatorParameters, Linkages
+from hydroid.hydraulics.records import Records, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -18,19 +18,17 @@ TEN = (
 )  # fmt: skip
 
 
-def scatter(nominal: ActuatorParameters, rng: np.random.Generator) -> ActuatorParameters:
+def scatter(nominal: Records, rng: np.random.Generator) -> Records:
     """Give every actuator its own feasible set from the whole search space, 0.25 to 2.5 times nominal."""
-    shape = nominal.area_a.shape
-    values = {name: np.empty(shape) for name in TEN}
-    for at in np.ndindex(shape):
+    scattered = nominal.copy()
+    for at in np.ndindex(nominal.shape):
         while True:
             factors = rng.uniform(0.25, 2.5, len(TEN))
             if curve_exists(8 * factors[6], 0.7 * factors[7], 0.8 * factors[8], 12 * factors[9]):
                 break
         for name, factor in zip(TEN, factors, strict=True):
-            values[name][at] = factor
-    whole = {name: getattr(nominal, name) * values.get(name, 1.0) for name in vars(nominal)}
-    return ActuatorParameters(**whole)
+            scattered[name][at] *= factor
+    return scattered
 
 
 class DrivenArm:
@@ -39,7 +37,7 @@ class DrivenArm:
     def __init__(
         self,
         arm: Arm,
-        parameters: ActuatorParameters,
+        parameters: Records,
         driven: list[int],
         settings: HydraulicSettings,
         steps: int = 1,
@@ -50,7 +48,7 @@ class DrivenArm:
         model.opt.timestep = PERIOD / steps
         model.dof_damping[:], model.jnt_stiffness[:] = 0.0, STIFFNESS
         model.qpos_spring[:] = pose
-        n, joints = parameters.area_a.shape
+        n, joints = parameters.shape
         self.batch = Batch(model, n, threads)
         self.angle, self.velocity = self.batch.bind("qpos"), self.batch.bind("qvel")
         self.mass, self.bias = self.batch.bind("M"), self.batch.bind("qfrc_bias")
@@ -59,8 +57,8 @@ class DrivenArm:
         for i in range(joints):
             for k in range(model.M_rowadr[i], model.M_rowadr[i] + model.M_rownnz[i]):
                 entries[i, model.M_colind[k]] = entries[model.M_colind[k], i] = k
-        linkages = Linkages.of(arm, range(joints), driven)
-        self.actuator = Actuator(parameters, linkages, DAMPING, model.opt.timestep, settings, entries)
+        moved = linkages(arm, range(joints), driven)
+        self.actuator = Actuator(parameters, moved, DAMPING, model.opt.timestep, settings, entries)
         self.model, self.pose, self.steps = model, pose, steps
 
     def run(self, command: np.ndarray) -> np.ndarray:

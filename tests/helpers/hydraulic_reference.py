@@ -13,16 +13,14 @@ from mujoco.batch import Batch
 from scipy.integrate import Radau
 
 from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.parameters import LINEAR, ActuatorParameters, Linkages
-from hydroid.settings.hydraulics import HYDRAULIC_UNITS, HydraulicSettings
+from hydroid.hydraulics.records import LINEAR, LINKAGE, PARAMETERS, Records, with_values
+from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
 
 INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, radians(-15.0)
 START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
 A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
-LINKAGE = Linkages(
-    np.array([LINEAR]),
-    *np.array([[A], [B], [THETA0], [sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))], [STROKE]]),
-)
+SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
+CYLINDER = np.array([(LINEAR, A, B, THETA0, SHORTEST, STROKE)], LINKAGE).view(np.recarray)
 TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
 TEN = {
     "area_a": 1000.0, "area_b": 750.0, "current_max": 0.9, "current_min": 0.3, "onset_a": 1.4, "onset_b": 1.2,
@@ -30,11 +28,15 @@ TEN = {
 }  # fmt: skip
 
 
-def parameters(settings: HydraulicSettings, **values: object) -> ActuatorParameters:
+def parameters(settings: HydraulicSettings, **values: object) -> Records:
     """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
     base = settings.model_dump() | {"flow_limit": settings.flow_limit or inf} | TRUTH
-    si = {name: np.array([[base[name] * factor]]) for name, (_, factor) in HYDRAULIC_UNITS.items()}
-    return ActuatorParameters(**si).with_values({k: np.reshape(v, (-1, 1)) for k, v in values.items()})
+    one = np.zeros((1, 1), PARAMETERS).view(np.recarray)
+    return with_values(
+        one,
+        {k: np.reshape(base[k], (-1, 1)) for k in QUANTITIES}
+        | {k: np.reshape(v, (-1, 1)) for k, v in values.items()},
+    )
 
 
 def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
@@ -71,7 +73,7 @@ def pendulum() -> mujoco.MjModel:
 
 
 def simulate(
-    p: ActuatorParameters,
+    p: Records,
     command: np.ndarray,
     settings: HydraulicSettings,
     steps: int = 1,
@@ -89,7 +91,7 @@ def simulate(
     armature = batch.expand("dof_armature")
     angle[:] = start
     batch.forward()
-    actuator = Actuator(p, LINKAGE, damping, model.opt.timestep, settings)
+    actuator = Actuator(p, CYLINDER, damping, model.opt.timestep, settings)
     spring = STIFFNESS * (start - START)
     state = actuator.start(angle, bias + spring)
     out = np.empty((n, len(command) + 1))
@@ -105,16 +107,14 @@ def simulate(
     return out
 
 
-def reference(
-    p: ActuatorParameters, command: np.ndarray, rtol: float = 1e-8
-) -> tuple[np.ndarray, np.ndarray]:
+def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.ndarray, np.ndarray]:
     """One candidate in plain equations: angles [rad], (T + 1,), and chamber pressures [Pa], (T + 1, 2)."""
-    v = {name: float(getattr(p, name)[0, 0]) for name in HYDRAULIC_UNITS}
+    v = {name: float(p[name][0, 0]) for name in QUANTITIES}
     ratio = sqrt(v["force_1"] / v["force_2"])
     gap = (v["stroke_2"] - ratio * v["stroke_1"]) / (ratio - 1)
     coil = v["force_1"] * (v["stroke_1"] + gap) ** 2 / v["rated_current"] ** 2
     beta, gain = v["bulk_modulus"], v["flow_coefficient"] * sqrt(2 / v["density"])
-    shortest = float(LINKAGE.shortest[0])
+    shortest = SHORTEST
 
     def geometry(q: float) -> tuple[float, float]:
         length = sqrt(A * A + B * B - 2 * A * B * cos(q + THETA0))

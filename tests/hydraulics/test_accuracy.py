@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hydraulic_reference import draw, parameters, pulses, reference, simulate
 
-from hydroid.hydraulics.parameters import ActuatorParameters
+from hydroid.hydraulics.records import Records
 from hydroid.settings.hydraulics import HydraulicSettings
 
 SETTINGS = HydraulicSettings()
 
 
-def errors(p: ActuatorParameters, command: np.ndarray, exact: np.ndarray, **steps: int) -> np.ndarray:
+def errors(p: Records, command: np.ndarray, exact: np.ndarray, **steps: int) -> np.ndarray:
     """Error of every candidate [deg], (n, T + 1)."""
     settings = HydraulicSettings(substeps=steps.get("substeps", SETTINGS.substeps))
     return np.degrees(simulate(p, command, settings, steps.get("steps", 1)) - exact)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hydraulic_reference import (
     CENTRE,
+    CYLINDER,
     DAMPING,
     GRAVITY,
-    LINKAGE,
     MASS,
     START,
     STIFFNESS,
@@ -21,7 +21,7 @@ from hydraulic_reference import (
 
 from hydroid.hydraulics.actuator import Actuator, Observation
 from hydroid.hydraulics.cylinder import triangle
-from hydroid.hydraulics.parameters import ROTARY, Linkages
+from hydroid.hydraulics.records import LINKAGE, ROTARY, has_force_curve
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -34,7 +34,7 @@ Seen = list[tuple[Observation, np.ndarray]]
 
 def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Travel and moment arm at angles of any shape."""
-    return triangle(angle, LINKAGE.a[0], LINKAGE.b[0], LINKAGE.theta0[0], LINKAGE.shortest[0])[:2]
+    return triangle(angle, *(float(CYLINDER[name][0]) for name in ("a", "b", "theta0", "shortest")))[:2]
 
 
 def weight(angle: float) -> float:
@@ -67,7 +67,7 @@ def test_a_kick_dies_out_where_it_started():
 def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
     """Pressures come back to the last digits with the angle, and are never below vapour pressure between."""
     p, period = parameters(TIGHT), 0.01
-    actuator = Actuator(p, LINKAGE, DAMPING, period, TIGHT)
+    actuator = Actuator(p, CYLINDER, DAMPING, period, TIGHT)
     angle, mass = np.full((1, 1), START), np.full((1, 1), 23.6)
     state = actuator.start(angle, np.full((1, 1), 250.0))
     before = actuator.observe(state, angle)
@@ -246,14 +246,14 @@ def test_an_infeasible_member_stands_still_and_harms_nobody():
     p = parameters(TIGHT, stroke_1=np.array([0.8, 13.0, 0.8]))
     command = pulses(np.random.default_rng(9), 200)
     angle = simulate(p, command, TIGHT)
-    assert p.feasible.tolist() == [True, False, True]
+    assert has_force_curve(p).tolist() == [True, False, True]
     assert abs(angle[1] - START).max() < 1e-9
     np.testing.assert_array_equal(angle[0], angle[2])
     np.testing.assert_array_equal(simulate(p[[0]], command, TIGHT)[0], angle[0])
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    linkage = Linkages(np.array([ROTARY]), *np.zeros((5, 1)))
+    linkage = np.array([(ROTARY, 0, 0, 0, 0, 0)], LINKAGE).view(np.recarray)
     p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0)
     actuator = Actuator(p, linkage, 5.0, 0.01, TIGHT)
     angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05

@@ -4,7 +4,7 @@ import numpy as np
 from hydraulic_arm import DrivenArm, scatter
 from hydraulic_reference import pulses
 
-from hydroid.hydraulics.parameters import ActuatorParameters, nominal_parameters
+from hydroid.hydraulics.records import Records, nominal_parameters
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -12,7 +12,7 @@ ALL = list(range(7))
 SETTINGS = HydraulicSettings()
 
 
-def candidates(arm: Arm, n: int, settings: HydraulicSettings = SETTINGS, seed: int = 0) -> ActuatorParameters:
+def candidates(arm: Arm, n: int, settings: HydraulicSettings = SETTINGS, seed: int = 0) -> Records:
     return scatter(nominal_parameters(arm, settings, ALL, n), np.random.default_rng(seed))
 
 

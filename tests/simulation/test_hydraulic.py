@@ -11,7 +11,7 @@ from conftest import candidates as arms
 from conftest import step_log
 
 from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.parameters import Linkages, nominal_parameters
+from hydroid.hydraulics.records import linkages, nominal_parameters
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import Candidates, HydraulicSimulation
@@ -35,7 +35,7 @@ def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:
     rng = np.random.default_rng(seed)
     actuators = nominal_parameters(arm, HydraulicSettings(**hydraulics), JOINTS, n)
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
-        getattr(actuators, name)[:] *= rng.uniform(0.7, 1.4, (n, 1))
+        actuators[name] *= rng.uniform(0.7, 1.4, (n, 1))
     return Candidates(arms(arm, n, seed), actuators)
 
 
@@ -92,10 +92,10 @@ def test_only_products_that_the_chain_knows_matter(spec, arm, steps):
     gap = (a.stroke_2 - ratio * a.stroke_1) / (ratio - 1)
     coil = a.force_1 * (a.stroke_1 + gap) ** 2
     x1, x2 = a.stroke_1 * 1.5, a.stroke_2 * 0.6
-    along = replace(
-        a, stroke_1=x1, stroke_2=x2, force_1=4 * coil / (x1 + gap) ** 2, force_2=4 * coil / (x2 + gap) ** 2
-    )
-    along = replace(along, current_max=a.current_max / 2, current_min=a.current_min / 2)
+    along = a.copy()
+    along.stroke_1, along.stroke_2 = x1, x2
+    along.force_1, along.force_2 = 4 * coil / (x1 + gap) ** 2, 4 * coil / (x2 + gap) ** 2
+    along.current_max, along.current_min = a.current_max / 2, a.current_min / 2
     run = simulation(spec, arm, steps).simulate
     np.testing.assert_allclose(run(Candidates(one.arm, along)).angle, run(one).angle, atol=1e-9)
 
@@ -109,15 +109,17 @@ def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
     healthy = run(everyone).angle
     assert everyone.actuators is not None
     capfd.readouterr()
-    force = everyone.actuators.force_2.copy()
+    broken = everyone.actuators.copy()
+    force = broken.force_2
     force[1] = 100.0  # the force would grow with the stroke
-    response = run(Candidates(everyone.arm, replace(everyone.actuators, force_2=force)))
+    response = run(Candidates(everyone.arm, broken))
     np.testing.assert_array_equal(response.feasible, [True, False, True])
     np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
     assert np.isnan(response.angle[1]).all()
     assert capfd.readouterr() == ("", "")
     assert not Path("MUJOCO_LOG.TXT").exists()
-    nobody = run(Candidates(everyone.arm, replace(everyone.actuators, force_2=np.full((3, 7), 100.0))))
+    broken.force_2 = 100.0
+    nobody = run(Candidates(everyone.arm, broken))
     assert not nobody.feasible.any()
 
 
@@ -130,10 +132,8 @@ def test_the_trace_explains_the_motion(spec, arm, steps):
     assert list(trace.joints) == [2]
     assert trace.pressure.shape == (len(steps.time), 1, 2)
     assert trace.pressure.min() >= 0
-    from hydroid.arm.linkage import linkage
-
-    cylinder = linkage(arm.joints[1])
-    way = cylinder.travel(angle) - cylinder.travel(angle[:1])
+    cylinder = arm.joints[1].actuator
+    way = cylinder.length(angle) - cylinder.length(angle[:1])
     assert one.actuators is not None
     oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.actuators.area_a[0, 1]
     assert np.ptp(way) > 2e-3
@@ -155,7 +155,7 @@ def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, ste
     assert one.actuators is not None
     actuator = Actuator(
         one.actuators,
-        Linkages.of(arm, JOINTS, [1, 3]),
+        linkages(arm, JOINTS, [1, 3]),
         one.arm.damping,
         0.01,
         HydraulicSettings(delay=0.033),

@@ -6,15 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hydroid.arm.linkage import Rotary
-from hydroid.hydraulics.amplifier import coil_current
-from hydroid.hydraulics.calibration import side_voltage
-from hydroid.hydraulics.parameters import ActuatorParameters
-from hydroid.hydraulics.solenoid import coil_force, force_curve, resting_stroke
-from hydroid.hydraulics.valve import conductance, opening, port_flow, spool
+from hydroid.hydraulics.amplifier import coil_current, side_voltage
+from hydroid.hydraulics.solenoid import coil_force, resting_stroke
+from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
 from hydroid.report.actuator import ActuatorCard
 from hydroid.report.plots.style import GREY, MEASURED, REFINED, SEARCH, figure, styled
+from hydroid.settings.linkage import LinearActuator
 
 SIDE_A: dict[str, Any] = {"color": SEARCH}
 SIDE_B: dict[str, Any] = {"color": REFINED, "linestyle": (0, (5, 2))}
@@ -61,7 +59,7 @@ def _current(axes: Axes, card: ActuatorCard) -> None:
 
 def _force(axes: Axes, card: ActuatorCard) -> None:
     p = card.parameters
-    coil, gap = _curve(p)
+    coil, gap = float(p.coil), float(p.gap)
     stroke = np.linspace(0.0, 1.08 * p.stroke_2, 400)
     currents = {float(i) for i in (p.current_min, 0.5 * (p.current_min + p.current_max), p.current_max)}
     for shade, current in zip(_SHADES, sorted(currents | {float(p.rated_current)}), strict=False):
@@ -92,7 +90,7 @@ def _spool(axes: Axes, card: ActuatorCard) -> None:
 
 def _opening(axes: Axes, card: ActuatorCard) -> None:
     at = _spool_range(card.parameters)
-    area = 1e6 * _area(card.parameters, at)
+    area = 1e6 * opening(at, card.parameters)
     _sides(axes, 1e3 * at, np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan))
     _name(axes, "Valve opening", "spool displacement [mm]", "opening [mm²]")
 
@@ -101,7 +99,7 @@ def _flow(axes: Axes, card: ActuatorCard) -> None:
     p = card.parameters
     at = _spool_range(p)
     for shade, drop in zip(_SHADES, _DROPS, strict=False):
-        axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, _area(p, at)), color=shade, label=f"{drop:g} bar")
+        axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, opening(at, p)), color=shade, label=f"{drop:g} bar")
     axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
     _name(axes, "Flow from the pump, (7)", "spool displacement [mm]", "flow [L/min]", "upper center", 3)
 
@@ -126,14 +124,14 @@ def _pressure_flow(axes: Axes, card: ActuatorCard) -> None:
 def _torque(axes: Axes, card: ActuatorCard) -> None:
     p = card.parameters
     angle = np.linspace(*card.range, 400)
-    arm = card.linkage.moment_arm(np.radians(angle))
-    rotary = isinstance(card.linkage, Rotary)
-    arm = np.ones_like(angle) if rotary else arm  # a rotary actuator's areas are its displacement
+    # a rotary actuator's areas are its displacement
+    linear = isinstance(card.linkage, LinearActuator)
+    arm = card.linkage.moment_arm(np.radians(angle)) if linear else np.ones_like(angle)
     most, least = p.supply_pressure, p.tank_pressure
     axes.plot(angle, arm * (p.area_a * most - p.area_b * least), label="A at supply", **SIDE_A)
     axes.plot(angle, arm * (p.area_a * least - p.area_b * most), label="B at supply", **SIDE_B)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    lever = "" if rotary else f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm"
+    lever = f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm" if linear else ""
     _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
 
 
@@ -150,42 +148,29 @@ PANELS = {
 """the panels by name, in the order of the chain"""
 
 
-def _voltages(p: ActuatorParameters, command: Array) -> tuple[Array, Array]:
+def _voltages(p: Any, command: Array) -> tuple[Array, Array]:
     return side_voltage(command, p.onset_a, p.full_a), side_voltage(-command, p.onset_b, p.full_b)
 
 
-def _currents(p: ActuatorParameters, command: Array) -> tuple[Array, Array]:
+def _currents(p: Any, command: Array) -> tuple[Array, Array]:
     a, b = (coil_current(voltage, p.current_max, p.current_min) for voltage in _voltages(p, command))
     return a, b
 
 
-def _curve(p: ActuatorParameters) -> tuple[float, float]:
-    coil, gap = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
-    return float(coil), float(gap)
-
-
-def _displacement(p: ActuatorParameters, command: Array) -> Array:
+def _displacement(p: Any, command: Array) -> Array:
     """Where the spool comes to rest [m]."""
-    coil, gap = _curve(p)
-    a, b = (resting_stroke(coil * i**2, gap, p.plunger_stiffness) for i in _currents(p, command))
+    a, b = (resting_stroke(p.coil * i**2, p.gap, p.plunger_stiffness) for i in _currents(p, command))
     return spool(a, b)
 
 
-def _spool_range(p: ActuatorParameters) -> Array:
+def _spool_range(p: Any) -> Array:
     """A little more than from full opening to full opening [m]."""
     return np.linspace(-1.15 * (p.overlap_b + p.slot_width), 1.15 * (p.overlap_a + p.slot_width), 2001)
 
 
-def _area(p: ActuatorParameters, at: Array) -> Array:
-    return opening(at, p.opening_a, p.opening_b, p.slot_width, p.overlap_a, p.overlap_b, p.opening_exponent)
-
-
-def _pump_flow(p: ActuatorParameters, drop: Array | float, area: Array | float) -> Array:
+def _pump_flow(p: Any, drop: Array | float, area: Array | float) -> Array:
     """Flow [L/min] from the pump over a pressure drop [Pa] through an edge of area [m²] and its leakage."""
-    supply, gain, edge = p.supply_pressure, conductance(p.flow_coefficient, p.density), area + p.leakage
-    flow, _ = port_flow(
-        supply - drop, edge, 0.0, supply, p.tank_pressure, gain, p.transition_pressure, p.flow_limit
-    )
+    flow, _ = port_flow(p.supply_pressure - drop, area + p.leakage, 0.0, p)
     return _LITRES * flow
 
 

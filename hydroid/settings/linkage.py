@@ -1,0 +1,94 @@
+"""What turns a joint: a cylinder that spans a triangle with it, or a rotary actuator. Units as on a drawing.
+
+A cylinder's pivots lie at distances a and b from the joint's axis. The angle between them is θ = q + θ0, so
+by the law of cosines the cylinder is c(q) long. By virtual work, τ dq = F dc, its force F makes the torque
+τ = r F with the moment arm r = dc/dq. (The article leaves this geometry to its CAD model; the triangle and
+its numbers are ours.)
+"""
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from hydroid.settings.load import Settings
+
+Positive = Annotated[float, Field(gt=0)]
+Vector = tuple[float, float, float]
+
+
+def _direction(value: Vector) -> Vector:
+    if not any(value):
+        raise ValueError("a direction cannot be (0, 0, 0)")
+    return value
+
+
+Direction = Annotated[Vector, AfterValidator(_direction)]
+
+
+def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of a cylinder, elementwise.
+
+    The hydraulic kernel compiles this very function.
+
+    Args:
+        angle: of the joint [rad].
+        a: distance of one pivot from the joint's axis [m].
+        b: distance of the other [m].
+        theta0: angle between the pivots at joint angle 0 [rad].
+        shortest: the cylinder's length with the rod fully in [m]; with 0 the travel is the length itself.
+    """
+    theta = angle + theta0
+    cosine = a * b * np.cos(theta)
+    length = np.sqrt(a * a + b * b - 2.0 * cosine)
+    arm = a * b * np.sin(theta) / length
+    return length - shortest, arm, (cosine - arm * arm) / length
+
+
+# catalogue strokes are round numbers: one a little short of the joint's range is an end stop, not a slip
+STROKE_TOLERANCE = 0.02
+
+
+class LinearActuator(Settings):
+    """A cylinder that spans a triangle with the joint; `a`, `b` are the pivots' distances from its axis."""
+
+    kind: Literal["linear"]
+    a: Positive
+    """[m]"""
+    b: Positive
+    """[m]"""
+    theta0: float
+    """angle between the two pivots at joint angle 0 [deg]"""
+    stroke: Positive
+    """[mm]"""
+    area_a: Positive
+    """piston area that pushes the joint to positive angles [mm²]"""
+    area_b: Positive
+    """annulus area on the rod side [mm²]"""
+    max_opening: Positive
+    """largest valve opening [mm²]"""
+    a_on: Literal["parent", "child"] = "parent"
+    """the link that carries the pivot at distance a; the other carries b"""
+    towards: Direction
+    """from the joint to the pivot on the parent link, in its frame; the part along the axis is dropped"""
+    offset: float = 0.0
+    """of both pivots along the joint's axis [m]"""
+
+    def length(self, angle: Any) -> Any:
+        """Distance between the pivots [m] at joint angles [rad] of any shape."""
+        return triangle(angle, self.a, self.b, math.radians(self.theta0))[0]
+
+    def moment_arm(self, angle: Any) -> Any:
+        """Torque per force, and rod speed per joint speed [m], at joint angles [rad] of any shape."""
+        return triangle(angle, self.a, self.b, math.radians(self.theta0))[1]
+
+
+class RotaryActuator(Settings):
+    """A rotary vane or piston actuator on the joint's axis."""
+
+    kind: Literal["rotary"]
+    displacement: Positive
+    """[cm³/rad]"""
+    max_opening: Positive
+    """largest valve opening [mm²]"""

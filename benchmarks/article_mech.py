@@ -15,7 +15,8 @@ import numpy as np
 from pseudo_random import pseudo_random_log
 
 from hydroid.fitting.fit import Fit, fit
-from hydroid.jobs import load_settings, read_parameters
+from hydroid.estimate import read_values
+from hydroid.jobs import load_settings
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Problem
 from hydroid.simulating import simulate_log
@@ -36,7 +37,7 @@ class Silent:
 def study(algorithm: str, seed: int) -> tuple[Problem, Fit, np.ndarray, float]:
     """Fit one seed; return the problem, the fit, the true parameters and the wall time [s]."""
     settings = load_settings("article-mech", {"search.algorithm": algorithm, "search.seed": seed})
-    values = read_parameters(TRUTH)
+    values = read_values(TRUTH)[0]
     log = simulate_log(settings, pseudo_random_log(settings.arm.pose("study"), [2]), values, str(TRUTH))
     problem = Problem(settings, [log])
     started = time.perf_counter()

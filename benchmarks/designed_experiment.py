@@ -26,7 +26,8 @@ from hydroid.experiment.design import design, start_poses
 from hydroid.experiment.information import statement_information
 from hydroid.experiment.trial import Bench, violation
 from hydroid.fitting.refinement import refine
-from hydroid.jobs import load_settings, read_parameters
+from hydroid.estimate import read_values
+from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
@@ -97,7 +98,7 @@ def main() -> None:
     parser.add_argument("--fits", type=int, default=50)
     parser.add_argument("--duration", type=float, default=30.0)
     arguments = parser.parse_args()
-    values = read_parameters(TRUTH)
+    values = read_values(TRUTH)[0]
     settings, arm = make_settings(values, arguments)
     names = list(values)
     truth = np.array([values[n] for n in names])

@@ -19,7 +19,8 @@ from pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.fitting.search import Search
-from hydroid.jobs import load_settings, read_parameters
+from hydroid.estimate import read_values
+from hydroid.jobs import load_settings
 from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm
 from hydroid.simulating import simulate_log
@@ -32,7 +33,7 @@ def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm
     changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
     settings = load_settings("article-mech", changes)
     log = pseudo_random_log(settings.arm.pose("study"), [2], duration=75.01)
-    log = simulate_log(settings, log, read_parameters(TRUTH), str(TRUTH))
+    log = simulate_log(settings, log, read_values(TRUTH)[0], str(TRUTH))
     return Problem(settings, [log]), settings.arm
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hydroid.errors import HydroidError, RunError
+from hydroid.estimate import NAME, NamedEstimate, read_estimate
 from hydroid.parameters import ParameterSet
 from hydroid.problem.stage import Stage
 from hydroid.report.collected import RunResult, write_collected
@@ -17,7 +18,6 @@ from hydroid.report.tables import SeedResult
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import read_yaml
 
 
 @dataclass(frozen=True)
@@ -102,22 +102,22 @@ def _read(path: Path) -> _Run:
 
 
 def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
-    file = path / "estimate.yaml"
-    content, _ = read_yaml(file)
-    try:
-        estimates, final = content["estimates"], content["final"]
-        searched = next(iter(estimates))
-        first, last = (_estimate(estimates[name], seed, parameters, str(file)) for name in (searched, final))
-        return RunResult(path, first, last, final != searched, frozenset(content["without_effect"]))
-    except (AttributeError, LookupError, OverflowError, StopIteration, TypeError, ValueError):
-        raise RunError("is not an estimate that a run has written", where=str(file)) from None
+    file = path / NAME
+    summary = read_estimate(file)
+    names = list(summary.estimates)
+    if not names or summary.final not in names:
+        raise RunError("is not an estimate that a run has written", where=str(file))
+    first, last = (
+        _estimate(summary.estimates[n], seed, parameters, str(file)) for n in (names[0], summary.final)
+    )
+    without = frozenset(name for name, p in summary.estimate.items() if p.flag == "no effect")
+    return RunResult(path, first, last, summary.final != names[0], without)
 
 
-def _estimate(content: dict[str, Any], seed: int, parameters: ParameterSet, source: str) -> SeedResult:
-    rms = math.radians(content["rms_deg"])
-    if not 0 <= rms < math.inf:
-        raise ValueError
-    return SeedResult(seed, parameters.vector(content["parameters"], source), rms)
+def _estimate(found: NamedEstimate, seed: int, parameters: ParameterSet, source: str) -> SeedResult:
+    if found.rms_deg is None:
+        raise RunError("is the estimate of a simulation that diverged", where=source)
+    return SeedResult(seed, parameters.vector(found.values, source), math.radians(found.rms_deg))
 
 
 def _refuse_others(runs: Sequence[_Run], tell: Callable[[str], None]) -> None:

@@ -15,9 +15,11 @@ import numpy as np
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution import Executor
+from hydroid.estimate import read_values
 from hydroid.fitting.fit import Fit, Watcher, fit
 from hydroid.fitting.search import check_search
 from hydroid.fitting.validation import ErrorIndices, error_indices
+from hydroid.identified import load_identified
 from hydroid.log import Finding, Log, Warn, check_log, read_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
@@ -26,7 +28,7 @@ from hydroid.report.write import write_report
 from hydroid.run.folder import RunFolder
 from hydroid.run.run_log import log_end, log_start
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
-from hydroid.settings.load import load, read_yaml
+from hydroid.settings.load import load
 from hydroid.simulating import respond
 
 _log = logging.getLogger(__name__)
@@ -154,7 +156,7 @@ def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    values = read_parameters(path)
+    values, _ = read_values(path)
     wanted = [name for name, p in settings.parameters.items() if p.quantity in MECHANICAL_UNITS]
     missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
     if missing:
@@ -178,29 +180,13 @@ def validate_fits(
     """Simulate each fit's estimate on each log, with the settings it was fitted with."""
     results: list[Validation] = []
     for path in folders:
-        folder = RunFolder(path)
-        settings = folder.settings(overrides)
-        source = str(path / "estimate.yaml")
+        model = load_identified(path, overrides=overrides)
+        settings = model.settings
         for log in read_logs(paths, settings, warn):
-            response = respond(settings, log, folder.estimate(), source, settings.outputs)
+            response = respond(settings, log, model.values, model.source, settings.outputs)
             indices = {
                 joint: error_indices(log.angle[:, joint - 1], response[:, column])
                 for column, joint in enumerate(settings.outputs)
             }
             results.append(Validation(path.name, log, response, indices))
     return results
-
-
-def read_parameters(path: Path) -> dict[str, Any]:
-    """Read parameter values by name: a mapping, an `estimate.yaml`, or the run folder that holds one.
-
-    Raises:
-        SettingsError: not a mapping.
-    """
-    if path.is_dir():
-        return RunFolder(path).estimate()
-    values, _ = read_yaml(path)
-    inner = values.get("parameters", values)
-    if not isinstance(inner, dict):
-        raise SettingsError("parameters must be a mapping", where=str(path), hint="write `K: 0.2` lines")
-    return inner

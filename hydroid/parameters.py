@@ -35,10 +35,6 @@ class ParameterSet:
 
     parameters: tuple[Parameter, ...]
 
-    def __post_init__(self) -> None:
-        if not self.free.any():
-            raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
-
     @property
     def names(self) -> tuple[str, ...]:
         """Names, in order."""

@@ -1,7 +1,6 @@
 """Studies of a model at an estimate, as plain functions: sensitivity, error surfaces, the next experiment."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +8,13 @@ import numpy as np
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.experiment.design import Tell, design
-from hydroid.jobs import load_settings, read_logs, read_parameters
+from hydroid.identified import IdentifiedModel, load_identified
+from hydroid.jobs import read_logs
 from hydroid.log import Warn, write_log
-from hydroid.parameters import Array
-from hydroid.problem.problem import Problem, freed_settings
-from hydroid.problem.stage import Stage
+from hydroid.problem.problem import Problem
 from hydroid.report.studies import surface_table, write_design, write_sensitivity, write_surface
 from hydroid.report.table import Table
 from hydroid.report.told import Told, write_told
-from hydroid.run.folder import RunFolder
-from hydroid.settings.fit import FitSettings
 from hydroid.uncertainty.covariance import uncertainty
 from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.intervals import Profile, bootstrap, profile
@@ -26,48 +22,19 @@ from hydroid.uncertainty.surface import surface
 from hydroid.uncertainty.sweep import sweep
 
 
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """A model at an estimate: theta, shape (P,), and where it came from."""
-
-    settings: FitSettings
-    theta: Array
-    source: str
-
-
 def load_subject(
     config: str | None, fit: Path | None, params: Path | None, overrides: dict[str, Any]
-) -> Subject:
-    """Read the model and the estimate that a study is about.
-
-    Args:
-        config: settings; left out, those of the fit, those beside the parameters, or fit-mech.
-        fit: a run folder.
-        params: a YAML file of values by name, or an estimate.yaml; instead of `fit`.
-        overrides: settings to replace, by key.
-
-    Raises:
-        SettingsError: neither or both of `fit` and `params`, or values that do not fit the settings.
-        RunError: a run without an estimate.
-    """
+) -> IdentifiedModel:
+    """Read the model and the estimate that a study is about, from `fit` or `params`."""
     if (fit is None) == (params is None):
         what = "needs an estimate" if fit is None else "has two estimates"
         raise SettingsError(what, hint="give either --fit DIR or --params P.yaml")
-    if fit is not None:
-        source, values = str(fit / "estimate.yaml"), RunFolder(fit).estimate()
-        settings = load_settings(config, overrides) if config else RunFolder(fit).settings(overrides)
-        if config is None and RunFolder(fit).refined:
-            settings = freed_settings(settings)
-    else:
-        assert params is not None
-        beside = (params if params.is_dir() else params.parent) / "config.yaml"
-        chosen = config or (str(beside) if beside.is_file() else "fit-mech")
-        settings = load_settings(chosen, overrides)
-        source, values = str(params), read_parameters(params)
-    return Subject(settings, Stage(settings).parameters.vector(values, source), source)
+    return load_identified(fit or params, config, overrides)
 
 
-def study_sensitivity(subject: Subject, logs: Sequence[Path], out: Path, warn: Warn, tell: Tell) -> Table:
+def study_sensitivity(
+    subject: IdentifiedModel, logs: Sequence[Path], out: Path, warn: Warn, tell: Tell
+) -> Table:
     """Write how every output depends on every free parameter against time (article, figure 10).
 
     Raises:
@@ -78,7 +45,7 @@ def study_sensitivity(subject: Subject, logs: Sequence[Path], out: Path, warn: W
 
 
 def study_surface(
-    subject: Subject,
+    subject: IdentifiedModel,
     logs: Sequence[Path],
     out: Path,
     over: Sequence[str],
@@ -113,7 +80,7 @@ def study_surface(
 
 
 def study_design(
-    subject: Subject, logs: Sequence[Path], out: Path, seed: int, warn: Warn, tell: Tell
+    subject: IdentifiedModel, logs: Sequence[Path], out: Path, seed: int, warn: Warn, tell: Tell
 ) -> Table:
     """Design the next experiment; write its commands, the predicted motion and the predicted precision.
 
@@ -135,12 +102,11 @@ def study_design(
     found = design(settings, subject.theta, read_logs(logs, settings, warn), seed, tell)
     write_log(out / "commands.csv", found.log, settings.log)
     write_log(out / "predicted.csv", found.predicted, settings.log)
-    values = Stage(settings).parameters.mapping(subject.theta)
-    return write_design(out, settings.arm, settings.design, found, values)
+    return write_design(out, settings.arm, settings.design, found, subject.values)
 
 
 def study_identifiability(
-    subject: Subject,
+    subject: IdentifiedModel,
     logs: Sequence[Path],
     out: Path,
     profiled: Sequence[str],
@@ -178,14 +144,6 @@ def study_identifiability(
     return told
 
 
-def middle_subject(config: str, overrides: dict[str, Any]) -> Subject:
-    """The model of some settings, every free parameter in the middle of its bounds."""
-    settings = load_settings(config, overrides)
-    parameters = Stage(settings).parameters
-    theta = parameters.from_unit(np.full((1, int(parameters.free.sum())), 0.5))[0]
-    return Subject(settings, theta, "the middle of the bounds")
-
-
-def _problem(subject: Subject, logs: Sequence[Path], warn: Warn) -> Problem:
+def _problem(subject: IdentifiedModel, logs: Sequence[Path], warn: Warn) -> Problem:
     settings = subject.settings
     return Problem(settings, read_logs(logs, settings, warn))

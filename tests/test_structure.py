@@ -11,6 +11,8 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 LAYERS = [
     {"errors", "__init__"},
     {"assets", "files", "parameters", "settings"},
+    {"estimate"},
+    {"identified"},
     {"log", "arm", "hydraulics"},
     {"simulation", "search", "execution", "parallel"},
     {"problem"},

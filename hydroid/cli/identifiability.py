@@ -52,10 +52,12 @@ def identifiability(
     Singular values in units of the noise, each direction that the data leave open in words, standard
     deviations and 95 % intervals. Writes a page with tables and figures.
     """
-    from hydroid.studies import load_subject, middle_subject, study_identifiability
+    from hydroid.identified import middle_of_bounds
+    from hydroid.jobs import load_settings
+    from hydroid.studies import load_subject, study_identifiability
 
     if fit is None and params is None:
-        subject = middle_subject(config or f"fit-{stage.value}", overrides(setting))
+        subject = middle_of_bounds(load_settings(config or f"fit-{stage.value}", overrides(setting)))
     else:
         subject = load_subject(
             config or (None if fit else f"fit-{stage.value}"), fit, params, overrides(setting)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import typer
 
 from hydroid.cli.progress import Progress
@@ -20,6 +19,7 @@ from hydroid.report import words
 from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
 from hydroid.run.folder import RunFolder
+from hydroid.run.summary import summarise
 from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
 
 
@@ -58,7 +58,7 @@ def run_fits(
             warn = _silent  # the logs are the same for every seed
     table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])
     if json:
-        found = [summary(problem, fit) | {"seed": seed} for seed, problem, fit in results]
+        found = [summarise(problem, fit).plain() for _, problem, fit in results]
         typer.echo(jsonlib.dumps({"out": str(out), "runs": found}))
     elif not quiet:
         table.show()
@@ -77,25 +77,6 @@ def with_mechanical(mech: Path | None, config: str, changes: dict[str, Any]) -> 
         hint = "give --mech RUN, or fix them in the config"
         raise SettingsError(f"stage 2 needs stage 1's {', '.join(open_)}", hint=hint)
     return changes
-
-
-def summary(problem: Problem, fit: Fit) -> dict[str, Any]:
-    """Return a fit as plain values: parameters by name, errors in deg, what has no effect."""
-    mapping = problem.parameters.mapping
-    return {
-        "final": fit.final,
-        "parameters": mapping(fit.best.theta),
-        "estimates": {
-            name: {"parameters": mapping(e.theta), "rms_deg": float(np.rad2deg(e.rms)), "norm": e.overall}
-            for name, e in fit.estimates.items()
-        },
-        "without_effect": [
-            name for name, none in zip(problem.parameters.names, fit.without_effect, strict=True) if none
-        ],
-        "evaluations": int(fit.history[-1, 1]),
-        "simulated": int(fit.history[-1, 2]),
-        "infeasible": int(fit.history[-1, 3]),
-    }
 
 
 def _continued(

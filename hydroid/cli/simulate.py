@@ -34,18 +34,15 @@ def simulate(
     quiet: Quiet = False,
 ) -> None:
     """Simulate commands with given parameters and write a log: a prediction, or data to test a fit with."""
-    from hydroid.jobs import load_settings, read_parameters
+    from hydroid.identified import load_identified
     from hydroid.simulating import simulate_file
 
-    beside = (params if params.is_dir() else params.parent) / "config.yaml"
-    chosen = config or (str(beside) if beside.is_file() else "fit-mech")
-    settings = load_settings(chosen, overrides(setting))
-    values = read_parameters(params)
+    model = load_identified(params, config, overrides(setting))
     simulate_file(
-        settings,
+        model.settings,
         commands,
-        values,
-        str(params),
+        model.values,
+        model.source,
         out,
         warn,
         pose=pose,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hydroid.arm.model import load_model
 from hydroid.arm.payload import add_payload
+from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
@@ -62,6 +63,8 @@ class Problem:
         self.stage = Stage(settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
+        if not self.parameters.free.any():
+            raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
         pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [
@@ -74,7 +77,7 @@ class Problem:
 
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
-        return Problem(freed_settings(self.settings), self.logs)
+        return Problem(self.settings.freed(), self.logs)
 
     def first(self, seconds: float) -> "Problem":
         """Return the same problem up to so long after each log's first command, in one segment a channel."""
@@ -122,15 +125,6 @@ class Problem:
     def _chunks(self, n: int) -> Iterator[slice]:
         size = min(simulation.record.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
-
-
-def freed_settings(settings: FitSettings) -> FitSettings:
-    """Return the settings with every parameter free that has bounds, as a refinement has them."""
-    free = {
-        name: p if p.bounds is None else p.model_copy(update={"fixed": None})
-        for name, p in settings.parameters.items()
-    }
-    return settings.model_copy(update={"parameters": free})
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:

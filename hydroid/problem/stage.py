@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import nominal_parameters
-from hydroid.parameters import Array, Parameter, ParameterSet
+from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings, ParameterSettings
 from hydroid.settings.hydraulics import QUANTITIES
@@ -36,7 +36,7 @@ class Stage:
         self._slots = {name: _slots(arm, name, p) for name, p in settings.parameters.items()}
         self._quantities = {name: p.quantity for name, p in settings.parameters.items()}
         self._refuse_overlap()
-        self.parameters = ParameterSet(tuple(_parameter(name, p) for name, p in settings.parameters.items()))
+        self.parameters = settings.parameter_set()
 
     def candidates(self, theta: Array) -> Candidates:
         """Spread theta, shape (n, P), over joints, links and actuators."""
@@ -122,8 +122,3 @@ def _slots(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
     if any(j > count for j in joints):
         raise SettingsError(f"the arm has joints 1 to {count}", where=f"{where}.joints")
     return [j - 1 for j in joints]
-
-
-def _parameter(name: str, settings: ParameterSettings) -> Parameter:
-    lower, upper = settings.bounds or (settings.fixed or 0.0,) * 2
-    return Parameter(name, settings.unit, lower, upper, settings.fixed)

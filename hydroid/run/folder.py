@@ -9,31 +9,31 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
-import numpy as np
-import yaml
 
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
+from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.journal import Journal
 from hydroid.fitting.search import Checkpoint, SearchState
+from hydroid.identified import write_settings
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run.checkpoint import read_checkpoint, write_checkpoint
 from hydroid.run.identity import (
     file_hash,
     identity,
     model_hash,
-    portable,
     refuse_other_arm,
     refuse_other_identity,
     refuse_other_settings,
 )
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
+from hydroid.run.summary import summarise
 from hydroid.settings.arm import load_arm
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import load, read_yaml
+from hydroid.settings.load import load
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,7 @@ class RunFolder:
         """
         self._refuse_other_files()
         self._write_model(load_model(settings.arm.model, settings.arm))
-        arm = settings.arm
-        local = arm.model_copy(update={"model": Path("model/arm.xml"), "meshes": Path("model/meshes")})
-        self._write_yaml("arm.yaml", local.model_dump(mode="json"))
-        self._write_yaml("config.yaml", portable(settings))
+        write_settings(self.path, settings)
         files = {"files": self._hashes(), "origin": model_hash(settings.arm), "status": "running"}
         self.write("run.json", json.dumps(identity(settings, logs) | files, indent=2) + "\n")
 
@@ -114,53 +111,9 @@ class RunFolder:
         self.identity()  # says what is wrong where the folder holds no run
         return load(self.path / "config.yaml", FitSettings, overrides)
 
-    @property
-    def refined(self) -> bool:
-        """Whether the final estimate is that of a refinement, which frees what was held fixed."""
-        file = self.path / "estimate.yaml"
-        return file.exists() and read_yaml(file)[0].get("final") == "joint"
-
-    def estimate(self) -> dict[str, Any]:
-        """Read the final parameters by name.
-
-        Raises:
-            RunError: the run is not finished, or its estimate is damaged.
-        """
-        file = self.path / "estimate.yaml"
-        if not file.exists():
-            raise RunError("has no estimate yet", where=str(self.path), hint="finish the fit with --resume")
-        parameters = read_yaml(file)[0].get("parameters")
-        if not isinstance(parameters, dict):
-            raise RunError("holds no parameters", where=str(file))
-        return parameters
-
     def write_estimate(self, problem: Problem, fit: Fit) -> None:
-        """Write `estimate.yaml` (the final parameters, every other estimate, flags) and the fitted MJCF."""
-        mapping = problem.parameters.mapping
-        names = problem.parameters.names
-        content = {
-            "stage": problem.settings.stage,
-            "final": fit.final,
-            "parameters": mapping(fit.best.theta),
-            "units": {p.name: p.unit for p in problem.parameters.parameters},
-            "standard_deviation": mapping(fit.uncertainty.standard_deviation),
-            "interval_95": {
-                name: [float(low), float(high)]
-                for name, (low, high) in zip(names, fit.uncertainty.interval, strict=True)
-            },
-            "flags": {n: list(f) for n, f in zip(names, fit.uncertainty.flags, strict=True) if f},
-            "not_determined": [direction.words for direction in fit.identifiability.weak],
-            "without_effect": [n for n, none in zip(names, fit.without_effect, strict=True) if none],
-            "estimates": {
-                e.name: {
-                    "parameters": mapping(e.theta),
-                    "rms_deg": float(np.rad2deg(e.rms)),
-                    "norm": e.overall,
-                }
-                for e in fit.estimates.values()
-            },
-        }
-        self._write_yaml("estimate.yaml", content)
+        """Write `estimate.yaml` and the fitted MJCF."""
+        write_estimate(self.path, summarise(problem, fit))
         spec = load_model(self.path / "model" / "arm.xml", load_arm(self.path / "arm.yaml"))
         problem.stage.write_into(spec, fit.best.theta)
         self._write_xml(spec, "fitted.xml")
@@ -241,6 +194,3 @@ class RunFolder:
         spec.modelfiledir, spec.meshdir = str((self.path / "model").resolve()), "meshes"
         spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
         self.write(f"model/{name}", spec.to_xml())
-
-    def _write_yaml(self, name: str, content: dict[str, Any]) -> None:
-        self.write(name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))

@@ -10,6 +10,7 @@ from typing import Any
 import hydroid
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
+from hydroid.identified import portable
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 
@@ -24,12 +25,6 @@ def identity(settings: FitSettings, logs: Sequence[Path]) -> dict[str, Any]:
         "seed": settings.search.seed,
         "logs": {str(path): file_hash(path) for path in logs},
     }
-
-
-def portable(settings: FitSettings) -> dict[str, Any]:
-    """Settings as they stand in a run folder, with the arm beside them."""
-    values = settings.model_dump(mode="json", exclude={"arm"})
-    return {"stage": values.pop("stage"), "arm": "arm.yaml"} | values
 
 
 def refuse_other_identity(

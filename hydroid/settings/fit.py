@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from hydroid.parameters import Parameter, ParameterSet
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.cluster import ClusterSettings
 from hydroid.settings.design import DesignSettings
@@ -149,3 +150,20 @@ class FitSettings(Settings):
             if self.stage == "hyd" and parameter.quantity == "gain":
                 raise ValueError(f"{name}: stage hyd has no gain; the hydraulics take its place")
         return self
+
+    def parameter_set(self) -> ParameterSet:
+        """Return the parameters with units, bounds and fixed values, in the order of theta."""
+        return ParameterSet(tuple(_parameter(name, p) for name, p in self.parameters.items()))
+
+    def freed(self) -> "FitSettings":
+        """Return the settings with every parameter free that has bounds, as a joint refinement has them."""
+        free = {
+            name: p if p.bounds is None else p.model_copy(update={"fixed": None})
+            for name, p in self.parameters.items()
+        }
+        return self.model_copy(update={"parameters": free})
+
+
+def _parameter(name: str, settings: ParameterSettings) -> Parameter:
+    lower, upper = settings.bounds or (settings.fixed or 0.0,) * 2
+    return Parameter(name, settings.unit, lower, upper, settings.fixed)

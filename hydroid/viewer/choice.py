@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import SettingsError
+from hydroid.estimate import read_values
 from hydroid.hydraulics.records import nominal_parameters
-from hydroid.jobs import load_settings, read_parameters
+from hydroid.jobs import load_settings
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import ArmParameters, Candidates
@@ -50,7 +51,7 @@ def choose(config: str | None, params: Path | None, changes: dict[str, Any] | No
         raise SettingsError("stage mech has no actuators", where=named, hint="use --config fit-hyd")
     values: dict[str, Any] = {}
     if params is not None:
-        values = read_parameters(params)
+        values, _ = read_values(params)
     source = str(params or named)
     stage = Stage(settings)
     known = stage.parameters.parameters

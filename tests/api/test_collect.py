@@ -142,14 +142,14 @@ def test_runs_that_cannot_be_used_are_told_and_left_out(runs, tmp_path: Path):
     "damage",
     [
         {"estimates": {}},
-        {"estimates": {"best": {"rms_deg": float("nan"), "parameters": TRUTH}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": -1.0, "parameters": TRUTH}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": "x", "parameters": TRUTH}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": 1.0, "parameters": TRUTH | {"K": "x"}}}, "final": "best"},
+        {"estimates": {"best": {"rms_deg": float("nan"), "values": TRUTH}}, "final": "best"},
+        {"estimates": {"best": {"rms_deg": -1.0, "values": TRUTH}}, "final": "best"},
+        {"estimates": {"best": {"rms_deg": None, "values": TRUTH}}, "final": "best"},
+        {"estimates": {"best": {"rms_deg": 1.0, "values": TRUTH | {"K": "x"}}}, "final": "best"},
         {"estimates": [1], "final": 0},
-        {"estimates": {"best": {"rms_deg": 10**400, "parameters": TRUTH}}, "final": "best"},
+        {"estimates": {"best": {"rms_deg": 10**400, "values": TRUTH}}, "final": "best"},
         {"final": ["best"]},
-        {"without_effect": None},
+        {"estimate": None},
     ],
 )
 def test_a_damaged_estimate_is_left_out(runs, damage: dict[str, object]):
@@ -157,7 +157,7 @@ def test_a_damaged_estimate_is_left_out(runs, damage: dict[str, object]):
     file.write_text(yaml.safe_dump(yaml.safe_load(file.read_text()) | damage))
     seeds, (told,) = collected("seed-*")
     assert seeds == [1, 3]
-    assert told.startswith("left out: seed-2/estimate.yaml: ")
+    assert told.startswith("left out: seed-2/estimate.yaml")
 
 
 def test_settings_that_were_changed_afterwards_are_told(runs):

@@ -42,11 +42,11 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     done = hydroid("fit-mech", short, "--algorithm", "ga", "--out", "run", "--json", *QUICK, cwd=tmp_path)
     (found,) = json.loads(done.stdout)["runs"]
-    assert set(found["parameters"]) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
-    assert found["without_effect"] == ["M1"]
+    assert set(found["estimate"]) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
+    assert [name for name, p in found["estimate"].items() if p["flag"] == "no effect"] == ["M1"]
     run = tmp_path / "run"
     estimate = yaml.safe_load((run / "estimate.yaml").read_text())
-    assert estimate["parameters"] == found["parameters"]
+    assert estimate == found
     for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.tex", "figures/response.svg"):
         assert (run / name).stat().st_size > 0
     assert json.loads((run / "run.json").read_text())["status"] == "done"
@@ -205,7 +205,7 @@ def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
     ]
     (found,) = json.loads(hydroid(*arguments, cwd=tmp_path).stdout)["runs"]
     assert list(found["estimates"]) == ["best", "refined", "joint"]
-    assert all(found["estimates"]["refined"]["parameters"][name] == v for name, v in values.items())
+    assert all(found["estimates"]["refined"]["values"][name] == v for name, v in values.items())
     rms = [found["estimates"][name]["rms_deg"] for name in ("best", "refined", "joint")]
     assert rms == sorted(rms, reverse=True)
     command = ["simulate", short, "--params", "run/estimate.yaml", "--out", "s.csv", "--trace", "t.csv"]

@@ -1,0 +1,137 @@
+"""`estimate.yaml`: what a fit found, as plain values; `--json` of a fit prints the same."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import Field
+
+from hydroid.errors import RunError, SettingsError
+from hydroid.files import is_file, write_atomic
+from hydroid.settings.load import Settings, load, read_yaml
+
+NAME = "estimate.yaml"
+"""name of the file in a run folder and beside a saved plant"""
+
+
+class ParameterEstimate(Settings):
+    """One parameter of the final estimate.
+
+    A standard deviation or an end of the interval that is unlimited or unknown is null.
+    """
+
+    value: float
+    unit: str
+    sd: float | None = None
+    """standard deviation, in the unit of the value"""
+    interval: tuple[float | None, float | None] = (None, None)
+    """95 % interval"""
+    flag: str | None = None
+    """how well the logs determine it: a value of `uncertainty.flags.Flag`"""
+    at_bound: Literal["lower", "upper"] | None = None
+
+
+class NamedEstimate(Settings):
+    """One of the estimates that a fit compared: null errors where its simulation diverged."""
+
+    values: dict[str, float]
+    rms_deg: Annotated[float, Field(ge=0)] | None = None
+    """rms error of the compared angles [deg]"""
+    objective: float | None = None
+    """over the whole record: [deg], or [-] where `objective.relative` is set"""
+
+
+class FitSummary(Settings):
+    """The final estimate of a fit, and the estimates that it was chosen from."""
+
+    version: Literal[1] = Field(default=1, alias="schema")
+    stage: Literal["mech", "hyd"]
+    estimate: dict[str, ParameterEstimate]
+    """by parameter"""
+    final: str | None = None
+    """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""
+    converged: bool | None = None
+    """whether the last refinement converged; null: there was none"""
+    ending: str | None = None
+    """why the last refinement ended"""
+    rms_deg: float | None = None
+    """rms error of the compared angles on the fitted logs [deg]"""
+    seed: int | None = None
+    """of the search"""
+    simulations: int | None = None
+    """of the search"""
+    diverged: int | None = None
+    """simulations of the search that diverged"""
+    estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
+    """by name; the first is the search's own"""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The final estimate by name."""
+        return {name: parameter.value for name, parameter in self.estimate.items()}
+
+    def plain(self) -> dict[str, Any]:
+        """Return mappings, lists, text and numbers, as YAML and JSON hold them."""
+        return self.model_dump(mode="json", by_alias=True)
+
+
+def write_estimate(folder: Path, summary: FitSummary) -> None:
+    """Write `estimate.yaml`.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    write_atomic(folder / NAME, yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True))
+
+
+def read_estimate(file: Path) -> FitSummary:
+    """Read an `estimate.yaml`.
+
+    Raises:
+        SettingsError: it cannot be read, or is damaged.
+    """
+    return load(file, FitSummary)
+
+
+def estimate_file(source: Path) -> Path:
+    """Return the file that holds the values of a run folder, of a saved plant, or of a YAML file by itself.
+
+    Raises:
+        RunError: the folder holds none.
+    """
+    if not source.is_dir():
+        return source
+    if is_file(source / NAME):
+        return source / NAME
+    if is_file(source / "run.json"):
+        raise RunError("has no estimate yet", where=str(source), hint="resume the fit")
+    raise RunError(
+        "holds no estimate", where=str(source), hint="name a run folder, a saved plant or a YAML file"
+    )
+
+
+def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:
+    """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
+
+    Returns:
+        The values, unchecked where they are not an estimate's, and the estimate where there is one.
+
+    Raises:
+        RunError: the folder holds none.
+        SettingsError: the file cannot be read, or is no mapping.
+    """
+    file = estimate_file(source)
+    content, _ = read_yaml(file)
+    if "estimate" in content:
+        summary = read_estimate(file)
+        return dict(summary.values), summary
+    values = content.get("parameters", content)
+    if not isinstance(values, dict):
+        raise SettingsError("parameters must be a mapping", where=str(file), hint="write `K: 0.2` lines")
+    return values, None
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None where it is infinite or NaN, which JSON has no word for."""
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,127 @@
+"""An estimate with its settings: from a run folder, a saved plant, a file of values, or nominal values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hydroid.assets import find_config
+from hydroid.estimate import FitSummary, ParameterEstimate, estimate_file, read_values
+from hydroid.files import is_file, write_atomic
+from hydroid.parameters import Array
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load
+
+CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
+"""the files of a folder that `load_identified` reads, beside the estimate"""
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedModel:
+    """A model at an estimate.
+
+    Attributes:
+        settings: with the arm; after a joint refinement every parameter that has bounds is free.
+        theta: the parameters in the order and units of the settings, shape (P,).
+        source: where the estimate came from, for messages.
+        summary: the fit's own account of the estimate, where a fit made it.
+        nominal: parameters without a value, which the settings and the arm's file stand for; they are no longer
+            among the settings' parameters.
+    """
+
+    settings: FitSettings
+    theta: Array
+    source: str
+    summary: FitSummary | None = None
+    nominal: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The parameters by name."""
+        return self.settings.parameter_set().mapping(self.theta)
+
+    def summarise(self) -> FitSummary:
+        """Return the fit's own account, or the values alone."""
+        if self.summary is not None:
+            return self.summary
+        parameters = self.settings.parameters
+        estimate = {
+            name: ParameterEstimate(value=value, unit=parameters[name].unit)
+            for name, value in self.values.items()
+        }
+        return FitSummary(stage=self.settings.stage, estimate=estimate)
+
+
+def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
+    """Return the model of some settings at parameters by name; a fixed parameter may be left out.
+
+    Raises:
+        SettingsError: a name that does not exist or is missing, or a value that is not allowed.
+    """
+    return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
+
+
+def load_identified(
+    source: str | Path | None,
+    config: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    default: str = "fit-mech",
+    nominal: bool = False,
+) -> IdentifiedModel:
+    """Read an estimate and the settings it belongs to.
+
+    Args:
+        source: a run folder, a folder that a plant was saved in, an `estimate.yaml`, or a YAML file of values by
+            name; None: no values.
+        config: settings, a path or a shipped name; left out: those beside the estimate, or `default`.
+        overrides: settings to replace, by dotted key.
+        default: a shipped config.
+        nominal: take parameters without a value as the settings and the arm's file have them.
+
+    Raises:
+        RunError: the folder holds no estimate.
+        SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
+    """
+    file = None if source is None else estimate_file(Path(source))
+    values, summary = ({}, None) if file is None else read_values(file)
+    beside = None if file is None else file.parent / CONFIG
+    chosen = config or (beside if beside is not None and is_file(beside) else default)
+    settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
+    if config is None and summary is not None and summary.final == "joint":
+        settings = settings.freed()
+    missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
+    if nominal and missing:
+        known = {n: p for n, p in settings.parameters.items() if n not in missing}
+        settings = settings.model_copy(update={"parameters": known})
+    origin = str(chosen if file is None else file)
+    theta = settings.parameter_set().vector(values, origin)
+    return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
+
+
+def middle_of_bounds(settings: FitSettings) -> IdentifiedModel:
+    """Return the model with every free parameter in the middle of its bounds."""
+    parameters = settings.parameter_set()
+    theta = parameters.from_unit(np.full((1, int(parameters.free.sum())), 0.5))[0]
+    return IdentifiedModel(settings, theta, "the middle of the bounds")
+
+
+def write_settings(folder: Path, settings: FitSettings) -> None:
+    """Write the settings and the arm to a folder whose model is MODEL, so that it can be read anywhere.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    meshes = (Path(MODEL).parent / "meshes").as_posix()
+    arm = settings.arm.model_dump(mode="json") | {"model": MODEL, "meshes": meshes}
+    for name, content in ((ARM, arm), (CONFIG, portable(settings))):
+        write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+
+
+def portable(settings: FitSettings) -> dict[str, Any]:
+    """Return the settings as they stand in a folder, with the arm beside them."""
+    values = settings.model_dump(mode="json", exclude={"arm"})
+    return {"stage": values.pop("stage"), "arm": ARM} | values

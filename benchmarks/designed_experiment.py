@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid.estimate import read_values
 from hydroid.experiment.commands import Draw, pose_limits
 from hydroid.experiment.design import design, start_poses
 from hydroid.experiment.information import statement_information
 from hydroid.experiment.trial import Bench, violation
 from hydroid.fitting.refinement import refine
-from hydroid.estimate import read_values
 from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem

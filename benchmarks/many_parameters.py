@@ -31,7 +31,7 @@ from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.simulating import simulate_log
-from hydroid.uncertainty.covariance import KNOWN
+from hydroid.uncertainty.flags import WEAK_ABOVE
 
 JOINTS = range(1, 8)
 MASSES = {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -144,10 +144,10 @@ def show_intervals(problem: Problem, best: Fit) -> None:
         low, high = told.interval[i]
         print(
             f"| {name} | {truth[i]:g} | {told.theta[i]:.4g} | {low:.4g} to {high:.4g} | "
-            f"{'yes' if inside[i] else 'NO'} | {', '.join(told.flags[i])} |"
+            f"{'yes' if inside[i] else 'NO'} | {told.status[i].flag.value} |"
         )
     for what, chosen in (
-        (f"determined to {KNOWN:.0%}", told.relative <= KNOWN),
+        (f"determined to {WEAK_ABOVE:.0%}", told.relative <= WEAK_ABOVE),
         ("with an interval", np.isfinite(told.interval).all(axis=1)),
     ):
         count = int(chosen.sum())

@@ -18,6 +18,7 @@ from hydroid.report.tables import SeedResult
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
+from hydroid.uncertainty.flags import Flag
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
     first, last = (
         _estimate(summary.estimates[n], seed, parameters, str(file)) for n in (names[0], summary.final)
     )
-    without = frozenset(name for name, p in summary.estimate.items() if p.flag == "no effect")
+    without = frozenset(name for name, p in summary.estimate.items() if p.flag == Flag.NO_EFFECT)
     return RunResult(path, first, last, summary.final != names[0], without)
 
 

@@ -65,19 +65,21 @@ def identifiability(
     names = [name.strip() for name in profile.split(",") if name.strip()]
     with Line(quiet=quiet or json) as line:
         told = study_identifiability(subject, logs, out, names, bootstrap, seed, warn, line)
+    from hydroid.report.phrases import direction_phrase
     from hydroid.report.told import interval_table
 
     table = interval_table(told)
+    phrases = [direction_phrase(d, told.problem) for d in told.identifiability.unidentifiable]
     if json:
         found = {
             "at": told.source,
             "rank": told.identifiability.rank,
-            "open": [direction.words for direction in told.identifiability.weak],
+            "open": phrases,
             "parameters": table.records(),
         }
         typer.echo(jsonlib.dumps(found))
     elif not quiet:
         table.show()
-        for direction in told.identifiability.weak:
-            typer.echo(f"- {direction.words}")
+        for phrase in phrases:
+            typer.echo(f"- {phrase}")
         typer.echo(str(out / "identifiability.html"))

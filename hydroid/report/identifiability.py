@@ -7,9 +7,11 @@ import numpy as np
 from hydroid.problem.problem import Problem
 from hydroid.report.channels import log_names
 from hydroid.report.html import Picture, Section
+from hydroid.report.phrases import direction_phrase
 from hydroid.report.table import Cell, Table
-from hydroid.uncertainty.covariance import KNOWN, Uncertainty
+from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.directions import Identifiability
+from hydroid.uncertainty.flags import WEAK_ABOVE
 
 FIGURES = {
     "singular_values": "How strongly each direction is felt, in units of the noise: the inverse of its "
@@ -33,7 +35,7 @@ def direction_table(found: Identifiability) -> Table:
         rows.append((float(value), 100 / value if value > 0 else np.inf, parts))
     note = (
         f"Relative changes of unit length, in units of the noise. {found.rank} of {len(found.names)} have a "
-        f"standard deviation of {100 * KNOWN:.0f} % or less."
+        f"standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )
     header = ("singular value", "standard deviation [%]", "relative changes that belong together")
     return Table("Directions", header, tuple(rows), note)
@@ -87,5 +89,5 @@ def told_section(
         pictures=tuple(
             Picture(figures[name], caption) for name, caption in FIGURES.items() if name in figures
         ),
-        points=tuple(direction.words for direction in told.weak),
+        points=tuple(direction_phrase(d, problem) for d in told.unidentifiable),
     )

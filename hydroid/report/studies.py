@@ -15,7 +15,7 @@ from hydroid.report.write import write_figure, write_table
 from hydroid.settings.arm import Arm
 from hydroid.settings.design import DesignSettings
 from hydroid.settings.objective import ObjectiveSettings
-from hydroid.uncertainty.covariance import KNOWN
+from hydroid.uncertainty.flags import WEAK_ABOVE, flag_of
 from hydroid.uncertainty.surface import Surface
 from hydroid.uncertainty.sweep import Sweep
 
@@ -126,7 +126,7 @@ def write_design(out: Path, arm: Arm, how: DesignSettings, found: Design, theta:
     moved = found.predicted
     figures = {
         "motion": motion(moved, arm.joint_names, arm.lower + margin, arm.upper - margin),
-        "precision": precision(found.names, *_deviations(found), KNOWN),
+        "precision": precision(found.names, *_deviations(found), WEAK_ABOVE),
     }
     for name, figure in figures.items():
         write_figure(out, name, figure, svg(figure))
@@ -140,7 +140,7 @@ def design_table(how: DesignSettings, found: Design, theta: dict[str, float]) ->
     rows: list[tuple[Cell, ...]] = [
         (
             *(name, theta[name], 100 * float(b), 100 * float(r), 100 * float(d), float(r / d)),
-            "" if d <= KNOWN else "not determined",
+            "" if d <= WEAK_ABOVE else flag_of(float(d)).value,
         )
         for name, b, r, d in zip(found.names, *_deviations(found), strict=True)
     ]

@@ -54,7 +54,7 @@ def parameter_table(problem: Problem, fit: Fit, truth: Mapping[str, float] | Non
             row += [Given(true) if true is not None else None, *(_relative(e.theta[i], true) for e in judged)]
         rows.append((*row, known(half[i]), known(degrees(fit.effects[i])), said[i]))
     if truth:
-        without = [n for n, flag in zip(problem.parameters.names, said, strict=True) if "no effect" in flag]
+        without = [n for n, none in zip(problem.parameters.names, fit.without_effect, strict=True) if none]
         rows += _sum_rows(problem.parameters, [e.theta for e in judged], truth, without, 5 + len(names))
     note = f"{estimate_words(fit)} effect: rms change of the output for 1 % of the value. {told(fit)}"
     return Table("Parameters", tuple(header), tuple(rows), note)

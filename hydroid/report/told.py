@@ -10,6 +10,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.html import Section
 from hydroid.report.identifiability import direction_table, noise_table, told_section
+from hydroid.report.phrases import status_phrase
 from hydroid.report.table import Cell, Table, known
 from hydroid.report.write import write_figure, write_table
 from hydroid.uncertainty.covariance import Uncertainty
@@ -56,7 +57,7 @@ def interval_table(told: Told) -> Table:
                 np.quantile(drawn[:, i], [0.025, 0.975]) if np.isfinite(found.relative[i]) else [np.nan] * 2
             )
             row += [known(v) for v in ends]
-        rows.append((*row, ", ".join(found.flags[i])))
+        rows.append((*row, status_phrase(found.status[i])))
     note = (
         f"At {told.source}. 95 % intervals for noise as the logs show it there, as far as the model holds; a "
         "dash has no limit. Away from a fit the residual does not measure noise: give objective.noise_deg."

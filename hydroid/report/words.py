@@ -8,10 +8,11 @@ import numpy as np
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
+from hydroid.report.phrases import listed, status_phrase
 from hydroid.report.table import number, plain
 from hydroid.settings.objective import ObjectiveSettings
-from hydroid.uncertainty.covariance import KNOWN, NOT_DETERMINED, WEAK, at_bounds
-from hydroid.uncertainty.patterns import listed
+from hydroid.uncertainty.covariance import at_bounds
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
 
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
@@ -52,15 +53,15 @@ def in_reader_units(settings: ObjectiveSettings, objectives: Array) -> Array:
 
 def flags(fit: Fit) -> tuple[str, ...]:
     """What is to be known about the final estimate of each parameter; empty where nothing is."""
-    return tuple(", ".join(said) for said in fit.uncertainty.flags)
+    return tuple(status_phrase(status) for status in fit.uncertainty.status)
 
 
 def runs_flag(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
     """What is to be known about a parameter over several runs, values of shape (N,); or nothing."""
     if not parameter.lower < parameter.upper or (parameter.fixed is not None and not np.ptp(values)):
-        return "held fixed"
+        return Flag.FIXED.value
     if parameter.name in without_effect:
-        return "no effect on the outputs"
+        return Flag.NO_EFFECT.value
     counts = ((side, int(np.sum(at))) for side, at in at_bounds(parameter, values))
     return ", ".join(f"at {side} bound in {n} of {len(values)} runs" for side, n in counts if n)
 
@@ -70,30 +71,30 @@ def told(fit: Fit) -> str:
     names, rank = fit.identifiability.names, fit.identifiability.rank
     return (
         f"These logs determine {rank} independent combination{'' if rank == 1 else 's'} of the {len(names)} "
-        f"free parameters to {100 * KNOWN:.0f} % or better. ±: 95 % interval for noise as these logs show "
-        "it, as far as the model holds. A parameter that is not determined has none: a small output error "
+        f"free parameters to {100 * WEAK_ABOVE:.0f} % or better. ±: 95 % interval for noise as these logs show "
+        "it, as far as the model holds. A parameter that is not identifiable has none: a small output error "
         "does not prove it."
     )
 
 
 def cautions(problem: Problem, fit: Fit) -> tuple[str, ...]:
     """What a reader of the answer should beware of, one sentence or two each."""
-    flagged = list(zip(problem.parameters.parameters, flags(fit), strict=True))
+    statuses = list(zip(problem.parameters.parameters, fit.uncertainty.status, strict=True))
     said = [told(fit)]
-    idle = [p.name for p, flag in flagged if "no effect" in flag]
+    idle = [p.name for p, status in statuses if status.flag is Flag.NO_EFFECT]
     if idle:
         said.append(
             f"{listed(idle)}: no effect on the outputs. Any value within the bounds fits as well; "
             "hold it fixed, or measure a joint that feels it."
         )
-    for word, advice in ((NOT_DETERMINED, "known"), (WEAK, "known better")):
-        if open_ := [p.name for p, flag in flagged if word in flag]:
-            said.append(f"{listed(open_)}: {word}. {_OPEN.format(advice)}")
+    for flag, advice in ((Flag.UNIDENTIFIABLE, "known"), (Flag.WEAK, "known better")):
+        if open_ := [p.name for p, status in statuses if status.flag is flag]:
+            said.append(f"{listed(open_)}: {flag.value}. {_OPEN.format(advice)}")
     for side in ("lower", "upper"):
         bounded = [
             f"{p.name} ({plain(p.lower if side == 'lower' else p.upper)} {p.unit})"
-            for p, flag in flagged
-            if f"at {side} bound" in flag and "no effect" not in flag
+            for p, status in statuses
+            if status.at_bound == side and status.flag is not Flag.NO_EFFECT
         ]
         if bounded:
             said.append(

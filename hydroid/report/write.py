@@ -25,8 +25,8 @@ from hydroid.report.tables import (
     runs_table,
     validation_table,
 )
-from hydroid.report.words import flags
 from hydroid.run.folder import RunFolder
+from hydroid.uncertainty.flags import Flag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,11 +100,10 @@ def write_runs(
 ) -> Table:
     """Write the spread over several runs with their seeds; return the table of their final estimates."""
     parameters = results[0][1].parameters
-    said = [flags(fit) for _, _, fit in results]
     ignore = [
         name
-        for name, *each in zip(parameters.names, *said, strict=True)
-        if all("no effect" in f for f in each)
+        for i, name in enumerate(parameters.names)
+        if all(fit.uncertainty.status[i].flag is Flag.NO_EFFECT for _, _, fit in results)
     ]
     found = {"search": [SeedResult(seed, fit.searched.theta, fit.searched.rms) for seed, _, fit in results]}
     if any(fit.refinement is not None for _, _, fit in results):

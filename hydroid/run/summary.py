@@ -1,16 +1,10 @@
 """A fit's result as `estimate.yaml` and `--json` hold it."""
 
-from typing import Literal
-
 import numpy as np
 
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.fit import Fit
-from hydroid.parameters import Parameter
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.covariance import NO_EFFECT, NOT_DETERMINED, WEAK, at_bounds
-
-_FLAGS = {NO_EFFECT: "no effect", NOT_DETERMINED: "not identifiable", WEAK: "weakly identifiable"}
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
@@ -39,21 +33,13 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 
 
 def _parameter(problem: Problem, fit: Fit, i: int) -> ParameterEstimate:
-    parameter, found = problem.parameters.parameters[i], fit.uncertainty
-    value = float(fit.best.theta[i])
+    found = fit.uncertainty
     low, high = found.interval[i]
-    free = bool(found.free[i])
-    word = next((word for flag, word in _FLAGS.items() if flag in found.flags[i]), "identifiable")
     return ParameterEstimate(
-        value=value,
-        unit=parameter.unit,
+        value=float(fit.best.theta[i]),
+        unit=problem.parameters.parameters[i].unit,
         sd=finite(found.standard_deviation[i]),
         interval=(finite(low), finite(high)),
-        flag=word if free else "fixed",
-        at_bound=_bound(parameter, value) if free else None,
+        flag=found.status[i].flag.value,
+        at_bound=found.status[i].at_bound,
     )
-
-
-def _bound(parameter: Parameter, value: float) -> Literal["lower", "upper"] | None:
-    lower, upper = (bool(at) for _, at in at_bounds(parameter, value))
-    return "lower" if lower else "upper" if upper else None

@@ -25,31 +25,20 @@ from scipy.stats import t as student
 
 from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
+from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
 from hydroid.uncertainty.noise import Noise, channel_noise, unbiased
 
-KNOWN = 0.3
-"""a parameter or direction is determined when its relative standard deviation is at most this, else weak"""
-LOST = 1.0
-"""beyond this relative standard deviation it is not determined at all: no linear interval says anything"""
-COVERED = 0.95
-"""chance with which an interval covers the truth"""
-AT_BOUND = 1e-3
-"""an estimate is called at a bound within this part of the range"""
-ZERO = 1e-12
-"""a singular value this much smaller than the first is zero"""
-PART = 0.01
-"""a parameter that has less than this part in a direction of no effect does not depend on it"""
-DOUBT = 0.1
-"""two steps whose derivatives differ by more than this part are flagged"""
-
-Flags = tuple[str, ...]
-FIXED, NO_EFFECT, NOT_DETERMINED, WEAK = (
-    "held fixed",
-    "no effect on the outputs",
-    "not determined",
-    "weakly determined",
-)
+COVERAGE = 0.95
+"""probability with which an interval covers the true value"""
+BOUND_MARGIN = 1e-3
+"""part of the range within which an estimate is called at a bound"""
+RANK_TOLERANCE = 1e-12
+"""singular values below this part of the largest are zero"""
+NULL_COMPONENT = 0.01
+"""component in an unmeasured direction below which a parameter does not depend on it"""
+DOUBT_ABOVE = 0.1
+"""relative difference between two steps' derivatives above which it is reported"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +58,7 @@ class Uncertainty:
             at a bound.
         correlation: of the free parameters' estimates, shape (p, p); NaN where not determined.
         freedom: degrees of freedom of the noise's level.
-        flags: by parameter, what is to be known about its estimate.
+        status: of each parameter.
     """
 
     theta: Array
@@ -81,7 +70,7 @@ class Uncertainty:
     interval: Array
     correlation: Array
     freedom: float
-    flags: tuple[Flags, ...]
+    status: tuple[ParameterStatus, ...]
 
     @property
     def standard_deviation(self) -> Array:
@@ -107,18 +96,20 @@ def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, 
     relative = np.full(len(theta), np.nan)
     relative[free] = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
     # with few independent samples Student's t is wide: so wide must a flag's limits be taken
-    widening = float(student.ppf(0.5 + COVERED / 2, freedom) / normal.ppf(0.5 + COVERED / 2))
-    unknown = widening * relative > LOST
+    widening = float(student.ppf(0.5 + COVERAGE / 2, freedom) / normal.ppf(0.5 + COVERAGE / 2))
+    unknown = widening * relative > UNIDENTIFIABLE_ABOVE
     relative[unknown] = np.inf
-    bound = [
-        next((side for side, at in at_bounds(parameter, value) if at), "")
+    bound: list[Side | None] = [
+        next((side for side, at in at_bounds(parameter, value) if at), None)
         for parameter, value in zip(problem.parameters.parameters, theta, strict=True)
     ]
-    half = student.ppf(0.5 + COVERED / 2, freedom) * relative * slopes.scale
+    half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative * slopes.scale
     interval = np.stack([theta - half, theta + half], axis=1)
-    interval[[side != "" for side in bound] & ~unknown] = np.nan
-    flags = tuple(
-        _flags(widening * float(relative[i]), slopes, i, bound[i]) if free[i] else (FIXED,)
+    interval[[side is not None for side in bound] & ~unknown] = np.nan
+    status = tuple(
+        _status(widening * float(relative[i]), slopes, i, bound[i])
+        if free[i]
+        else ParameterStatus(Flag.FIXED)
         for i in range(len(theta))
     )
     deviation = np.where(unknown[free], np.nan, relative[free])
@@ -132,21 +123,21 @@ def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, 
         interval,
         covariance / np.outer(deviation, deviation),
         freedom,
-        flags,
+        status,
     )
 
 
 def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return (G' G)^-1 over the felt directions, (p, p), and who has a part in the others, (p,)."""
     _, values, directions = np.linalg.svd(root)
-    felt = values > ZERO * values.max(initial=0.0)
+    felt = values > RANK_TOLERANCE * values.max(initial=0.0)
     known = directions[felt] / values[felt, None]
-    return known.T @ known, np.linalg.norm(directions[~felt], axis=0) > PART
+    return known.T @ known, np.linalg.norm(directions[~felt], axis=0) > NULL_COMPONENT
 
 
-def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, NDArray[np.bool_]], ...]:
     """Whether values lie at each bound."""
-    margin = AT_BOUND * (parameter.upper - parameter.lower)
+    margin = BOUND_MARGIN * (parameter.upper - parameter.lower)
     return (
         ("lower", np.asarray(value - parameter.lower <= margin)),
         ("upper", np.asarray(parameter.upper - value <= margin)),
@@ -161,7 +152,7 @@ def decompose(free: NDArray[np.bool_], slopes: Jacobian) -> tuple[Array, Array, 
     felt = np.nan_to_num(np.hstack([slopes.slopes, slopes.unit * slopes.statements])[free])
     directions, values, course = np.linalg.svd(felt, full_matrices=False)
     error = np.linalg.norm(directions.T @ np.nan_to_num(slopes.error[free]), axis=1)
-    values[values <= np.maximum(error, ZERO * values[0])] = 0.0
+    values[values <= np.maximum(error, RANK_TOLERANCE * values[0])] = 0.0
     return directions, values, course
 
 
@@ -198,18 +189,10 @@ def _sum(matrices: Iterable[Array]) -> Array:
     return np.sum(list(matrices), axis=0)
 
 
-def _flags(relative: float, slopes: Jacobian, i: int, bound: str) -> Flags:
-    found: list[str] = []
-    if not np.isfinite(slopes.slopes[i]).all():
-        found.append("effect unknown, the changed arm diverges")
-    elif slopes.without_effect[i]:
-        found.append(NO_EFFECT)
-    elif not relative <= LOST:
-        found.append(NOT_DETERMINED)
-    elif relative > KNOWN:
-        found.append(WEAK)
-    if slopes.doubt[i] > DOUBT:
-        found.append(f"derivative only to {100 * slopes.doubt[i]:.0f} %")
-    if bound:
-        found.append(f"at {bound} bound")
-    return tuple(found)
+def _status(relative: float, slopes: Jacobian, i: int, at_bound: Side | None) -> ParameterStatus:
+    return ParameterStatus(
+        Flag.NO_EFFECT if slopes.without_effect[i] else flag_of(relative),
+        at_bound,
+        float(slopes.doubt[i]) if slopes.doubt[i] > DOUBT_ABOVE else None,
+        diverges=not np.isfinite(slopes.slopes[i]).all(),
+    )

@@ -6,14 +6,16 @@ without effect, the solenoid's four numbers, the currents' scale, a common scale
 equation of motion is linear in; what is left over is told by its components.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.covariance import KNOWN, LOST, ZERO, Uncertainty
-from hydroid.uncertainty.patterns import patterns
+from hydroid.uncertainty.covariance import RANK_TOLERANCE, Uncertainty
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, flag_of
+from hydroid.uncertainty.patterns import DirectionKind, Pattern, patterns
 
 SHOWN = 0.1
 """components below this part of the largest are left out of a direction's name"""
@@ -28,23 +30,24 @@ class Direction:
     """One direction, or several of one kind, that the data determine weakly or not at all.
 
     Attributes:
-        name: in words, such as "K, D and S scale together".
+        kind: why it is not determined.
+        parameters: relative changes along the weakest, by name, of those that take part.
         changes: relative changes of the free parameters along each, the largest +1, shape (m, p).
-        relative: standard deviation of the largest relative change along the weakest; inf where nothing is
-            felt.
+        relative_sd: standard deviation of the largest relative change along the weakest; inf where the data
+            do not depend on it.
+        numbers: what stays determined, as in `Pattern`.
     """
 
-    name: str
+    kind: DirectionKind
+    parameters: Mapping[str, float]
     changes: Array
-    relative: float
+    relative_sd: float
+    numbers: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
-    def words(self) -> str:
-        """The direction and how far it is open."""
-        count = f", {len(self.changes)} directions" if len(self.changes) > 1 else ""
-        if self.relative > LOST:
-            return f"{self.name}: not determined (±∞{count})"
-        return f"{self.name}: only to ±{_percent(self.relative)} %{count}"
+    def flag(self) -> Flag:
+        """Weakly identifiable, or not."""
+        return flag_of(self.relative_sd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,25 +59,25 @@ class Identifiability:
         singular: singular values of the derivatives in units of the noise, largest first, shape (p,): the
             inverse of the relative standard deviation of each direction. 0: the data do not feel it.
         axes: these directions, relative changes of unit length, shape (p, p), one a row.
-        weak: the directions whose relative standard deviation is above KNOWN, in words.
+        unidentifiable: the directions whose relative standard deviation is above WEAK_ABOVE.
     """
 
     names: tuple[str, ...]
     singular: Array
     axes: Array
-    weak: tuple[Direction, ...]
+    unidentifiable: tuple[Direction, ...]
 
     @property
     def rank(self) -> int:
-        """How many independent combinations the data determine, to a relative standard deviation of KNOWN."""
-        return int(np.sum(self.singular >= 1 / KNOWN))
+        """Number of independent combinations with a relative standard deviation of at most WEAK_ABOVE."""
+        return int(np.sum(self.singular >= 1 / WEAK_ABOVE))
 
 
 def identifiability(problem: Problem, found: Uncertainty) -> Identifiability:
     """Return what the data tell apart at an estimate."""
     _, singular, axes = np.linalg.svd(found.root)
     axes *= np.where(axes[np.arange(len(axes)), np.argmax(np.abs(axes), axis=1)] < 0, -1.0, 1.0)[:, None]
-    singular = np.where(singular > ZERO * singular.max(initial=0.0), singular, 0.0)
+    singular = np.where(singular > RANK_TOLERANCE * singular.max(initial=0.0), singular, 0.0)
     names = tuple(n for n, free in zip(problem.parameters.names, found.free, strict=True) if free)
     named: list[Direction] = []
     rest = np.eye(len(names))  # a basis of the directions that no pattern has taken
@@ -88,11 +91,11 @@ def identifiability(problem: Problem, found: Uncertainty) -> Identifiability:
         )
         unfelt = _weakest_first(found.root, whole)
         if len(unfelt):
-            named.append(_direction(pattern.name, found.root, unfelt))
+            named.append(_direction(pattern, names, found.root, unfelt))
             rest = _without(rest, new if whole is not new else unfelt)
-    left = int(np.sum(singular < 1 / KNOWN)) - (len(names) - len(rest))
+    left = int(np.sum(singular < 1 / WEAK_ABOVE)) - (len(names) - len(rest))
     for changes in _weakest_first(found.root, rest)[: max(left, 0)]:
-        named.append(_direction(_combination(names, _scaled(changes)), found.root, changes[None]))
+        named.append(_direction(_combination(names, _scaled(changes)), names, found.root, changes[None]))
     return Identifiability(names, singular, axes, tuple(named))
 
 
@@ -104,12 +107,12 @@ def _new(changes: Array, basis: Array) -> Array:
 
 
 def _weakest_first(root: Array, basis: Array) -> Array:
-    """Directions in the span of an orthonormal basis, (m, p), whose deviation is above KNOWN, (k, p)."""
+    """Directions in the span of an orthonormal basis, (m, p), whose deviation is above WEAK_ABOVE, (k, p)."""
     if not len(basis):
         return basis
     _, felt, inner = np.linalg.svd(root @ basis.T)
     felt = np.concatenate([felt, np.zeros(len(basis) - len(felt))])
-    return (inner[felt < 1 / KNOWN] @ basis)[::-1]
+    return (inner[felt < 1 / WEAK_ABOVE] @ basis)[::-1]
 
 
 def _without(basis: Array, taken: Array) -> Array:
@@ -118,27 +121,24 @@ def _without(basis: Array, taken: Array) -> Array:
     return complement @ basis
 
 
-def _direction(name: str, root: Array, changes: Array) -> Direction:
+def _direction(pattern: Pattern, names: tuple[str, ...], root: Array, changes: Array) -> Direction:
     changes = np.array([_scaled(one) for one in changes])
     felt = np.linalg.norm(root @ changes.T, axis=0).min()
-    return Direction(name, changes, float(1 / felt) if felt > ZERO * np.linalg.norm(root) else np.inf)
+    relative = float(1 / felt) if felt > RANK_TOLERANCE * np.linalg.norm(root) else np.inf
+    parameters = {name: float(changes[0, names.index(name)]) for name in pattern.parameters}
+    return Direction(pattern.kind, parameters, changes, relative, pattern.numbers)
 
 
 def _scaled(changes: Array) -> Array:
     return changes / changes[np.argmax(np.abs(changes))]
 
 
-def _combination(names: tuple[str, ...], changes: Array) -> str:
-    """A direction by its components, the largest first."""
-    order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= SHOWN]
+def _combination(names: tuple[str, ...], changes: Array) -> Pattern:
+    """Name a direction by its components, the largest first."""
+    order = [int(i) for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= SHOWN]
+    kind = DirectionKind.COMBINATION
     if len(order) == 1:
-        return f"{names[order[0]]} alone"
-    if all(abs(changes[i] - 1) < EQUAL for i in order):
-        together = [names[i] for i in sorted(order)]
-        return f"{', '.join(together[:-1])} and {together[-1]} scale together"
-    first, *others = (f"{changes[i]:+.2g} % {names[i]}".replace("-", "−") for i in order)
-    return f"{first} with {', '.join(others)}"
-
-
-def _percent(relative: float) -> str:
-    return f"{100 * relative:.2g}" if relative < 0.1 else f"{100 * relative:.0f}"
+        kind = DirectionKind.SINGLE
+    elif all(abs(changes[i] - 1) < EQUAL for i in order):
+        kind, order = DirectionKind.COMMON_SCALE, sorted(order)
+    return Pattern(kind, tuple(names[i] for i in order), changes[None])

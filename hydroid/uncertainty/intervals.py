@@ -11,13 +11,13 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
-from hydroid.uncertainty.covariance import COVERED, Uncertainty, decompose
+from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, decompose
 
 POINTS = 6
 """grid points on each side of the estimate"""
 REACH = 3.0
 """standard deviations that the grid reaches; of a parameter that is not determined it covers the bounds"""
-THRESHOLD = float(chi2.ppf(COVERED, 1))
+THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
 QUICK = RefinementSettings(iterations=20, step_tolerance=1e-10)
 STEPS = 4

@@ -17,7 +17,7 @@ DOUBTFUL = 0.02
 """two steps whose derivatives differ by more than this part disagree; the wider looks over small jumps"""
 SMALL = 0.01
 """of a bounds' width: a value below it changes by parts of this instead of its own"""
-NO_EFFECT = 1e-6
+NO_EFFECT_BELOW = 1e-6
 """a parameter that moves the response less than this times the strongest one's has no effect on it"""
 
 
@@ -50,7 +50,7 @@ class Jacobian:
     @property
     def without_effect(self) -> NDArray[np.bool_]:
         """Parameters that the outputs do not feel at all, shape (P,)."""
-        return self.effects <= NO_EFFECT * np.nanmax(self.effects, initial=0.0)
+        return self.effects <= NO_EFFECT_BELOW * np.nanmax(self.effects, initial=0.0)
 
     @property
     def doubt(self) -> Array:

@@ -1,7 +1,8 @@
 """Directions that experience or the equations make suspect, and what they leave determined."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import MECHANICAL_UNITS
-from hydroid.uncertainty.covariance import KNOWN, Uncertainty
+from hydroid.uncertainty.covariance import Uncertainty
+from hydroid.uncertainty.flags import WEAK_ABOVE
 
 COIL = ("force_1", "force_2", "stroke_1", "stroke_2")
 CURRENTS = ("current_max", "current_min")
@@ -17,32 +19,58 @@ RATED = "rated_current"
 STEP = 1e-5
 
 
+class DirectionKind(StrEnum):
+    """Why the logs cannot determine a combination of parameters."""
+
+    NO_EFFECT = "no effect"
+    """one parameter that the outputs do not depend on"""
+    SINGLE = "single parameter"
+    """one parameter whose effect is below the noise"""
+    COMMON_SCALE = "common scale"
+    """all parameters change by one factor, or masses by what makes up for a fixed one"""
+    SOLENOID = "solenoid combination"
+    """the four coil parameters act through two numbers only"""
+    CURRENT_SCALE = "current scale"
+    """the currents' common factor trades with the coil parameters"""
+    COMBINATION = "combination"
+    """any other combination"""
+
+
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Directions to be tried: in words, and as relative changes of the p free parameters, shape (m, p)."""
+    """Directions to test.
 
-    name: str
+    Attributes:
+        kind: why they are suspected.
+        parameters: names of those that take part.
+        changes: relative changes of the p free parameters along each direction, shape (m, p).
+        numbers: what stays determined, by symbol: `delta` [mm]; `k_i0`, `k_imax`, `k_imin`, each a k·i²
+            [N·mm²].
+    """
+
+    kind: DirectionKind
+    parameters: tuple[str, ...]
     changes: Array
+    numbers: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def patterns(problem: Problem, found: Uncertainty) -> Iterator[Pattern]:
     """Yield what is worth a try, the simplest first."""
     names = [n for n, free in zip(problem.parameters.names, found.free, strict=True) if free]
-    yield from _alone(problem, found, names)
+    yield from _alone(found, names)
     yield from _solenoids(problem, found, names)
     yield from _common_scale(problem, found, names)
 
 
-def _alone(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+def _alone(found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
     """Parameters without effect, and those whose own effect drowns in the noise."""
-    where = outputs(problem)
     idle = found.jacobian.without_effect[found.free]
     for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
         if none:
-            yield Pattern(f"{name} has no effect on {where}", direction[None])
+            yield Pattern(DirectionKind.NO_EFFECT, (name,), direction[None])
     for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
-        if not none and np.linalg.norm(found.root @ direction) < 1 / KNOWN:
-            yield Pattern(f"{name} by itself", direction[None])
+        if not none and np.linalg.norm(found.root @ direction) < 1 / WEAK_ABOVE:
+            yield Pattern(DirectionKind.SINGLE, (name,), direction[None])
 
 
 def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
@@ -62,10 +90,8 @@ def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) ->
         felt = np.vstack([found.root[:, mass], np.eye(mass.sum())])
         target = np.append(-found.root @ changes, np.zeros(mass.sum()))
         changes[mass] += np.linalg.lstsq(felt, target)[0]
-    group = [n for n, one in zip(names, linear & ~mass, strict=True) if one]
-    masses = [n for n, one in zip(names, mass, strict=True) if one]
-    unequal = " (these to make up for what is fixed, unequally)" if np.ptp(changes[linear]) > 0.1 else ""
-    yield Pattern(f"{listed([*group, *masses])} scale together{unequal}", changes[None])
+    order = [*np.flatnonzero(linear & ~mass).tolist(), *np.flatnonzero(mass).tolist()]
+    yield Pattern(DirectionKind.COMMON_SCALE, tuple(names[i] for i in order), changes[None])
 
 
 def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
@@ -80,19 +106,15 @@ def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> It
         at = {q: float(values[mine[q]] if q in mine else nominal[q]) for q in (*COIL, *CURRENTS, RATED)}
         if not curve_exists(*(at[q] for q in COIL)):
             continue
-        gap, pull, highest, lowest = _acting(at)
+        numbers: dict[str, float] = dict(zip(("delta", "k_i0", "k_imax", "k_imin"), _acting(at), strict=True))
         coil = [q for q in COIL if mine.get(q) in names]
         free = coil + [q for q in CURRENTS if mine.get(q) in names]
-        if len(trade := _null(at, coil, [0, 1])):
-            said = f"act through two combinations only: δ = {gap:.3g} mm and k·i0² = {pull:.3g} N·mm²"
-            yield Pattern(f"{listed([mine[q] for q in coil])} {said}", _spread(trade, coil, mine, names))
-        if len(free) > len(coil) and len(trade := _null(at, free, [0, 2, 3])):
-            known = f"δ = {gap:.3g} mm, k·I_max² = {highest:.3g} and k·I_min² = {lowest:.3g} N·mm²"
-            who = " and ".join(mine[q] for q in free[len(coil) :])
-            said = (
-                f"a common scale of {who} trades with {listed([mine[q] for q in coil])}, at the same {known}"
-            )
-            yield Pattern(said, _spread(trade, free, mine, names))
+        cases = [(DirectionKind.SOLENOID, coil, [0, 1])]
+        cases += [(DirectionKind.CURRENT_SCALE, free, [0, 2, 3])] if len(free) > len(coil) else []
+        for kind, quantities, held in cases:
+            if len(trade := _null(at, quantities, held)):
+                who = tuple(mine[q] for q in quantities)
+                yield Pattern(kind, who, _spread(trade, who, names), numbers)
 
 
 def _acting(at: Mapping[str, float]) -> tuple[float, float, float, float]:
@@ -118,26 +140,8 @@ def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> 
     return directions[rank:]
 
 
-def _spread(
-    changes: Array, quantities: Sequence[str], mine: Mapping[str, str], names: Sequence[str]
-) -> Array:
-    """Return changes of some quantities, shape (m, k), as changes of all free parameters, shape (m, p)."""
+def _spread(changes: Array, parameters: Sequence[str], names: Sequence[str]) -> Array:
+    """Return changes of some parameters, shape (m, k), as changes of all free ones, shape (m, p)."""
     out = np.zeros((len(changes), len(names)))
-    out[:, [names.index(mine[q]) for q in quantities]] = changes
+    out[:, [names.index(name) for name in parameters]] = changes
     return out
-
-
-def outputs(problem: Problem) -> str:
-    """What is compared, in words."""
-    joints = [str(joint) for joint in dict.fromkeys(c.joint for c in problem.channels)]
-    which = (
-        f"the angle of joint {joints[0]}" if len(joints) == 1 else f"the angles of joints {listed(joints)}"
-    )
-    pressed = any(c.quantity != "angle" for c in problem.channels)
-    return f"{which} and the pressures" if pressed else which
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last

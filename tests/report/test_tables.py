@@ -50,12 +50,12 @@ def test_flags_name_what_the_data_cannot_tell():
     effects = (1e-3, 0.0, 0.0, 1e-3)
     fit = make_fit(problem, effects=effects)
     low, high = MODEL["K"]
-    assert flags(fit) == ("", "held fixed", "no effect on the outputs", "")
+    assert flags(fit) == ("", "fixed", "no effect", "")
     at = with_theta(fit, problem, effects, K=low + 1e-4 * (high - low), M2=MODEL["M2"][1])
     assert flags(at) == (
         "at lower bound",
-        "held fixed",
-        "no effect on the outputs",
+        "fixed",
+        "no effect",
         "at upper bound",
     )
     off = with_theta(fit, problem, effects, K=low + 2e-3 * (high - low))
@@ -186,8 +186,8 @@ def test_runs_keep_the_flags():
     )
     assert column(table, "flag") == [
         "at upper bound in 3 of 3 runs",
-        "held fixed",
-        "no effect on the outputs",
+        "fixed",
+        "no effect",
         "at lower bound in 1 of 3 runs",
         "",
     ]

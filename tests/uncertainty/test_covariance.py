@@ -13,6 +13,7 @@ from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings, ParameterSettings
 from hydroid.settings.priors import PriorSettings
 from hydroid.uncertainty.covariance import judge, uncertainty
+from hydroid.uncertainty.flags import Flag, ParameterStatus
 from hydroid.uncertainty.intervals import REACH, THRESHOLD, bootstrap, profile
 from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.noise import FLOOR, Noise, channel_noise, fit_noise
@@ -73,6 +74,10 @@ def least_squares(columns, measured):
     return np.linalg.lstsq(columns.T, measured)[0]
 
 
+def flags(found):
+    return [status.flag for status in found.status]
+
+
 THETA = np.array([1.0, -2.0, 3.0])
 
 
@@ -121,14 +126,14 @@ def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
     rng = np.random.default_rng(3)
     problem = Linear(columns, theta @ columns + rng.normal(0, 0.1 * DEG, 1000), theta, noise_deg=0.1)
     found = uncertainty(problem, theta)
-    assert found.flags[:3] == (("not determined",), ("not determined",), ("no effect on the outputs",))
+    assert flags(found) == [Flag.UNIDENTIFIABLE, Flag.UNIDENTIFIABLE, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
     assert np.isinf(found.interval[:3]).all()
-    assert not found.flags[3]
     pair = columns[[0, 3]]
     expected = 0.1 * DEG * np.sqrt(np.linalg.inv(pair @ pair.T)[1, 1])
     assert found.standard_deviation[3] == pytest.approx(expected, rel=1e-6)
     fixed = Linear(columns, problem.measured, theta, fixed="b", noise_deg=0.1)
-    assert uncertainty(fixed, theta).flags == ((), ("held fixed",), ("no effect on the outputs",), ())
+    expected = [Flag.IDENTIFIABLE, Flag.FIXED, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
+    assert flags(uncertainty(fixed, theta)) == expected
 
 
 def test_a_statement_is_one_more_measurement():
@@ -145,8 +150,8 @@ def test_a_statement_is_one_more_measurement():
     np.testing.assert_allclose(
         found.standard_deviation, np.sqrt(np.diag(np.linalg.inv(information))), rtol=1e-3
     )
-    assert found.flags == ((), (), ())
-    assert uncertainty(Linear(columns, measured, theta), theta).flags[0] == ("not determined",)
+    assert flags(found) == [Flag.IDENTIFIABLE] * 3
+    assert flags(uncertainty(Linear(columns, measured, theta), theta))[0] is Flag.UNIDENTIFIABLE
 
 
 def test_a_bound_takes_the_interval():
@@ -154,7 +159,7 @@ def test_a_bound_takes_the_interval():
     at = theta.copy()
     at[2] = problem.parameters.upper[2]
     found = uncertainty(problem, at)
-    assert found.flags[2] == ("at upper bound",)
+    assert found.status[2] == ParameterStatus(Flag.IDENTIFIABLE, at_bound="upper")
     assert np.isnan(found.interval[2]).all()
     assert np.isfinite(found.interval[:2]).all()
 

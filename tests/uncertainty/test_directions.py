@@ -10,8 +10,10 @@ from hydroid.hydraulics.solenoid import force_curve
 from hydroid.jobs import load_settings
 from hydroid.problem.problem import Problem
 from hydroid.simulating import simulate_log
-from hydroid.uncertainty.covariance import KNOWN, Uncertainty, uncertainty
+from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.directions import Identifiability, identifiability
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
+from hydroid.uncertainty.patterns import DirectionKind
 
 MECH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 HYD = {"A_A": 1e3, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
@@ -33,8 +35,8 @@ def look(config: str, truth: dict[str, float], **changes) -> tuple[Problem, Unce
     return problem, told, identifiability(problem, told)
 
 
-def flag_of(problem: Problem, told: Uncertainty) -> dict[str, tuple[str, ...]]:
-    return dict(zip(problem.parameters.names, told.flags, strict=True))
+def flags_of(problem: Problem, told: Uncertainty) -> dict[str, Flag]:
+    return {n: s.flag for n, s in zip(problem.parameters.names, told.status, strict=True)}
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +51,19 @@ def hyd():
 
 def test_m1_has_no_effect_and_one_scale_of_all_is_open(mech):
     problem, told, found = mech
-    assert found.weak[0].words == "M1 has no effect on the angle of joint 2: not determined (±∞)"
-    direction = next(d for d in found.weak if "scale together" in d.name)
-    assert direction.name.startswith("K, D, S, M2, M3, M4, M5 and M6 scale together")
-    assert "not determined" in direction.words
+    first, *others = found.unidentifiable
+    assert (first.kind, list(first.parameters)) == (DirectionKind.NO_EFFECT, ["M1"])
+    direction = next(d for d in others if d.kind is DirectionKind.COMMON_SCALE)
+    assert list(direction.parameters) == ["K", "D", "S", "M2", "M3", "M4", "M5", "M6"]
+    assert direction.flag is Flag.UNIDENTIFIABLE
     # but for the known jaws K, D and S scale by one factor, and so does the one mass that dwarfs the jaws
     (scale,) = direction.changes
     np.testing.assert_allclose(scale[:3] / scale[0], 1.0, atol=0.02)
-    assert flag_of(problem, told)["M1"] == ("no effect on the outputs",)
-    assert flag_of(problem, told)["K"] == ("not determined",)
+    assert flags_of(problem, told)["M1"] is Flag.NO_EFFECT
+    assert flags_of(problem, told)["K"] is Flag.UNIDENTIFIABLE
     assert np.isinf(told.interval[problem.parameters.names.index("K")]).all()
     assert 3 <= found.rank <= 5
-    assert sum(len(direction.changes) for direction in found.weak) == 9 - found.rank
+    assert sum(len(direction.changes) for direction in found.unidentifiable) == 9 - found.rank
     assert found.singular[-1] == 0  # M1, exactly
     assert found.singular[-2] > 0
 
@@ -70,9 +73,9 @@ def test_directions_belong_to_the_singular_values(mech):
     assert (np.diff(found.singular) <= 0).all()
     np.testing.assert_allclose(np.linalg.norm(told.root @ found.axes.T, axis=0), found.singular, atol=1e-9)
     np.testing.assert_allclose(found.axes @ found.axes.T, np.eye(9), atol=1e-9)
-    for direction in found.weak:
+    for direction in found.unidentifiable:
         felt = np.linalg.norm(told.root @ direction.changes.T, axis=0)
-        assert (felt < 1 / KNOWN).all()
+        assert (felt < 1 / WEAK_ABOVE).all()
         np.testing.assert_allclose(direction.changes.max(axis=1), 1)
 
 
@@ -89,19 +92,19 @@ def test_pins_close_directions_one_by_one(mech):
     held = {f"parameters.{name}.fixed": MECH[name] for name in MECH if name[0] == "M"}
     problem, told, found = look("article-mech", MECH, **held)
     assert found.rank == 3
-    assert not found.weak
-    assert set(flag_of(problem, told).values()) == {(), ("held fixed",)}
+    assert not found.unidentifiable
+    assert set(flags_of(problem, told).values()) == {Flag.IDENTIFIABLE, Flag.FIXED}
     inside = told.interval[:3] / np.array([0.2, 231.8, 53.4])[:, None]
-    assert (np.abs(inside - 1) < KNOWN * 2.1).all()
+    assert (np.abs(inside - 1) < WEAK_ABOVE * 2.1).all()
     # a plausible value of each mass instead, to 5 %: K, D, S are known about as well as the masses
     priors = {
         name: {"of": name, "value": MECH[name], "sd": 0.05 * MECH[name]} for name in MECH if name[0] == "M"
     }
     problem, told, found = look("article-mech", MECH, priors=priors)
     assert found.rank == 9 > free.rank
-    flags = flag_of(problem, told)
-    assert flags.pop("M1") == ("no effect on the outputs",)
-    assert set(flags.values()) == {()}
+    flags = flags_of(problem, told)
+    assert flags.pop("M1") is Flag.NO_EFFECT
+    assert set(flags.values()) == {Flag.IDENTIFIABLE}
     deviation = dict(zip(problem.parameters.names, told.relative, strict=True))
     assert deviation["M1"] == pytest.approx(0.05, rel=0.02)  # its prior, and nothing else
     assert deviation["K"] < 0.05
@@ -112,15 +115,15 @@ def test_the_three_null_directions_of_the_hydraulics_are_named_with_their_values
     problem, told, found = hyd
     assert list(found.singular[-3:]) == [0.0, 0.0, 0.0]
     assert found.singular[-4] > 0
-    coil, currents = found.weak[:2]
-    assert coil.words.startswith(
-        "F1, F2, x1 and x2 act through two combinations only: δ = 3.9 mm and k·i0² = 177 N·mm²"
-    )
-    assert coil.words.endswith("not determined (±∞, 2 directions)")
-    assert currents.name.startswith("a common scale of I_max and I_min trades with F1, F2, x1 and x2")
-    assert "k·I_max² = 177 and k·I_min² = 19.7 N·mm²" in currents.name
-    flags = flag_of(problem, told)
-    assert {n for n, f in flags.items() if f == ("not determined",)} == {"I_max", "I_min", *COIL}
+    coil, currents = found.unidentifiable[:2]
+    assert (coil.kind, [*coil.parameters], len(coil.changes)) == (DirectionKind.SOLENOID, [*COIL], 2)
+    assert currents.kind is DirectionKind.CURRENT_SCALE
+    assert list(currents.parameters) == [*COIL, "I_max", "I_min"]
+    assert coil.flag is currents.flag is Flag.UNIDENTIFIABLE
+    numbers = {"delta": 3.9, "k_i0": 177.0, "k_imax": 177.0, "k_imin": 19.7}  # [mm], [N mm²]
+    assert coil.numbers == currents.numbers == pytest.approx(numbers, rel=0.01)
+    flags = flags_of(problem, told)
+    assert {n for n, f in flags.items() if f is Flag.UNIDENTIFIABLE} == {"I_max", "I_min", *COIL}
     # moved along what was found, the solenoid's two numbers stay
     names = found.names
     start = np.array([COIL[n] for n in COIL])
@@ -142,12 +145,15 @@ def test_the_three_null_directions_of_the_hydraulics_are_named_with_their_values
 )
 def test_pins_close_the_hydraulic_directions(pins, open_):
     problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **pins)
-    assert {n for n, f in flag_of(problem, told).items() if "not determined" in f} == open_
-    assert bool(open_) == any("not determined" in direction.words for direction in found.weak)
+    assert {n for n, f in flags_of(problem, told).items() if f is Flag.UNIDENTIFIABLE} == open_
+    assert bool(open_) == any(direction.flag is Flag.UNIDENTIFIABLE for direction in found.unidentifiable)
 
 
 def test_a_parameter_that_drowns_in_the_noise_by_itself_is_named_so():
     held = {f"parameters.{name}.fixed": value for name, value in MECH.items() if name not in ("K", "M4")}
     _, told, found = look("article-mech", MECH, **held, **{"objective.noise_deg": 300.0})
-    assert [d.name for d in found.weak] == ["K by itself", "M4 by itself"]
+    assert [(d.kind, list(d.parameters)) for d in found.unidentifiable] == [
+        (DirectionKind.SINGLE, ["K"]),
+        (DirectionKind.SINGLE, ["M4"]),
+    ]
     assert told.noise[0].source == "settings"

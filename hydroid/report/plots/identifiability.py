@@ -10,8 +10,9 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from hydroid.parameters import Array
 from hydroid.report.plots.style import GREY, MEASURED, REFINED, SEARCH, figure, styled, tick
 from hydroid.report.table import plain
-from hydroid.uncertainty.covariance import KNOWN, Uncertainty
+from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.directions import Identifiability
+from hydroid.uncertainty.flags import WEAK_ABOVE
 from hydroid.uncertainty.intervals import THRESHOLD, Profile
 
 _CELL = 0.36  # [in]
@@ -34,25 +35,25 @@ def told(uncertainty: Uncertainty, found: Identifiability) -> dict[str, Figure]:
 def singular_values(found: Identifiability) -> Figure:
     """How strongly each direction is felt, in units of the noise, and what is too weak."""
     values = found.singular
-    top = max(float(values.max(initial=0.0)), 1 / KNOWN)
+    top = max(float(values.max(initial=0.0)), 1 / WEAK_ABOVE)
     foot = top * _FADED
     drawing = figure(3.0)
     axes = drawing.subplots()
     axes.set_yscale("log")
     axes.set_ylim(foot / 3, 3 * top)
     for i, value in enumerate(values, start=1):
-        felt, strong = value > foot, value >= 1 / KNOWN
+        felt, strong = value > foot, value >= 1 / WEAK_ABOVE
         color = SEARCH if strong else REFINED
         axes.plot([i, i], [foot / 3, max(value, foot)], color=color, linewidth=1.0, alpha=0.5)
         mark = "o" if strong else "D"
         axes.plot(
             i, max(value, foot), mark, color=color, markerfacecolor=color if felt else "white", markersize=6
         )
-    axes.axhline(1 / KNOWN, color=GREY, linestyle="--", linewidth=1.0)
+    axes.axhline(1 / WEAK_ABOVE, color=GREY, linestyle="--", linewidth=1.0)
     axes.text(
         len(values) + 0.45,
-        1.2 / KNOWN,
-        f"±{100 * KNOWN:.0f} %",
+        1.2 / WEAK_ABOVE,
+        f"±{100 * WEAK_ABOVE:.0f} %",
         color=GREY,
         fontsize=8,
         ha="right",
@@ -80,7 +81,7 @@ def directions(found: Identifiability) -> Figure:
     axes.set_title("Directions: relative changes that belong together")
     axes.set_xlabel("standard deviation along the direction")
     for label, value in zip(axes.get_xticklabels(), found.singular, strict=True):
-        label.set_color(MEASURED if value >= 1 / KNOWN else REFINED)
+        label.set_color(MEASURED if value >= 1 / WEAK_ABOVE else REFINED)
     return drawing
 
 

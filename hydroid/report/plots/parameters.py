@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.problem.problem import Problem
+from hydroid.report.phrases import status_phrase
 from hydroid.report.plots.style import (
     GREY,
     MEASURED,
@@ -24,7 +25,8 @@ from hydroid.report.plots.style import (
 )
 from hydroid.report.table import number, plain
 from hydroid.report.tables import SeedResult
-from hydroid.report.words import estimate_label, flags, runs_flag
+from hydroid.report.words import estimate_label, runs_flag
+from hydroid.uncertainty.flags import Flag
 
 _BAR = 0.36
 _ROW = 0.44  # [in]
@@ -40,8 +42,8 @@ def estimates(problem: Problem, fit: Fit, truth: Mapping[str, float] | None = No
     _frame(axes, parameters, "Estimates within their bounds")
     looks = estimate_looks(fit)
     axes.text(_TEXT_AT, -0.7, estimate_label(fit, fit.final), fontsize=9, fontweight="bold", va="center")
-    for row, (parameter, flag) in enumerate(zip(parameters, flags(fit), strict=True)):
-        dull = "no effect" in flag or "fixed" in flag
+    for row, (parameter, status) in enumerate(zip(parameters, fit.uncertainty.status, strict=True)):
+        dull = status.flag in (Flag.NO_EFFECT, Flag.FIXED)
         if _bar(axes, row, parameter, dull=dull):
             beside = iter((-0.25, 0.25, -0.25, 0.25))  # compromises often coincide
             for depth, (name, (color, mark)) in enumerate(looks.items()):
@@ -51,7 +53,7 @@ def estimates(problem: Problem, fit: Fit, truth: Mapping[str, float] | None = No
                 )
                 _mark(axes, at, row + lane, GREY if dull else color, mark, size, depth)
             _true(axes, row, parameter, truth)
-        _text(axes, row, f"{number(float(fit.best.theta[row]))} {parameter.unit}", flag)
+        _text(axes, row, f"{number(float(fit.best.theta[row]))} {parameter.unit}", status_phrase(status))
     for name, (color, mark) in looks.items():  # in full colour, though every row may be grey
         axes.plot(
             [], [], mark, color=color, markeredgecolor="white", markersize=8, label=estimate_label(fit, name)
@@ -170,7 +172,7 @@ def _median_and_range(parameter: Parameter, values: Array, ignore: Collection[st
     """Median, and below it what is to be known or else the range."""
     median = f"{number(float(np.median(values)))} {parameter.unit}"
     flag = runs_flag(parameter, values, ignore)
-    if flag == "held fixed":
+    if flag == Flag.FIXED:
         return median, flag
     return f"median {median}", flag or f"{number(float(values.min()))} to {number(float(values.max()))}"
 

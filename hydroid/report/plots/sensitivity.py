@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hydroid.parameters import Array
 from hydroid.report.plots.style import GREY, MEASURED, REFINED, figure, finite, styled
 from hydroid.report.table import number, plain
-from hydroid.uncertainty.jacobian import NO_EFFECT
+from hydroid.uncertainty.jacobian import NO_EFFECT_BELOW
 
 _ROW, _MOST = 0.95, 12
 """height of a panel [in]; more parameters than this stand in two columns"""
@@ -38,7 +38,7 @@ def slopes(title: str, unit: str, names: Sequence[str], time: Array, output: Arr
     top.set_ylabel(f"[{unit}]")
     top.set_title("the output at the estimate", fontsize=9, fontweight="normal")
     strength = np.sqrt(np.mean(change**2, axis=1))
-    none = strength <= NO_EFFECT * np.nanmax(strength, initial=0.0)
+    none = strength <= NO_EFFECT_BELOW * np.nanmax(strength, initial=0.0)
     for axes, name, curve, rms, idle in zip(panels, names, change, strength, none, strict=True):
         most = 0.0 if idle else float(np.max(np.abs(curve)))
         axes.plot(time[thin], finite(curve)[thin], color=REFINED)

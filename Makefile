@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model docs clean
 
 setup: .venv/.ready
 
@@ -74,6 +74,9 @@ meshes: setup
 
 model: meshes
 	$(BIN)/hydroid build-model
+
+docs: setup  ## the reference of all settings, docs/settings.md
+	$(BIN)/python -m hydroid.settings.reference > docs/settings.md
 
 clean:
 	rm -rf .venv runs dist build

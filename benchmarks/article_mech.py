@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from pseudo_random import pseudo_random_log
 
-from hydroid.fitting.fit import Fit, fit
 from hydroid.estimate import read_values
+from hydroid.fitting.fit import Fit, fit
 from hydroid.jobs import load_settings
 from hydroid.parameters import relative_error
 from hydroid.problem.problem import Problem

@@ -28,7 +28,7 @@ from hydroid.execution.local import LocalPool
 from hydroid.jobs import load_settings
 from hydroid.problem.problem import Problem
 from hydroid.problem.spread import SpreadProblem
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 POPULATIONS, WORKERS = (70, 20), (1, 2, 4)
 STAGES = {"mechanical": "article-mech", "hydraulic": "article-hyd"}

@@ -18,8 +18,8 @@ from pseudo_random import pseudo_random_log
 
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.fitting.search import Search
 from hydroid.estimate import read_values
+from hydroid.fitting.search import Search
 from hydroid.jobs import load_settings
 from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm

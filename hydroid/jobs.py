@@ -14,8 +14,8 @@ import numpy as np
 
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
-from hydroid.execution import Executor
 from hydroid.estimate import read_values
+from hydroid.execution import Executor
 from hydroid.fitting.fit import Fit, Watcher, fit
 from hydroid.fitting.search import check_search
 from hydroid.fitting.validation import ErrorIndices, error_indices
@@ -27,8 +27,9 @@ from hydroid.problem.spread import SpreadProblem
 from hydroid.report.write import write_report
 from hydroid.run.folder import RunFolder
 from hydroid.run.run_log import log_end, log_start
-from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+from hydroid.settings.problem import MECHANICAL_UNITS
 from hydroid.simulating import respond
 
 _log = logging.getLogger(__name__)

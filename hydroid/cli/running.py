@@ -20,7 +20,8 @@ from hydroid.report.tables import parameter_table
 from hydroid.report.write import write_runs
 from hydroid.run.folder import RunFolder
 from hydroid.run.summary import summarise
-from hydroid.settings.fit import MECHANICAL_UNITS, FitSettings
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.problem import MECHANICAL_UNITS
 
 
 def run_fits(

@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager, nullcontext
 
 from hydroid.errors import SettingsError
 from hydroid.execution.executor import Executor
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 
 def open_executor(

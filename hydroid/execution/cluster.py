@@ -25,7 +25,7 @@ from distributed.scheduler import KilledWorker
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.execution.executor import Answer, C, R, Work, answer, result
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""

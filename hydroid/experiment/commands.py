@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
-from hydroid.settings.design import DesignSettings
+from hydroid.settings.experiment import DesignSettings
 
 Ints = NDArray[np.int64]
 

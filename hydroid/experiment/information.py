@@ -12,7 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem
-from hydroid.settings.design import DesignSettings
+from hydroid.settings.experiment import DesignSettings
 from hydroid.uncertainty.jacobian import STEP, jacobian, relative_scale
 from hydroid.uncertainty.noise import Noise, channel_noise
 

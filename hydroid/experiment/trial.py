@@ -16,7 +16,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
-from hydroid.settings.design import DesignSettings
+from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 from hydroid.uncertainty.jacobian import STEP, relative_scale
 

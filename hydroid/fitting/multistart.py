@@ -23,8 +23,7 @@ from hydroid.fitting.search import HISTORY, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.problem import Memo, Problem
 from hydroid.search.algorithm import Population
-from hydroid.settings.fit import SearchSettings
-from hydroid.settings.search import RefinementSettings
+from hydroid.settings.search import RefinementSettings, SearchSettings
 
 WIDE = 10.0
 """bounds of a larger ratio than this are searched by the logarithm: a start is as likely in each decade"""

@@ -17,7 +17,7 @@ from hydroid.search.ga import SimpleGa
 from hydroid.search.library import LibraryAlgorithm
 from hydroid.search.moo import pymoo
 from hydroid.search.nsga2 import Nsga2
-from hydroid.settings.fit import SearchSettings
+from hydroid.settings.search import SearchSettings
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
 """Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or

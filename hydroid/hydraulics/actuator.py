@@ -57,7 +57,7 @@ class Actuator:
         linkages: of the J joints, from `records.linkages`.
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
-        settings: sub-steps, plunger dynamics, start level.
+        settings: for the sub-steps and the start pressure.
         entries: where M[i, j] stands in a row of `mass`, shape (J, J); by default rows are whole matrices.
 
     Attributes:
@@ -79,7 +79,7 @@ class Actuator:
         order = np.argsort(driven, stable=True)
         places = np.arange(joints**2).reshape(joints, joints) if entries is None else entries
         self.plugin = kernel.Plugin(
-            coefficients=coefficients(parameters, linkages, settings),
+            coefficients=coefficients(parameters, linkages),
             damping=np.array(np.broadcast_to(damping, self.shape), float, order="C"),
             order=order,
             entries=places[np.ix_(order, order)],

@@ -12,7 +12,7 @@ from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.cylinder import friction_damping, stop_damping, triangle, volume
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import plunger_step, plunger_weight, resting_stroke
+from hydroid.hydraulics.solenoid import plunger_step, plunger_weight
 from hydroid.hydraulics.valve import opening, port_flow, spool
 
 
@@ -62,10 +62,6 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
     part = min(max(substep + 1.0 - w.fresh, 0.0), 1.0)
     drive_a = w.old_a + part * (w.new_a - w.old_a)
     drive_b = w.old_b + part * (w.new_b - w.old_b)
-    if c.quasi_static:
-        z.stroke_a = resting_stroke(drive_a, c.gap, c.plunger_stiffness)
-        z.stroke_b = resting_stroke(drive_b, c.gap, c.plunger_stiffness)
-        return spool(z.stroke_a, z.stroke_b)
     before = spool(z.stroke_a, z.stroke_b)
     z.stroke_a, z.speed_a = plunger_step(z.stroke_a, z.speed_a, drive_a, step, w.plunger_weight, c)
     z.stroke_b, z.speed_b = plunger_step(z.stroke_b, z.speed_b, drive_b, step, w.plunger_weight, c)

@@ -37,9 +37,7 @@ LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
 """how a joint is moved: kind (NONE, LINEAR or ROTARY); pivots' distances a, b [m]; their angle theta0 at
 joint angle 0 [rad]; cylinder length with the rod fully in [m], as at the joint's lower limit; stroke [m]"""
 
-COEFFICIENTS = np.dtype(
-    [*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance"), ("quasi_static", np.int64)]
-)
+COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance")])
 """what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them"""
 
 JOINT_STATE = np.dtype(
@@ -140,7 +138,7 @@ def linkages(arm: Arm, joints: Sequence[int], driven: Sequence[int]) -> Records:
     return table.view(np.recarray)
 
 
-def coefficients(parameters: Records, linkages: Records, settings: HydraulicSettings) -> NDArray[np.void]:
+def coefficients(parameters: Records, linkages: Records) -> NDArray[np.void]:
     """Lay out what the kernel reads of n candidates' J actuators, of COEFFICIENTS, shape (n, J)."""
     table = np.zeros(parameters.shape, COEFFICIENTS)
     for source in (parameters, linkages):
@@ -149,5 +147,4 @@ def coefficients(parameters: Records, linkages: Records, settings: HydraulicSett
     p = parameters
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient, p.density)
-    table["quasi_static"] = not settings.plunger_dynamics
     return table

@@ -49,7 +49,6 @@ def coil_force(drive: Any, stroke: Any, gap: Any) -> Any:
     return drive / (reach * reach)
 
 
-@compilable
 def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
     """Stroke [m] where spring and coil balance: K x (x + δ)² = k i².
 

@@ -3,15 +3,17 @@
 For each lag the joint's velocity is regressed on the command at that lag, the angle and a constant:
 q̇(t) ≈ k u(t − lag) + s q(t) + c. The angle stands for springs and gravity's gradient, which turn a slow
 velocity ahead of its command; without it a sine would look acausal. All are smoothed by one Gaussian, which
-is symmetric and so shifts nothing. The lag of the smallest residual is the answer, if it is clearly smaller
-than what lags of a plain actuator leave: valve, oil and inertia alone lag by a few hundredths of a second.
+is symmetric and so shifts nothing. Samples at which a joint stands at the end of its travel, pushed further,
+do not count: its velocity says nothing about the command. The lag of the smallest residual is the answer if
+it lies inside the range of lags and is clearly better than any lag of the opposite sign and than the lags of
+a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from numpy.typing import NDArray
 
 from hydroid.log.finding import Finding
 from hydroid.log.log import Floats, Log
@@ -19,11 +21,15 @@ from hydroid.settings.log import LogSettings
 
 EARLIEST, LATEST = -0.5, 1.5  # lags tried [s]
 PLAIN = (0.0, 0.1)  # lags that need no transport delay [s]
-ACAUSAL = -0.02  # earlier than noise makes it [s]
+ACAUSAL = -0.02  # lags below this are more than noise [s]
 SMOOTHING = 0.05  # standard deviation of the Gaussian [s]
-CLEARER = 0.5  # residual of the best lag over that of the best plain one
-MOST = 0.5  # residual above which command and motion do not belong together
-_REST = 1e-12  # [% rad], a product of norms this small is rounding
+CLEARER = 0.5  # largest ratio of the best lag's residual to that of the best plain one
+MAX_RESIDUAL = 0.5  # above it command and motion do not belong together
+MAX_ACAUSAL_RESIDUAL = 0.25  # motion ahead of its command takes stronger evidence
+STOP_ZONE = 0.02  # part of the logged travel, at each of its ends, in which a joint may stand at a stop
+STANDING = 0.03  # part of the largest speed below which it stands
+STOPPED = 0.2  # how long it must stand there [s]
+_ROUNDING = 1e-9  # part of a sum of squares
 
 
 @dataclass(frozen=True)
@@ -44,8 +50,9 @@ class Delay:
 def suggest_delay(log: Log, joint: int) -> Delay | None:
     """Return the lag of a joint (number, from 1) behind its command; None where the log does not tell.
 
-    It does not if it is short, if command and motion do not belong together, or if a lag within a plain
-    actuator's explains the motion about as well as the best (the command is one sine, say).
+    It does not if it is short, if command and motion do not belong together, if the best lag is the first or
+    the last tried, or if a plain actuator's lag or one of the opposite sign explains the motion about as well
+    (the command is periodic, say).
     """
     u, q = log.command[:, joint - 1], log.angle[:, joint - 1]
     first, last = round(EARLIEST / log.period), round(LATEST / log.period)
@@ -53,21 +60,81 @@ def suggest_delay(log: Log, joint: int) -> Delay | None:
     if used.stop - used.start < last or np.isnan(q).any() or (u == u[0]).all() or (q == q[0]).all():
         return None
     width = SMOOTHING / log.period
-    smooth = gaussian_filter1d(u, width)
-    basis = np.linalg.qr(np.stack([np.ones(len(u)), gaussian_filter1d(q, width)], axis=1)[used])[0]
-    velocity = _beyond(gaussian_filter1d(q, width, order=1)[used], basis)
-    lags = np.arange(first, last + 1)
-    match = np.array([_match(smooth[used.start - k : used.stop - k], basis, velocity) for k in lags])
-    residual, lag = 1 - match**2, lags * log.period
-    best = int(residual.argmin())
-    plain = (lag > PLAIN[0] - log.period / 2) & (lag < PLAIN[1] + log.period / 2)
-    if residual[best] > MOST or not (plain[best] or residual[best] < CLEARER * residual[plain].min()):
+    command, angle = _smooth(u, width), _smooth(q, width)
+    speed = _smooth(q, width, derivative=True)
+    counts = ~_at_stop(command, angle, speed, log.period)[used]
+    if counts.sum() < last:
         return None
-    return Delay(float(lag[best]), float(1 - residual[best]), int(np.sign(match[best])))
+    residual, sign = _regress(command, angle[used], speed[used], counts)
+    residual, sign = residual[::-1], sign[::-1]  # by increasing lag
+    lag = np.arange(first, last + 1) * log.period
+    best = int(residual.argmin())
+    if not 0 < best < len(lag) - 1 or residual[best] > (
+        MAX_RESIDUAL if lag[best] > ACAUSAL else MAX_ACAUSAL_RESIDUAL
+    ):
+        return None
+    plain = (lag > PLAIN[0] - log.period / 2) & (lag < PLAIN[1] + log.period / 2)
+    rivals = (sign != sign[best]) | (plain & ~plain[best])
+    if rivals.any() and residual[best] >= CLEARER * residual[rivals].min():
+        return None
+    return Delay(float(lag[best]), float(1 - residual[best]), int(sign[best]))
+
+
+def _regress(
+    command: Floats, angle: Floats, speed: Floats, counts: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Regress the speed on the angle, a constant and the command, shifted by all lags from the latest on.
+
+    Args:
+        command: of the whole log, shape (T,).
+        angle: of the samples compared at all lags, shape (N,).
+        speed: of these, shape (N,).
+        counts: which of these count, shape (N,).
+
+    Returns:
+        Share of the speed's variance that is left, and the sign of the command's effect, shape (T - N + 1,).
+    """
+    basis = np.linalg.qr(counts[:, None] * np.stack([np.ones_like(angle), angle], axis=1))[0]
+    wanted = counts * speed
+    wanted = wanted - basis @ (basis.T @ wanted)
+    power = np.correlate(command**2, counts.astype(float), "valid")
+    explained = sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
+    own = power - explained  # of the command, what angle and constant do not explain
+    product = np.correlate(command, wanted, "valid")
+    enough = own > _ROUNDING * power
+    match = np.zeros_like(product)
+    np.divide(product**2, own * (wanted @ wanted), out=match, where=enough & (wanted @ wanted > 0))
+    return 1 - match, np.sign(product)
+
+
+def _at_stop(command: Floats, angle: Floats, speed: Floats, period: float) -> NDArray[np.bool_]:
+    """Where the joint stands at an end of its travel while it is pushed further, shape (T,)."""
+    low, high = angle.min(), angle.max()
+    zone = STOP_ZONE * (high - low)
+    push = command * np.sign(command @ speed)
+    ends = ((angle > high - zone) & (push > 0)) | ((angle < low + zone) & (push < 0))
+    standing = ends & (np.abs(speed) < STANDING * np.abs(speed).max())
+    edges = np.flatnonzero(np.diff(standing, prepend=False, append=False))
+    stopped = np.zeros_like(standing)
+    margin = round(2 * SMOOTHING / period)
+    for begin, end in edges.reshape(-1, 2):
+        if (end - begin) * period >= STOPPED:
+            stopped[max(begin - margin, 0) : end + margin] = True
+    return stopped
+
+
+def _smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats:
+    """Smooth a signal by a Gaussian of `width` samples, or return the derivative of that per sample."""
+    reach = int(4 * width + 0.5)
+    at = np.arange(-reach, reach + 1)
+    kernel = np.exp(-0.5 * (at / width) ** 2)
+    kernel /= kernel.sum()
+    kernel = -at / width**2 * kernel if derivative else kernel
+    return np.convolve(np.pad(signal, reach, "symmetric"), kernel, "valid")
 
 
 def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]) -> list[Finding]:
-    """Mention commands that look early, late, or of the wrong sign against the angle."""
+    """Report commands that look early, late, or of the wrong sign against the angle."""
     joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
     delays = {joint: delay for joint in joints if (delay := suggest_delay(log, joint))}
     early = {j: d.lag for j, d in delays.items() if d.lag > PLAIN[1] + log.period / 2}
@@ -91,18 +158,6 @@ def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]
         )
         findings.append(Finding("warning", what, log.source, hint, column=column(min(against))))
     return findings
-
-
-def _beyond(signal: Floats, basis: Floats) -> Floats:
-    """What of a signal the basis does not explain."""
-    return signal - basis @ (basis.T @ signal)
-
-
-def _match(command: Floats, basis: Floats, velocity: Floats) -> float:
-    """Partial correlation of command and velocity, -1 to 1; 0 where either is at rest."""
-    rest = _beyond(command, basis)
-    size = float(np.linalg.norm(rest) * np.linalg.norm(velocity))
-    return float(rest @ velocity) / size if size > _REST * len(rest) else 0.0
 
 
 def _named(kind: str, joints: Sequence[int]) -> str:

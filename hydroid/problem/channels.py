@@ -8,7 +8,7 @@ import numpy as np
 
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 from hydroid.simulation import Response
 
 

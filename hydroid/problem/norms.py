@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 
 Float = NDArray[np.float64]
 

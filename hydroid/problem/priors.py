@@ -10,7 +10,7 @@ import numpy as np
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array, ParameterSet
-from hydroid.settings.priors import PriorSettings
+from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0
 """standard deviations that a search may be off a statement"""

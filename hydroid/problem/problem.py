@@ -23,7 +23,7 @@ from hydroid.problem.priors import Priors
 from hydroid.problem.segments import segment_bounds, segment_objectives
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.objective import SegmentSettings
+from hydroid.settings.problem import SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
 from hydroid.simulation.record import Record
 

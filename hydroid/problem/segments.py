@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
 from hydroid.problem.norms import overall_objective
-from hydroid.settings.objective import ObjectiveSettings, SegmentSettings
+from hydroid.settings.problem import ObjectiveSettings, SegmentSettings
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

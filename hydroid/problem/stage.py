@@ -11,8 +11,9 @@ from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import nominal_parameters
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings, ParameterSettings
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import QUANTITIES
+from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import ArmParameters, Candidates
 
 

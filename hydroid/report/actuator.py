@@ -11,7 +11,6 @@ from hydroid.files import write_atomic
 from hydroid.hydraulics.records import coefficients, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.simulation import Candidates
 
@@ -36,9 +35,7 @@ def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> A
         raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
     assert candidate.actuators is not None
     one = candidate.actuators[:1, [joint - 1]].view(np.recarray)
-    p = coefficients(one, linkages(arm, [joint - 1], [joint - 1]), HydraulicSettings()).view(np.recarray)[
-        0, 0
-    ]
+    p = coefficients(one, linkages(arm, [joint - 1], [joint - 1])).view(np.recarray)[0, 0]
     if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
         raise SettingsError(
             f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "

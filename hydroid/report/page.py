@@ -10,7 +10,7 @@ from hydroid.report.html import Picture, Section, report_html
 from hydroid.report.identifiability import told_section
 from hydroid.report.table import Table, number
 from hydroid.report.words import cautions, norm_label, summary, told
-from hydroid.settings.priors import PriorSettings
+from hydroid.settings.problem import PriorSettings
 
 _ALGORITHMS = {
     "ga": "simple genetic algorithm",

@@ -13,8 +13,8 @@ from hydroid.report.table import Cell, Table, number
 from hydroid.report.words import in_reader_units, norm_label
 from hydroid.report.write import write_figure, write_table
 from hydroid.settings.arm import Arm
-from hydroid.settings.design import DesignSettings
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.experiment import DesignSettings
+from hydroid.settings.problem import ObjectiveSettings
 from hydroid.uncertainty.flags import WEAK_ABOVE, flag_of
 from hydroid.uncertainty.surface import Surface
 from hydroid.uncertainty.sweep import Sweep

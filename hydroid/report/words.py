@@ -10,7 +10,7 @@ from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 from hydroid.report.phrases import listed, status_phrase
 from hydroid.report.table import number, plain
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 from hydroid.uncertainty.covariance import at_bounds
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
 

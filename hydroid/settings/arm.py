@@ -1,6 +1,6 @@
 """A serial hydraulic arm: links, joints, cylinders and named poses, from one YAML file.
 
-The units are those of a drawing (m, deg, mm, mm², cm³/rad); the rooms that compute turn them into SI.
+Units are those of a drawing (m, deg, mm, mm², cm³/rad); other packages turn them into SI.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
@@ -27,53 +27,60 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 
 
 class Base(Settings):
-    """What stands still and carries the first joint."""
+    """The fixed base that carries the first joint."""
 
     mesh: str
+    """STL file in the folder of the meshes"""
     at: Vector = (0.0, 0.0, 0.0)
-    """of the base's frame in the world [m]"""
+    """position of the base's frame in the world [m]"""
 
 
 class Link(Settings):
-    """A moving link; the frame of its mesh sits in its joint."""
+    """A moving link; the origin of its mesh lies in its joint."""
 
     name: Name
+    """name of the link"""
     mesh: str
+    """STL file in the folder of the meshes"""
     mass: Positive
-    """nominal [kg]; known where no parameter is named"""
+    """nominal mass [kg]"""
     parameter: Name | None = None
-    """the unknown that this mass is, M1 say"""
+    """name of the unknown parameter that this mass is, such as M1; null: the mass is known"""
 
 
 class FixedPart(Link):
-    """A part bolted to a link: a fixed jaw, a tool, a payload."""
+    """A part bolted to a link, such as a fixed jaw or a tool."""
 
     carried_by: Name
+    """name of the link that carries the part"""
     at: Vector = (0.0, 0.0, 0.0)
-    """in the frame of the link that carries it [m]"""
+    """position in the frame of that link [m]"""
 
 
 class PayloadPlace(Settings):
-    """Where a payload sits: its centre of mass, carried by a link."""
+    """Where the gripper holds the mass that a log's `payloads` names."""
 
     carried_by: Name
+    """name of the link that carries the payload"""
     at: Vector
-    """in the frame of the link [m]"""
+    """position of its centre of mass in the frame of that link [m]"""
 
 
 class Joint(Settings):
-    """A hinge; it moves the link of the same position in the list of links."""
+    """A hinge; it moves the link at the same position in the list of links."""
 
     name: Name
+    """name of the joint"""
     axis: Direction
-    """in the parent link's frame at angle 0"""
+    """direction of the axis in the parent link's frame at angle 0"""
     at: Vector
-    """in the parent link's frame [m]"""
+    """position in the parent link's frame [m]"""
     range: tuple[float, float]
-    """[deg]"""
+    """smallest and largest angle [deg]"""
     continuous: bool = False
-    """turns without stops; `range` is then no more than the span that a viewer offers"""
+    """true: the joint turns without stops, and `range` only limits the viewer's slider"""
     actuator: Annotated[LinearActuator | RotaryActuator, Field(discriminator="kind")]
+    """what turns the joint; its `kind` decides which settings it has"""
 
     @model_validator(mode="after")
     def _possible(self) -> "Joint":
@@ -89,18 +96,22 @@ class Arm(Settings):
     """A serial arm: `links[i]` hangs on `links[i - 1]` (the first on the base) by `joints[i]`."""
 
     name: str
-    model: Path
-    """the MJCF, relative to this file"""
-    meshes: Path
+    """name of the arm"""
+    model: Annotated[Path, Strict(False)]
+    """the MJCF model, relative to this file"""
+    meshes: Annotated[Path, Strict(False)]
     """folder of the STL files, relative to this file"""
     base: Base
     links: Annotated[tuple[Link, ...], Field(min_length=1)]
+    """the links, from the base outwards"""
     fixed: tuple[FixedPart, ...] = ()
+    """parts bolted to links"""
     joints: tuple[Joint, ...]
+    """the joints, from the base outwards"""
     payload: PayloadPlace | None = None
-    """where the gripper holds what a log's `payloads` names"""
+    """where the gripper holds a payload; null: logs have no payloads"""
     poses: dict[Name, tuple[float, ...]]
-    """joint angles by name [deg], one a joint"""
+    """named poses: the angle of each joint, by name [deg]"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Arm":

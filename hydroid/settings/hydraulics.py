@@ -88,8 +88,6 @@ class HydraulicSettings(Settings):
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
-    plunger_dynamics: bool = True
-    """false: plungers are always in equilibrium with their coil and spring"""
     start_pressure: Positive = 50.0
     """pressure on the rod side at the start, where static balance leaves it open [bar]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3

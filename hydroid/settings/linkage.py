@@ -51,17 +51,18 @@ STROKE_TOLERANCE = 0.02
 
 
 class LinearActuator(Settings):
-    """A cylinder that spans a triangle with the joint; `a`, `b` are the pivots' distances from its axis."""
+    """A cylinder that spans a triangle with the joint."""
 
     kind: Literal["linear"]
+    """linear: a cylinder"""
     a: Positive
-    """[m]"""
+    """distance of one pivot from the joint's axis [m]"""
     b: Positive
-    """[m]"""
+    """distance of the other pivot from the joint's axis [m]"""
     theta0: float
     """angle between the two pivots at joint angle 0 [deg]"""
     stroke: Positive
-    """[mm]"""
+    """stroke of the rod [mm]"""
     area_a: Positive
     """piston area that pushes the joint to positive angles [mm²]"""
     area_b: Positive
@@ -69,11 +70,12 @@ class LinearActuator(Settings):
     max_opening: Positive
     """largest valve opening [mm²]"""
     a_on: Literal["parent", "child"] = "parent"
-    """the link that carries the pivot at distance a; the other carries b"""
+    """link that carries the pivot at distance a; the other link carries the pivot at distance b"""
     towards: Direction
-    """from the joint to the pivot on the parent link, in its frame; the part along the axis is dropped"""
+    """direction from the joint to the pivot on the parent link, in its frame; the part along the axis is
+    ignored"""
     offset: float = 0.0
-    """of both pivots along the joint's axis [m]"""
+    """distance of both pivots from the joint's origin along its axis [m]"""
 
     def length(self, angle: Any) -> Any:
         """Distance between the pivots [m] at joint angles [rad] of any shape."""
@@ -88,7 +90,8 @@ class RotaryActuator(Settings):
     """A rotary vane or piston actuator on the joint's axis."""
 
     kind: Literal["rotary"]
+    """rotary: a vane or piston actuator on the joint's axis"""
     displacement: Positive
-    """[cm³/rad]"""
+    """oil per angle [cm³/rad]"""
     max_opening: Positive
     """largest valve opening [mm²]"""

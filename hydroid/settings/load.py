@@ -1,19 +1,40 @@
 """YAML -> checked settings: every refusal names the file, the line, the setting and what is allowed."""
 
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from hydroid.errors import SettingsError
 from hydroid.settings.document import read_document, read_value
-from hydroid.settings.words import explain
+from hydroid.settings.messages import explain
 
 
 class Settings(BaseModel):
-    """Base of all settings: frozen, and an unknown key is an error rather than a silent default."""
+    """Base of all settings: frozen; an unknown key is an error, and so is true for a number or "3" for 3."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lists_are_tuples(cls, values: Any) -> Any:
+        """Take YAML's lists for tuples, which frozen settings hold."""
+        return _with_tuples(values)
+
+
+def _with_tuples(values: Any) -> Any:
+    if isinstance(values, dict):
+        return {key: _with_tuples(value) for key, value in values.items()}
+    return tuple(_with_tuples(value) for value in values) if isinstance(values, list) else values
+
+
+def _number_of(key: Any) -> Any:
+    """JSON and `--set` spell the number of a joint as text."""
+    return int(key) if isinstance(key, str) and key.isascii() and key.isdecimal() else key
+
+
+JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
+"""of a joint of the arm, from 1"""
 
 
 S = TypeVar("S", bound=Settings)
@@ -74,37 +95,14 @@ def validate(
     Files that the settings name are looked up in `folder` first.
     """
     try:
-        taken = kind.model_validate(values, context={"folder": folder})
+        return kind.model_validate(values, context={"folder": folder})
     except ValidationError as error:
-        first = error.errors()[0]
+        # a setting that does not exist may be why another is missing
+        first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
         loc = tuple(str(part) for part in first["loc"])
-        more = error.error_count() - 1
-        hint = f"and {more} more fault{'s' if more > 1 else ''} in this file" if more else ""
-        what = explain(".".join(loc), first, kind)
+        more = f"{len(others)} more fault{'s' if len(others) > 1 else ''}"
+        what, hint = explain(".".join(loc), first, kind), f"and {more} in this file" if others else ""
         raise SettingsError(what, where=_where(loc, source, lines, overridden), hint=hint) from None
-    if loc := _truth_for_number(values, taken):
-        what = f"{'.'.join(loc)}: true and false are no numbers"
-        raise SettingsError(what, where=_where(loc, source, lines, overridden))
-    return taken
-
-
-def _truth_for_number(given: Any, taken: Any) -> tuple[str, ...]:
-    """Path to where a true or false was taken for 1 or 0, which pydantic does without a word."""
-    if isinstance(given, bool):
-        return () if isinstance(taken, bool) else ("",)
-    if isinstance(given, list):
-        inner, parts = given, taken if isinstance(taken, list | tuple) else ()
-        pairs = [(str(i), *pair) for i, pair in enumerate(zip(inner, parts, strict=False))]
-    elif isinstance(given, dict):
-        parts = dict(taken) if isinstance(taken, dict | BaseModel) else {}
-        by_name = {str(key): part for key, part in parts.items()}
-        pairs = [(str(key), one, by_name[str(key)]) for key, one in given.items() if str(key) in by_name]
-    else:
-        return ()
-    for name, one, part in pairs:
-        if loc := _truth_for_number(one, part):
-            return (name, *(piece for piece in loc if piece))
-    return ()
 
 
 def _where(
@@ -112,8 +110,10 @@ def _where(
 ) -> str:
     key = ".".join(loc)
     # the fault may lie in the override, below it, or in what it is a part of
-    guilty = [o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")]
-    return f"--set {guilty[0]}" if guilty else f"{source}{_line(loc, lines or {})}"
+    related = [
+        o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")
+    ]
+    return f"--set {related[0]}" if related else f"{source}{_line(loc, lines or {})}"
 
 
 def parse_override(text: str) -> tuple[str, Any]:

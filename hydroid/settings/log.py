@@ -1,18 +1,18 @@
-"""How the columns of a CSV log become commands [%] and joint angles [rad]; the defaults fit the shipped logs.
+"""How the columns of a CSV log become commands [%] and joint angles [rad]. The defaults fit the shipped logs.
 
 log:
   time: {column: t, unit: ms}
-  command: {column: ["up{joint}", "down{joint}"], scale: 10}   # two columns: one a direction
-  joints:                       # what differs, laid over the common columns
+  command: {column: ["up{joint}", "down{joint}"], scale: 10}   # two columns: one per direction
+  joints:                       # what differs for single joints
     4: {angle: {unit: rad}}
-    7: null                     # not in the log: undriven and unmeasured
+    7: null                     # not in the log
 """
 
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
 
-from hydroid.settings.load import Settings
+from hydroid.settings.load import JointNumber, Settings
 
 JOINT = "{joint}"
 
@@ -22,7 +22,7 @@ def _as_columns(value: Any) -> Any:
     ok = isinstance(columns, list | tuple) and all(isinstance(c, str) and c for c in cast(list[Any], columns))
     if not ok or len(cast(list[Any], columns)) not in (1, 2):
         raise ValueError("must be a column's name, or two: the positive and the negative direction")
-    return columns
+    return tuple(columns)
 
 
 def _nonzero(value: float) -> float:
@@ -37,84 +37,107 @@ Offset = Annotated[float, Field(ge=-1e12, le=1e12)]
 
 
 class TimeColumn(Settings):
-    """Where the time stands."""
+    """The column that holds the time."""
 
     column: Name = "time_s"
+    """name in the header"""
     unit: Literal["s", "ms"] = "s"
+    """unit of the cells"""
 
 
 class CommandColumns(Settings):
-    """One signed column, or two (positive, negative direction): command [%] = scale · cell + offset.
-
-    With two columns each is scaled so, must lie in [0, 100] %, and the command is the first minus the second.
-    """
+    """Columns that hold the commands: command [%] = scale · cell + offset."""
 
     column: Annotated[tuple[str, ...], BeforeValidator(_as_columns)] = (f"u{JOINT}_pct",)
+    """name in the header, with {joint} for the joint's number; or two names, for the positive and the
+    negative direction, whose values must lie in [0, 100] % and are subtracted"""
     scale: Scale = 1.0
+    """factor on the cells"""
     offset: Offset = 0.0
+    """is added to the scaled cells [%]"""
 
 
 class AngleColumn(Settings):
-    """One column: angle [unit] = scale · cell + offset."""
+    """Columns that hold the angles: angle [unit] = scale · cell + offset."""
 
     column: Name = f"q{JOINT}_deg"
+    """name in the header, with {joint} for the joint's number"""
     unit: Literal["deg", "rad"] = "deg"
+    """unit of the scaled cells"""
     scale: Scale = 1.0
+    """factor on the cells"""
     offset: Offset = 0.0
+    """is added to the scaled cells, in `unit`"""
 
 
 class PressureColumns(Settings):
-    """Columns of chambers A (pushes to positive angles) and B: pressure [unit] = scale · cell + offset."""
+    """Columns that hold chamber pressures: pressure [unit] = scale · cell + offset."""
 
     column: Annotated[tuple[str, str], Field(min_length=2, max_length=2)] = (
         f"pA{JOINT}_bar",
         f"pB{JOINT}_bar",
     )
+    """names in the header of chamber A, which pushes to positive angles, and chamber B"""
     unit: Literal["bar", "Pa", "MPa"] = "bar"
+    """unit of the scaled cells"""
     scale: Scale = 1.0
+    """factor on the cells"""
     offset: Offset = 0.0
+    """is added to the scaled cells, in `unit`"""
 
 
 class JointColumns(Settings):
-    """The columns of one joint; null: the log does not have it."""
+    """The columns of one joint, where they differ from the common ones."""
 
     command: CommandColumns | None
+    """as log.command; null: the log holds no command of this joint"""
     angle: AngleColumn | None
+    """as log.angle; null: the log holds no angle of this joint"""
     pressure: PressureColumns | None = None
+    """as log.pressure; null: the log holds no pressures of this joint"""
 
 
 Columns = CommandColumns | AngleColumn | PressureColumns
 
 
 def _common(columns: Columns | None) -> Columns | None:
-    """Columns of all joints must tell the joints apart."""
+    """Refuse a common column that does not contain the joint's number."""
     names = (
         () if columns is None else (columns.column,) if isinstance(columns.column, str) else columns.column
     )
     for name in names:
         if JOINT not in name:
-            raise ValueError(f"column {name!r} is common to all joints and needs {JOINT} in its name")
+            raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
     return columns
 
 
 class LogSettings(Settings):
-    """Columns, units and tolerances of a log."""
+    """The layout of CSV logs: columns, units and tolerances."""
 
     time: TimeColumn = TimeColumn()
     command: Annotated[CommandColumns | None, AfterValidator(_common)] = CommandColumns()
+    """columns of the commands; null: the log holds none"""
     angle: Annotated[AngleColumn | None, AfterValidator(_common)] = AngleColumn()
-    pressure: Annotated[PressureColumns | None, AfterValidator(_common)] = None  # most logs have none
-    joints: dict[Annotated[int, Field(ge=1)], JointColumns] = Field(default_factory=dict[int, JointColumns])
-    period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01  # of the Log, whatever the file's rate
-    delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0  # the command acts this much later than logged
-    repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # longest hole that --repair fills
-    angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0  # potentiometers are noisy at the stops
+    """columns of the angles; null: the log holds none"""
+    pressure: Annotated[PressureColumns | None, AfterValidator(_common)] = None
+    """columns of the chamber pressures; null: the log holds none"""
+    joints: dict[JointNumber, JointColumns] = Field(default_factory=dict[int, JointColumns])
+    """what differs for single joints, by joint; null: the log does not hold this joint"""
+    period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
+    """sample period to which logs are resampled [s]: commands are held, angles interpolated"""
+    delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    """transport delay: commands act this much later than logged [s]"""
+    repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
+    """longest gap that --repair fills [s]"""
+    angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0
+    """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops"""
     shortest_s: Annotated[float, Field(ge=0)] = 0.5
+    """duration below which a log is refused [s]"""
 
     @model_validator(mode="before")
     @classmethod
     def _lay_over(cls, values: Any) -> Any:
-        """Complete each joint from the common columns, so that dumped settings read back the same."""
+        """Complete each joint from the common columns, so that written settings read back the same."""
         if not isinstance(values, dict) or not isinstance(cast(Any, values).get("joints"), dict):
             return cast(Any, values)
         given = cast(dict[str, Any], values)

@@ -10,25 +10,27 @@ Rate = Annotated[float, Field(ge=0, le=1)]
 
 
 class PopulationSettings(Settings):
-    """What all searches by populations share: their size and how long they run."""
+    """Settings that all searches by populations share."""
 
     population: Annotated[int, Field(ge=2, le=100_000)]
+    """number of candidates in a population"""
     generations: Annotated[int, Field(ge=0)]
-    """Populations bred after the first one. Ours: all defaults cost about 2,800 simulations."""
+    """number of populations after the first one"""
 
 
 class GeneticSettings(PopulationSettings):
-    """What both genetic algorithms share: coding and operators."""
+    """Settings that both genetic algorithms share: coding and operators."""
 
     crossover_rate: Rate
-    """Chance P_c that a pair of parents crosses; otherwise its children are copies."""
+    """probability P_c that a pair of parents is crossed; otherwise its children are copies"""
     mutation_rate: Rate
-    """Chance P_m that one element (one parameter) of a child changes."""
+    """probability P_m that an element (one parameter) of a child changes"""
     coding: Literal["binary", "integer"] = "binary"
-    """Binary: 16 Gray-coded bits a parameter, the article's MVBS. Integer: one number a parameter."""
+    """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
+    """pointwise: cut parents at `points`; uniform: choose each element from either parent"""
     points: Annotated[int, Field(ge=1)] = 2
-    """Cuts of the pointwise crossover (the article gives no number)."""
+    """number of cuts of the pointwise crossover (ours; the article gives none)"""
 
 
 class GaSettings(GeneticSettings):
@@ -39,9 +41,9 @@ class GaSettings(GeneticSettings):
     crossover_rate: Rate = 0.8
     mutation_rate: Rate = 0.05
     elitism: Annotated[int, Field(ge=0)] = 1
-    """Best candidates carried over unchanged (the article is silent)."""
+    """number of best candidates that survive unchanged (ours; the article gives none)"""
     target: float | None = None
-    """The search stops once its best objective is this low."""
+    """the search ends once its best objective is this low; null: after all generations"""
 
     @model_validator(mode="after")
     def _someone_new(self) -> "GaSettings":
@@ -64,35 +66,38 @@ class Nsga2Settings(GeneticSettings):
 
 
 class CmaesSettings(PopulationSettings):
-    """CMA-ES (Hansen), of the library cma: one objective, the error over the whole record."""
+    """CMA-ES (Hansen) of the library cma; its objective is the error over the whole log."""
 
     population: Annotated[int, Field(ge=6, le=100_000)] = 20
     generations: Annotated[int, Field(ge=0)] = 140
-    """The search ends before, where cma finds that it has converged."""
+    """number of populations after the first one; fewer if the search converges earlier"""
     sigma: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Standard deviation of the first population about the middle of the bounds, in terms of their widths."""
+    """standard deviation of the first population around the middle of the bounds, as a fraction of their
+    widths"""
 
 
 class PymooSettings(PopulationSettings):
     """An algorithm of the library pymoo."""
 
     algorithm: str = "NSGA3"
-    """Its class there: NSGA3, MOEAD, RVEA, AGEMOEA, SMSEMOA, ... with the segments as objectives; DE, PSO,
-    GA, ... with the error over the whole record."""
+    """its name there; algorithms for several objectives (NSGA3, MOEAD, ...) take one per segment, the
+    others (DE, PSO, ...) the error over the whole log"""
     population: Annotated[int, Field(ge=4, le=100_000)] = 40
     generations: Annotated[int, Field(ge=0)] = 70
 
 
 class MultistartSettings(Settings):
-    """Bounded least squares from several random starts (ours; not in the article)."""
+    """Bounded least squares from several random start points (ours; not in the article)."""
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = 10
+    """number of start points"""
     horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0)
-    """Seconds of every log, from its first command on, that a start is fitted to before the whole logs."""
+    """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
+    command on [s]"""
     iterations: Annotated[int, Field(ge=1)] = 40
-    """Steps at most, of each of these fits."""
+    """largest number of steps of each of these fits"""
     step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
-    """As the refinement's; coarser, since the refinement follows from the best point found."""
+    """as the refinement's; coarser, since the refinement starts from the best result"""
 
     @property
     def generations(self) -> int:
@@ -101,8 +106,32 @@ class MultistartSettings(Settings):
 
 
 class RefinementSettings(Settings):
-    """The bounded least squares that starts from a search's estimate (ours; not in the article)."""
+    """The refinement: bounded least squares that start from the search's estimate (ours; not in the
+    article)."""
 
     iterations: Annotated[int, Field(ge=1)] = 100
+    """largest number of steps"""
     step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-14
-    """Relative length of a step, in units of the bounds' widths, below which the refinement ends."""
+    """the refinement ends after a step that is shorter than this fraction of the bounds' widths"""
+
+
+class SearchSettings(Settings):
+    """The search: its algorithm, its seed, and how one estimate is taken from a Pareto set."""
+
+    algorithm: Literal["ga", "nsga2", "cmaes", "pymoo", "multistart"] = "nsga2"
+    """the search algorithm; its settings stand under the same name"""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    """seed of all random numbers"""
+    compromise: Literal["average", "utopia", "best"] = "average"
+    """average: mean of the best candidates of all segments, the article's; utopia: candidate nearest to
+    the utopia point; best: candidate of the lowest norm"""
+    ga: GaSettings = GaSettings()
+    nsga2: Nsga2Settings = Nsga2Settings()
+    cmaes: CmaesSettings = CmaesSettings()
+    pymoo: PymooSettings = PymooSettings()
+    multistart: MultistartSettings = MultistartSettings()
+
+    @property
+    def name(self) -> str:
+        """The algorithm, one of pymoo by its name there."""
+        return self.pymoo.algorithm if self.algorithm == "pymoo" else self.algorithm

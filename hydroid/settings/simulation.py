@@ -1,4 +1,4 @@
-"""How a record is simulated."""
+"""How logs are simulated, and the Slurm jobs that may do it."""
 
 from typing import Annotated, Literal
 
@@ -8,19 +8,33 @@ from hydroid.settings.load import Settings
 
 
 class SimulationSettings(Settings):
-    """How a record is simulated.
-
-    `other_joints` says what the joints do that are neither driven by the log nor compared with it:
-    `locked` leaves them out of the stepped model, exactly; `passive` gives them their own spring and
-    damper, as in the article; `measured` prescribes their logged motion.
-    """
+    """How logs are simulated."""
 
     other_joints: Literal["locked", "passive", "measured"] = "locked"
+    """what joints do that the log does not drive and the fit does not compare. locked: they stand still
+    and are left out of the stepped model, which is exact; passive: they move on their own spring and
+    damper, as in the article; measured: they follow their logged motion"""
     steps_per_sample: Annotated[int, Field(ge=1, le=100)] = 1
-    """MuJoCo steps in one sample of the log"""
+    """MuJoCo steps per sample of the log"""
     threads: Annotated[int, Field(ge=0, le=1024)] = 0
-    """0: one a core"""
+    """number of threads; 0: one per core, or one per worker with --dask"""
     chunk_mib: Annotated[int, Field(ge=1, le=512)] = 128
-    """memory for one chunk of a population [MiB]"""
+    """memory for the part of a population that is simulated at a time [MiB]"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
-    """low-pass of a prescribed motion [Hz]: its second derivative is a torque, and sensors are noisy"""
+    """cutoff of the low-pass filter on motion that joints follow [Hz]; its second derivative becomes a
+    torque"""
+
+
+class ClusterSettings(Settings):
+    """Slurm jobs of `--dask slurm`, with one worker per core; no result depends on them."""
+
+    jobs: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """number of jobs"""
+    cores: Annotated[int, Field(ge=1, le=1024)] = 4
+    """cores of each job"""
+    memory: Annotated[str, Field(pattern=r"^[0-9]+ ?[KMGT]i?B$")] = "4GiB"
+    """memory of each job, such as 4GiB"""
+    walltime: Annotated[str, Field(pattern=r"^([0-9]+-)?[0-9]{1,2}:[0-9]{2}:[0-9]{2}$")] = "01:00:00"
+    """time limit of each job, [days-]hours:minutes:seconds; a new job replaces one that ends"""
+    queue: str | None = None
+    """Slurm's partition; null: the site's default"""

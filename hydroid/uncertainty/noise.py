@@ -15,7 +15,7 @@ from scipy.signal import lfilter, lfiltic
 
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 
 ORDER = 30
 """the highest order that is tried"""

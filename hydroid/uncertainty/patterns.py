@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.settings.fit import MECHANICAL_UNITS
+from hydroid.settings.problem import MECHANICAL_UNITS
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE
 

@@ -16,7 +16,7 @@ from hydroid.problem.problem import Problem
 from hydroid.report.plots.surface import contours
 from hydroid.report.studies import design_table, write_sensitivity
 from hydroid.settings.arm import Arm
-from hydroid.settings.design import DesignSettings
+from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 from hydroid.simulating import simulate_log
 from hydroid.uncertainty.surface import surface

@@ -16,7 +16,8 @@ from hydroid.problem.segments import segment_objectives
 from hydroid.run.folder import RunFolder
 from hydroid.search.least_squares import Ending, Refinement
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings, ParameterSettings
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.problem import ParameterSettings
 from hydroid.uncertainty.covariance import Uncertainty, judge
 from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.jacobian import Jacobian, relative_scale

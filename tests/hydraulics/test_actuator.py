@@ -232,16 +232,6 @@ def test_dry_friction_takes_its_share_of_the_force():
     assert measured.force[0, 0] - needed == pytest.approx(2000.0, rel=0.05)
 
 
-def test_quasi_static_plungers_are_the_limit_of_light_ones():
-    command = pulses(np.random.default_rng(8), 300)
-    fine = HydraulicSettings(substeps=20)
-    quick = HydraulicSettings(substeps=20, plunger_dynamics=False)
-    still = simulate(parameters(quick), command, quick)
-    light = simulate(parameters(fine, plunger_mass=1e-5, plunger_damping=0.05), command, fine)
-    heavy = simulate(parameters(fine), command, fine)
-    assert abs(light - still).max() < 0.1 * abs(heavy - still).max()
-
-
 def test_an_infeasible_member_stands_still_and_harms_nobody():
     p = parameters(TIGHT, stroke_1=np.array([0.8, 13.0, 0.8]))
     command = pulses(np.random.default_rng(9), 200)

@@ -101,6 +101,39 @@ def test_a_log_that_cannot_tell_raises_no_alarm(command: np.ndarray) -> None:
     assert found is None or 0 <= found.lag <= 0.1
 
 
+def stopping_joint(command: np.ndarray, stop_deg: float, delay: int, seed: int) -> Log:
+    """A joint that follows its command at once, 0.5 deg/s per %, between two stops."""
+    q, speed, angle = np.zeros(len(command)), 0.0, 0.0
+    stop = np.deg2rad(stop_deg)
+    for k in range(len(command)):
+        q[k] = angle
+        u = command[k - delay] if k >= delay else 0.0
+        speed += 0.25 * (np.deg2rad(0.5 * u) - speed)
+        angle += 0.01 * speed
+        if abs(angle) > stop:
+            angle, speed = np.clip(angle, -stop, stop), 0.0
+    q += np.deg2rad(0.05) * np.random.default_rng(seed).normal(size=len(q))
+    return Log("stop", np.arange(len(q)) * 0.01, command[:, None], q[:, None], 0.01)
+
+
+@pytest.mark.parametrize("stop_deg", [5, 15, 40])
+@pytest.mark.parametrize("dwell", [100, 200, 400])
+def test_a_joint_at_its_stop_is_not_taken_for_a_delay(stop_deg: float, dwell: int) -> None:
+    """It stands still for most of the log: nothing but its true lag may be said, at any delay."""
+    told = 0
+    for seed in range(4):
+        steps = np.random.default_rng(seed).uniform(-100, 100, 6000 // dwell)
+        squares = 80 * np.sign(np.sin(np.arange(6000) * 0.01 * (1 + 0.3 * seed)))
+        for command in (np.repeat(steps, dwell), squares):
+            for delay in (0, 30):
+                found = suggest_delay(stopping_joint(command, stop_deg, delay, seed), 1)
+                told += found is not None
+                if found is not None:
+                    assert found.sign == 1
+                    assert -0.02 < found.lag - 0.01 * delay < 0.06 or 0 <= found.lag <= 0.1
+    assert told >= 3
+
+
 def test_noise_alone_has_no_delay() -> None:
     log = rig("rig_shoulder_1")
     rng = np.random.default_rng(7)

@@ -18,7 +18,7 @@ from hydroid.errors import ModelError, RunError, SettingsError
 from hydroid.execution import Work, open_executor
 from hydroid.problem.problem import Problem
 from hydroid.problem.spread import SpreadProblem
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 pytest.importorskip("distributed")
 from hydroid.execution.cluster import DaskCluster

@@ -17,7 +17,7 @@ from hydroid.execution import TRIES, Executor, Work, open_executor
 from hydroid.execution.local import LocalPool
 from hydroid.problem.problem import Memo, Problem
 from hydroid.problem.spread import SpreadProblem
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 ROOT = Path(__file__).parents[2]
 SQUARES = [n**2 for n in range(9)]

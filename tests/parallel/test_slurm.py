@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from hydroid.execution import Work, open_executor
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 pytestmark = pytest.mark.skipif(
     shutil.which("sinfo") is None or "SLURM_CONF" not in os.environ,

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from hydroid.errors import SettingsError
 from hydroid.problem.norms import norm, overall_objective, relative_norm
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 
 ORDERS = [1, 2, "inf"]
 

@@ -2,7 +2,7 @@ import pytest
 
 from hydroid.errors import SettingsError
 from hydroid.settings.load import validate
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 
 
 def read(**values):

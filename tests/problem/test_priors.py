@@ -12,7 +12,7 @@ from hydroid.jobs import load_settings
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.priors import REACH, Priors
 from hydroid.problem.problem import Problem
-from hydroid.settings.priors import PriorSettings
+from hydroid.settings.problem import PriorSettings
 from hydroid.settings.search import RefinementSettings
 from hydroid.simulating import simulate_log
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hydroid.errors import SettingsError
 from hydroid.problem.norms import norm
 from hydroid.problem.segments import segment_bounds, segment_objectives
-from hydroid.settings.objective import ObjectiveSettings, SegmentSettings
+from hydroid.settings.problem import ObjectiveSettings, SegmentSettings
 
 PERIOD = 0.01
 

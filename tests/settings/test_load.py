@@ -90,6 +90,49 @@ def test_a_malformed_override_is_refused(text: str):
         parse_override(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("search: {seed: true}\n", "search.seed: must be a whole number (given: True)"),
+        ("search: {seed: 2.0}\n", "search.seed: must be a whole number (given: 2.0)"),
+        ("search: {seed: '3'}\n", "search.seed: must be a whole number (given: '3')"),
+        ("log: {delay_s: false}\n", "log.delay_s: must be a number (given: False)"),
+        ("log: {delay_s: '0.1'}\n", "log.delay_s: must be a number (given: '0.1')"),
+        ("joint_refinement: 1\n", "joint_refinement: must be true or false (given: 1)"),
+        ("joint_refinement: yes\n", "joint_refinement: must be true or false (given: 'yes')"),
+        ("outputs: 2\n", "outputs: must be a list in brackets"),
+        ("outputs: [true]\n", "outputs.0: must be a whole number (given: True)"),
+        ("objective: {weights: {true: 1}}\n", "must be a whole number (given: True)"),
+        ("objective: {norm: true}\n", "objective.norm: must be 1, 2 or 'inf' (given: True)"),
+    ],
+)
+def test_values_of_another_type_are_refused(tmp_path: Path, text: str, says: str):
+    with pytest.raises(SettingsError) as caught:
+        load(written(tmp_path, MINIMAL + text), FitSettings)
+    assert says in str(caught.value)
+
+
+def test_numbers_may_be_written_in_any_way_yaml_knows(tmp_path: Path):
+    text = MINIMAL + "log: {delay_s: 1, repair_s: 1e-1}\nobjective: {weights: {2: 1e3, 3: 2}, norm: .inf}\n"
+    settings = load(written(tmp_path, text), FitSettings, {"objective.weights.4": 5})
+    assert (settings.log.delay_s, settings.log.repair_s) == (1.0, 0.1)
+    assert settings.objective.weights == {2: 1000.0, 3: 2.0, 4: 5.0}
+    assert settings.objective.norm == "inf"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("polish", "refinement"), ("refine", "joint_refinement"), ("known", "priors")]
+)
+def test_a_setting_that_was_renamed_is_refused_with_its_new_name(tmp_path: Path, old: str, new: str):
+    with pytest.raises(SettingsError, match=f"line 7: unknown setting '{old}'; it is now called '{new}'"):
+        load(written(tmp_path, MINIMAL + f"{old}: {{}}\n"), FitSettings)
+
+
+def test_a_misspelt_setting_is_named_before_the_one_that_is_missing_for_it(tmp_path: Path):
+    with pytest.raises(SettingsError, match="unknown setting 'paramters'"):
+        load(written(tmp_path, MINIMAL.replace("parameters", "paramters")), FitSettings)
+
+
 def test_an_unknown_config_lists_the_shipped_ones():
     with pytest.raises(SettingsError, match="fit-mech") as caught:
         find_config("nonsense")

@@ -10,8 +10,8 @@ from hydroid.errors import SettingsError
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
-from hydroid.settings.fit import FitSettings, ParameterSettings
-from hydroid.settings.priors import PriorSettings
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.problem import ParameterSettings, PriorSettings
 from hydroid.uncertainty.covariance import judge, uncertainty
 from hydroid.uncertainty.flags import Flag, ParameterStatus
 from hydroid.uncertainty.intervals import REACH, THRESHOLD, bootstrap, profile

@@ -10,7 +10,7 @@ from hydroid.parameters import Parameter
 from hydroid.report.plots.style import GREY, PALE, REFINED, figure, styled
 from hydroid.report.table import number, plain
 from hydroid.report.words import in_reader_units, norm_label
-from hydroid.settings.objective import ObjectiveSettings
+from hydroid.settings.problem import ObjectiveSettings
 from hydroid.uncertainty.surface import Surface
 
 _LEVELS = 14

@@ -1,10 +1,15 @@
-"""Pydantic's faults in the words of this program."""
+"""Messages for faults that pydantic finds in settings."""
 
 from typing import Any
 
 from pydantic import BaseModel
 
-LONGEST = 60  # characters of a value in a message
+LONGEST = 60
+"""characters of a value in a message"""
+
+RENAMED = {"polish": "refinement", "refine": "joint_refinement", "known": "priors"}
+"""settings of earlier versions, and what they are called now"""
+
 _PLAIN = {
     "bool": "must be true or false",
     "dict": "must be a mapping of settings",
@@ -29,8 +34,10 @@ def explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
         kind: the settings class that was asked for.
     """
     if fault["type"] == "extra_forbidden":
+        if new := RENAMED.get(str(fault["loc"][-1])):
+            return f"unknown setting {shown(key)}; it is now called {new!r}"
         allowed = _allowed(kind, fault["loc"][:-1])
-        return f"unknown setting {shown(key)}" + (f", allowed here: {allowed}" if allowed else "")
+        return f"unknown setting {shown(key)}" + (f"; allowed here: {allowed}" if allowed else "")
     if fault["type"] == "missing":
         return f"setting {key!r} is missing"
     return f"{shown(key)[1:-1] or 'settings'}: {_problem(fault)} (given: {shown(fault['input'])})"
@@ -60,7 +67,7 @@ def _problem(fault: Any) -> str:
 
 
 def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> str:
-    """Names of the settings at `loc`, where the path can be followed through nested classes."""
+    """Names of the settings at `loc`, if the path can be followed through nested classes."""
     for part in loc:
         field = kind.model_fields.get(str(part))
         inner = field.annotation if field else None

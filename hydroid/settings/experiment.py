@@ -1,0 +1,49 @@
+"""Settings of `hydroid design`: what the next experiment may do, and what it is chosen for."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from hydroid.settings.load import JointNumber, Settings
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class DesignSettings(Settings):
+    """Settings of `hydroid design`, the search for the next experiment; a fit does not use them."""
+
+    duration_s: Annotated[float, Field(ge=1, le=3600)] = 60.0
+    """length of the experiment [s]"""
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] | None = None
+    """joints that may be driven; null: the outputs"""
+    poses: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["any"] | None = None
+    """names of the arm's poses to start from; any: also random ones within the ranges; null: all named
+    poses"""
+    command_pct: Annotated[float, Field(gt=0, le=100)] = 100.0
+    """largest command [%]"""
+    dwell_s: tuple[Positive, Positive] = (1.0, 5.0)
+    """shortest and longest time between two changes of a command [s]; the shortest limits the bandwidth"""
+    speed_deg_s: Positive = 30.0
+    """largest joint speed in the simulated experiment [deg/s]"""
+    margin_deg: Annotated[float, Field(ge=0)] = 5.0
+    """smallest distance of the simulated motion from the ends of the joints' ranges [deg]"""
+    criterion: Literal["D", "E"] = "E"
+    """E: make the least precise combination of parameters as precise as possible; D: all on average"""
+    noise_deg: Positive = 0.1
+    """standard deviation of the angles' noise [deg]"""
+    noise_correlation_s: Annotated[float, Field(ge=0)] = 0.0
+    """time in which the noise's autocorrelation falls to 1/e (first order) [s]; 0: white noise"""
+    candidates: Annotated[int, Field(ge=2, le=100_000)] = 40
+    """number of random experiments that the search begins with"""
+    improvements: Annotated[int, Field(ge=0, le=1_000_000)] = 200
+    """number of changes to the best experiment that are then tried"""
+    time_limit_s: Positive = 600.0
+    """time after which the search ends [s]; if it ends so, the result depends on the machine's speed"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "DesignSettings":
+        if not self.dwell_s[0] <= self.dwell_s[1] <= self.duration_s:
+            raise ValueError("dwell_s must be [shortest, longest], not longer than duration_s")
+        if self.joints is not None and len(set(self.joints)) < len(self.joints):
+            raise ValueError("joints: a joint is listed twice")
+        return self

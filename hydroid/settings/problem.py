@@ -1,0 +1,160 @@
+"""What a fit estimates and compares: parameters, priors, and the objectives over segments of the logs."""
+
+import difflib
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from hydroid.settings.hydraulics import QUANTITIES
+from hydroid.settings.load import JointNumber, Settings
+
+Positive = Annotated[float, Field(gt=0)]
+
+MECHANICAL_UNITS = {
+    "gain": "N·m/%",
+    "damping": "N·m·s/rad",
+    "stiffness": "N·m/rad",
+    "friction": "N·m",
+    "mass": "kg",
+}
+
+UNITS = MECHANICAL_UNITS | {q.name: q.unit for q in QUANTITIES.values()}
+"""Quantities that a parameter can be, with their units."""
+
+
+class ParameterSettings(Settings):
+    """One parameter: what it is in the model, where it acts, its bounds, or the value it is held at."""
+
+    quantity: str
+    """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and area_a,
+    area_b, opening_a, opening_b"""
+    joints: tuple[JointNumber, ...] | None = None
+    """joints that share the parameter; null: all"""
+    link: str | None = None
+    """link whose mass the parameter is"""
+    bounds: tuple[float, float] | None = None
+    """lower and upper bound, in the unit of the quantity"""
+    fixed: float | None = None
+    """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "ParameterSettings":
+        if self.quantity not in UNITS:
+            near = difflib.get_close_matches(self.quantity, UNITS, n=3, cutoff=0.4) or list(MECHANICAL_UNITS)
+            raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
+        if (self.quantity == "mass") != (self.link is not None):
+            raise ValueError("a mass names its link, and only a mass does")
+        if self.link is not None and self.joints is not None:
+            raise ValueError("a mass belongs to a link, not to joints")
+        if self.bounds is None and self.fixed is None:
+            raise ValueError("needs bounds: [lower, upper], or fixed: value")
+        if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
+            raise ValueError("bounds must be [lower, upper] with lower < upper")
+        lowest = min(self.bounds or (self.fixed or 0.0,))
+        if self.quantity == "mass" and min(lowest, self.fixed or lowest) <= 0:
+            raise ValueError("a mass must be above 0 kg")
+        if min(lowest, self.fixed or 0.0) < 0:
+            raise ValueError(f"a {self.quantity} cannot be negative")
+        return self
+
+    @property
+    def unit(self) -> str:
+        """The unit of the quantity."""
+        return UNITS[self.quantity]
+
+
+class PriorSettings(Settings):
+    """A prior on a combination of parameters; without a standard deviation it is an exact constraint.
+
+    priors:
+      total mass: {of: [M1, M2, M3, M4, M5, M6], value: 42.5, sd: 0.5}   # their sum
+      forearm:    {of: M5, value: 4.0, sd: 0.4}                          # a Gaussian prior
+      balance:    {of: {M3: 1, M4: -2}, value: 0, sd: 0.5}               # M3 - 2 M4
+      areas:      {ratio: [A_A, A_B], value: 1.333}                      # A_A / A_B
+    """
+
+    of: str | tuple[str, ...] | dict[str, float] | None = None
+    """a parameter, a list of parameters whose sum is meant, or a mapping of parameters to their factors"""
+    ratio: tuple[str, str] | None = None
+    """two parameters: the ratio of the first to the second is meant"""
+    value: float
+    """value of the combination, in the unit of the parameters"""
+    sd: Positive | None = None
+    """standard deviation of the value; null: the constraint is exact"""
+
+    @model_validator(mode="after")
+    def _one(self) -> "PriorSettings":
+        if (self.of is None) == (self.ratio is None):
+            raise ValueError(
+                "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b]"
+            )
+        if isinstance(self.of, tuple) and len(set(self.of)) < len(self.of):
+            raise ValueError("of: a parameter is listed twice")
+        if not self.factors or not any(self.factors.values()):
+            raise ValueError("names no parameter")
+        if self.ratio is not None and self.ratio[0] == self.ratio[1]:
+            raise ValueError("ratio: needs two different parameters")
+        return self
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """Parameters with their factors; of a ratio those of a - value b, which is 0 where it holds."""
+        if self.ratio is not None:
+            return {self.ratio[0]: 1.0, self.ratio[1]: -self.value}
+        if isinstance(self.of, str):
+            return {self.of: 1.0}
+        return self.of if isinstance(self.of, dict) else dict.fromkeys(self.of or (), 1.0)
+
+
+def _name_infinity(value: Any) -> Any:
+    """Accept YAML's own infinity, `.inf`; refuse true, which equals 1."""
+    if isinstance(value, bool):
+        raise ValueError("must be 1, 2 or 'inf'")
+    return "inf" if isinstance(value, float) and value == math.inf else value
+
+
+Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
+
+
+class SegmentSettings(Settings):
+    """How a log is cut into segments, one objective per segment: give exactly one of the first three."""
+
+    equal: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """number of segments of equal length"""
+    turning_points: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """number of segments, cut at the most prominent peaks and troughs of the measured output"""
+    times: tuple[Annotated[float, Field(gt=0)], ...] | None = None
+    """inner cuts, increasing, from the start of the log [s]"""
+    swing: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    """smallest prominence of a turning point, as a fraction of the output's range"""
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> "SegmentSettings":
+        given = [name for name in ("equal", "turning_points", "times") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"give exactly one of equal, turning_points, times, not {' and '.join(given) or 'none'}"
+            )
+        if self.times is not None and any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("times must increase")
+        return self
+
+
+class ObjectiveSettings(Settings):
+    """Norm of the output error, equations (18) and (19), and the segments of equation (21)."""
+
+    norm: Order = "inf"
+    """p of the norm: 1, 2 or inf (the article's choice, table 5)"""
+    relative: bool = False
+    """divide by the norm of the measured output of the same segment, equation (19)"""
+    segments: SegmentSettings = SegmentSettings(equal=8)
+    weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
+    """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
+    pressure_weight: Annotated[float, Field(ge=0)] = 0.0
+    """stage 2: factor that turns a chamber pressure's error into an angle's [deg/bar]; 0: angles only"""
+    noise_deg: Positive | dict[JointNumber, Positive] | None = None
+    """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is
+    estimated from the residuals, with its autocorrelation"""
+    noise_bar: Positive | None = None
+    """standard deviation of the white noise of measured chamber pressures [bar]; null: it is estimated"""

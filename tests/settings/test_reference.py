@@ -1,0 +1,23 @@
+from pathlib import Path
+
+from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.settings.reference import reference, undescribed
+
+PAGE = Path(__file__).parents[2] / "docs" / "settings.md"
+
+
+def test_the_page_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == reference(), "write it again with `make docs`"
+
+
+def test_every_setting_is_described():
+    assert undescribed() == []
+
+
+def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
+    assert len(QUANTITIES) == 35
+    arm = {"area_a", "area_b", "opening_a", "opening_b"}
+    other = {"rotary_volume", "start_pressure", "substeps"}
+    assert set(QUANTITIES) - arm == set(HydraulicSettings.model_fields) - other
+    assert all(q.meaning for q in QUANTITIES.values())
+    assert QUANTITIES["flow_limit"].factor == 1e-3 / 60

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hydroid.log.channels import Channel, Record
-from hydroid.log.finding import Finding
+from hydroid.log.finding import Finding, numbered
 from hydroid.log.log import Floats
+from hydroid.log.signals import Recording, Signal
 from hydroid.settings.log import LogSettings
 
 GAP = 1.5  # a step this many sample periods long lacks a sample
@@ -15,11 +15,13 @@ SLOWEST = 10  # file's period over the wanted one: above, a held command says no
 ROUNDING = 1e-6  # [%], of a scaled command
 
 
-def check_record(record: Record, settings: LogSettings, outputs: Sequence[int]) -> list[Finding]:
-    """Return every fault of the record, in the order in which a user should mend them."""
+def check_recording(
+    record: Recording, settings: LogSettings, outputs: Sequence[int], *, repaired: bool = False
+) -> list[Finding]:
+    """Return every fault of the recording, in the order in which a user should mend them."""
     return [
         *_ragged(record),
-        *_holes(record),
+        *_holes(record, repaired),
         *_time(record, settings),
         *_outside(record),
         *_jumps(record),
@@ -33,35 +35,37 @@ def sample_period(time: Floats) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
 
 
-def _ragged(record: Record) -> Iterator[Finding]:
+def _ragged(record: Recording) -> Iterator[Finding]:
     rows = np.flatnonzero(record.ragged)
     if len(rows):
-        what = f"the row does not have {len(record.table.names)} cells as the header has"
-        yield record.finding("error", what, "mend or delete the line, or fill it with --repair", rows)
+        what = f"the row does not have {len(record.file.names)} cells like the header"
+        yield record.finding("error", what, "correct or delete the line, or use --repair", rows)
 
 
-def _holes(record: Record) -> Iterator[Finding]:
-    for column, channel in enumerate(record.channels):
+def _holes(record: Recording, repaired: bool) -> Iterator[Finding]:
+    for column, signal in enumerate(record.signals):
         rows = np.flatnonzero(np.isnan(record.values[:, column]) & ~record.ragged)
         if not len(rows):
             continue
         text = record.text(rows[0], column)
         what = f"{text[:30]!r} is not a number" if text else "the cell is empty"
-        hint = "mend the cell, or use --repair, which bridges holes up to log.repair_s"
-        if channel.kind == "time":
+        hint = "correct the cell, or use --repair, which fills gaps up to log.repair_s [s]"
+        if repaired:
+            hint = "correct the cell: --repair fills only gaps between samples, up to log.repair_s [s]"
+        if signal.kind == "time":
             hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
-        yield record.finding("error", what, hint, rows, channel)
+        yield record.finding("error", what, hint, rows, signal)
 
 
-def _time(record: Record, settings: LogSettings) -> Iterator[Finding]:
-    channel, rows = record.channels[0], np.flatnonzero(~np.isnan(record.time))
+def _time(record: Recording, settings: LogSettings) -> Iterator[Finding]:
+    signal, rows = record.signals[0], np.flatnonzero(~np.isnan(record.time))
     time, steps = record.time[rows], np.diff(record.time[rows])
     back = rows[1:][steps <= 0]
     if len(back):
         at = np.flatnonzero(steps <= 0)[0]
         what = f"time does not increase: {time[at + 1]:.12g} s follows {time[at]:.12g} s"
         hint = "delete or sort the lines, or log the time with more digits"
-        yield record.finding("error", what, hint, back, channel)
+        yield record.finding("error", what, hint, back, signal)
         return
     duration = time[-1] - time[0] if len(time) else 0.0
     if len(time) < 2 or duration < settings.shortest_s:
@@ -72,15 +76,15 @@ def _time(record: Record, settings: LogSettings) -> Iterator[Finding]:
     period = sample_period(time)
     if period > SLOWEST * settings.period_s:
         what = f"has a sample every {period:.6g} s, at most {SLOWEST * settings.period_s:g} s can be used"
-        yield record.finding("error", what, "log faster, or set log.time.unit if it is wrong", (), channel)
+        yield record.finding("error", what, "log faster, or set log.time.unit if it is wrong", (), signal)
     yield from _steps(record, steps, rows, period, settings.repair_s)
 
 
 def _steps(
-    record: Record, steps: Floats, rows: np.ndarray, period: float, longest: float
+    record: Recording, steps: Floats, rows: np.ndarray, period: float, longest: float
 ) -> Iterator[Finding]:
     """Gaps, and steps that vary; a row without a time counts as a sample here, and is reported for that."""
-    channel, per_row = record.channels[0], steps / np.diff(rows)
+    signal, per_row = record.signals[0], steps / np.diff(rows)
     gaps = np.flatnonzero(steps > (np.diff(rows) - 1 + GAP) * period)
     if len(gaps):
         worst = steps[gaps].max()
@@ -90,67 +94,70 @@ def _steps(
             if worst <= longest * (1 + 1e-9) + period
             else (f"cut the log into two files there (--repair bridges up to log.repair_s: {longest:g})")
         )
-        yield record.finding("error", what, hint, rows[1:][gaps], channel)
+        yield record.finding("error", what, hint, rows[1:][gaps], signal)
         return
     uneven = np.flatnonzero(np.abs(per_row - period) > JITTER * period)
     if len(uneven):
         what = f"sample period varies from {per_row.min():.4g} to {per_row.max():.4g} s around {period:.4g} s"
         yield record.finding(
-            "warning", what, "commands are held and angles interpolated", rows[1:][uneven], channel
+            "warning", what, "commands are held and angles interpolated", rows[1:][uneven], signal
         )
 
 
-def _outside(record: Record) -> Iterator[Finding]:
-    for channel, values in zip(record.channels, record.values.T, strict=True):
-        rounding = ROUNDING if channel.kind == "command" else 0.0
-        rows = np.flatnonzero((values < channel.low - rounding) | (values > channel.high + rounding))
+def _outside(record: Recording) -> Iterator[Finding]:
+    for signal, values in zip(record.signals, record.values.T, strict=True):
+        rounding = ROUNDING if signal.kind == "command" else 0.0
+        rows = np.flatnonzero((values < signal.low - rounding) | (values > signal.high + rounding))
         if not len(rows):
             continue
-        to_unit, unit, hint = _presented(channel)
-        value, low, high = (to_unit * x for x in (values[rows[0]], channel.low, channel.high))
-        what = f"{channel} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
-        yield record.finding("error", what, hint, rows, channel)
+        to_unit, unit, hint = _presented(signal)
+        value, low, high = (to_unit * x for x in (values[rows[0]], signal.low, signal.high))
+        what = f"{signal} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
+        yield record.finding("error", what, hint, rows, signal)
 
 
-def _presented(channel: Channel) -> tuple[float, str, str]:
-    if channel.kind == "command":
+def _presented(signal: Signal) -> tuple[float, str, str]:
+    if signal.kind == "command":
         return 1.0, "%", "correct the cells, or log.command's scale and offset"
-    if channel.kind == "pressure":
+    if signal.kind == "pressure":
         return 1e-5, "bar", "correct the cells, or log.pressure's unit, scale and offset"
     hint = "correct the cells, log.angle's unit, scale and offset, or the joint's range"
     return 180 / np.pi, "deg", hint
 
 
-def _jumps(record: Record) -> Iterator[Finding]:
+def _jumps(record: Recording) -> Iterator[Finding]:
     """A joint without a range is checked by its speed: no arm turns half a turn within one sample."""
-    for channel, values in zip(record.channels, record.values.T, strict=True):
-        if channel.kind != "angle" or np.isfinite(channel.high):
+    for signal, values in zip(record.signals, record.values.T, strict=True):
+        if signal.kind != "angle" or np.isfinite(signal.high):
             continue
         rows = np.flatnonzero(~np.isnan(values))
         steps = np.diff(values[rows])
         far = rows[1:][np.abs(steps) > np.pi]
         if len(far):
             first = np.rad2deg(steps[np.abs(steps) > np.pi][0])
-            what = f"{channel} jumps by {first:.6g} deg from one sample to the next"
+            what = f"{signal} jumps by {first:.6g} deg from one sample to the next"
             yield record.finding(
-                "error", what, "correct the cells, or log.angle's unit and scale", far, channel
+                "error", what, "correct the cells, or log.angle's unit and scale", far, signal
             )
 
 
-def _constant(record: Record, outputs: Sequence[int]) -> Iterator[Finding]:
-    command, angle = record.signals(max((c.joint for c in record.channels), default=0))
-    names = {(c.kind, c.joint): c for c in reversed(record.channels)}
-    for joint in range(1, command.shape[1] + 1):
-        u, q = command[:, joint - 1], angle[:, joint - 1]
-        driven, still = np.nan_to_num(u).any(), _is_constant(q)
-        if ("angle", joint) in names and still and (driven or joint in outputs):
-            what = f"angle of joint {joint} never changes" + (" though it is driven" if driven else "")
-            hint = "check the sensor and the mapping of log.angle"
-            yield record.finding("warning", what, hint, (), names["angle", joint])
-        if ("command", joint) in names and joint in outputs and _is_constant(u):
-            what = f"command of output joint {joint} is constant at {np.nanmax(u):g} %"
-            hint = "one such log alone tells little: fit it together with others"
-            yield record.finding("warning", what, hint, (), names["command", joint])
+def _constant(record: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
+    command, angle = record.motions(max((c.joint for c in record.signals), default=0))
+    names = {(c.kind, c.joint): c for c in reversed(record.signals)}
+    joints = range(1, command.shape[1] + 1)
+    driven = {j for j in joints if np.nan_to_num(command[:, j - 1]).any()}
+    still = [j for j in joints if ("angle", j) in names and _is_constant(angle[:, j - 1])]
+    still = [j for j in still if j in driven or j in outputs]
+    if still:
+        what = f"angle of {numbered(still)} never changes"
+        what += " though it is driven" if len(still) == 1 and still[0] in driven else ""
+        hint = "check the sensor and log.angle"
+        yield record.finding("warning", what, hint, (), names["angle", still[0]])
+    held = [j for j in joints if j in outputs and ("command", j) in names and _is_constant(command[:, j - 1])]
+    if held:
+        what = f"command of {numbered(held)}, whose angle is compared, is constant"
+        hint = "such a log alone says little: fit it together with others"
+        yield record.finding("warning", what, hint, (), names["command", held[0]])
 
 
 def _is_constant(values: Floats) -> bool:

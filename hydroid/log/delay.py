@@ -9,13 +9,13 @@ it lies inside the range of lags and is clearly better than any lag of the oppos
 a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.log.finding import Finding
+from hydroid.log.finding import Finding, numbered
 from hydroid.log.log import Floats, Log
 from hydroid.settings.log import LogSettings
 
@@ -143,23 +143,18 @@ def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]
     findings = list[Finding]()
     if early:
         lag = float(np.median(list(early.values())))
-        what = f"{_named('command', list(early))} looks {lag:.2f} s early against the angle"
+        what = f"command of {numbered(list(early))} looks {lag:.2f} s early against the angle"
         hint = f"set log.delay_s: {settings.delay_s + lag:.2f} if the machine has that transport delay"
         findings.append(Finding("note", what, log.source, hint, column=column(min(early))))
     if late:
         lag = float(np.median(list(late.values())))
-        what = f"{_named('angle', list(late))} moves {-lag:.2f} s before the command, as no machine does"
+        what = f"angle of {numbered(list(late))} moves {-lag:.2f} s before the command, as no machine does"
         hint = f"the log's clocks differ: mend the log, or set log.delay_s: {settings.delay_s + lag:.2f}"
         findings.append(Finding("warning", what, log.source, hint, column=column(min(late))))
     if against:
-        what = f"{_named('angle', against)} moves against the command"
+        what = f"angle of {numbered(against)} moves against the command"
         hint = (
             "give log.command or log.angle a negative scale if the axis or the valve is logged the other way"
         )
         findings.append(Finding("warning", what, log.source, hint, column=column(min(against))))
     return findings
-
-
-def _named(kind: str, joints: Sequence[int]) -> str:
-    numbers = ", ".join(str(joint) for joint in joints)
-    return f"{kind} of joint{'' if len(joints) == 1 else 's'} {numbers}"

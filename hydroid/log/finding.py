@@ -1,6 +1,6 @@
 """One thing that a reader noticed in a log."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,3 +43,8 @@ class Finding:
 
 Warn = Callable[[Finding], None]
 """takes what is odd about a log"""
+
+
+def numbered(joints: Sequence[int]) -> str:
+    """Return "joint 2" or "joints 2, 3"."""
+    return f"joint{'' if len(joints) == 1 else 's'} {', '.join(map(str, joints))}"

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.channels import Channel, Record, map_channels, missing_columns, to_record
-from hydroid.log.checks import check_record, sample_period
+from hydroid.log.checks import check_recording, sample_period
+from hydroid.log.csv_file import open_csv
 from hydroid.log.delay import delay_findings
 from hydroid.log.finding import Finding
 from hydroid.log.log import Floats, Log
 from hydroid.log.repair import fill, unwrap
 from hydroid.log.resample import is_on_grid, resample
-from hydroid.log.table import open_table, read_cells
+from hydroid.log.signals import Recording, Signal, map_signals, missing_columns, read_recording
 from hydroid.log.units import check_units
 from hydroid.settings.log import LogSettings
 
@@ -66,23 +66,26 @@ def check_log(
         The log, None if any finding is an error; and all findings, errors first.
     """
     try:
-        table = open_table(path)
+        file = open_csv(path)
     except LogError as error:
         return None, [Finding("error", error.what, error.where, error.hint)]
-    wanted = map_channels(settings, ranges)
+    wanted = map_signals(settings, ranges)
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:
-        wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in table.names]
-    findings += missing_columns(table, wanted)
-    channels = [channel for channel in wanted if channel.name in table.names]
+        wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in file.names]
+    findings += missing_columns(file, wanted)
+    signals = [signal for signal in wanted if signal.name in file.names]
     log = None
-    if channels and channels[0].kind == "time":
-        cells = read_cells(table, [table.names.index(channel.name) for channel in channels])
-        record, notes = unwrap(to_record(table, channels, cells))
+    if signals and signals[0].kind == "time":
+        record, notes = unwrap(read_recording(file, signals))
         if repair:
             record, repairs = fill(record, settings.repair_s)
             notes += repairs
-        findings += [*notes, *check_record(record, settings, outputs), *check_units(record)]
+        findings += [
+            *notes,
+            *check_recording(record, settings, outputs, repaired=repair),
+            *check_units(record),
+        ]
         if all(finding.level != "error" for finding in findings):
             log, more = _to_log(record, settings, len(ranges))
             findings += more
@@ -90,11 +93,11 @@ def check_log(
 
 
 def _mapping_faults(
-    source: str, settings: LogSettings, wanted: Sequence[Channel], joints: int, outputs: Sequence[int]
+    source: str, settings: LogSettings, wanted: Sequence[Signal], joints: int, outputs: Sequence[int]
 ) -> list[Finding]:
     strangers = [f"log.joints.{joint}" for joint in settings.joints if joint > joints]
     faults = [Finding("error", f"{name}: the arm has joints 1 to {joints}", source) for name in strangers]
-    measured = {channel.joint for channel in wanted if channel.kind == "angle"}
+    measured = {signal.joint for signal in wanted if signal.kind == "angle"}
     for joint in outputs:
         if joint not in measured:
             what = f"output joint {joint} has no angle column"
@@ -102,8 +105,8 @@ def _mapping_faults(
     return faults
 
 
-def _to_log(record: Record, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
-    command, angle = record.signals(joints)
+def _to_log(record: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
+    command, angle = record.motions(joints)
     pressure, period = record.pressures(joints), settings.period_s
     measured = angle if pressure is None else np.column_stack([angle, pressure.reshape(len(angle), -1)])
     time, command, measured = resample(
@@ -111,14 +114,12 @@ def _to_log(record: Record, settings: LogSettings, joints: int) -> tuple[Log, li
     )
     if pressure is not None:
         pressure = measured[:, joints:].reshape(-1, joints, 2)
-    log = Log(record.table.source, time, command, measured[:, :joints], period, pressure)
+    log = Log(record.file.source, time, command, measured[:, :joints], period, pressure)
     findings = list[Finding]()
     if not is_on_grid(record.time, period):
         what = f"resampled from {sample_period(record.time):.6g} s to {period:g} s"
         findings.append(record.finding("note", what, "commands held, angles interpolated"))
     if not log.driven.any():
         findings.append(record.finding("warning", "no joint is driven", "check log.command"))
-    columns = {
-        channel.joint: channel.name for channel in reversed(record.channels) if channel.kind == "command"
-    }
+    columns = {signal.joint: signal.name for signal in reversed(record.signals) if signal.kind == "command"}
     return log, findings + delay_findings(log, settings, columns.__getitem__)

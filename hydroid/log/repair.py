@@ -4,33 +4,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.log.channels import Record
 from hydroid.log.checks import GAP, sample_period
 from hydroid.log.finding import Finding
 from hydroid.log.log import Floats
+from hydroid.log.signals import Recording
 
 TURN = 2 * np.pi
 MOST_ADDED = 2  # times the rows there are: a record with more holes than samples is not repaired
 NEAR_TURN = np.pi / 4  # a wrap differs from a whole turn by what the joint moves within one sample
 
 
-def unwrap(record: Record) -> tuple[Record, list[Finding]]:
+def unwrap(record: Recording) -> tuple[Recording, list[Finding]]:
     """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
     values, notes = record.values.copy(), list[Finding]()
-    for column, channel in enumerate(record.channels):
-        if channel.kind != "angle" or np.isfinite(channel.high):
+    for column, signal in enumerate(record.signals):
+        if signal.kind != "angle" or np.isfinite(signal.high):
             continue
         rows = np.flatnonzero(~np.isnan(values[:, column]))
         steps = np.diff(values[rows, column])
         wraps = np.abs(np.abs(steps) - TURN) < NEAR_TURN
         if wraps.any():
             values[rows[1:], column] -= TURN * np.cumsum(np.sign(steps) * wraps)
-            what = f"{channel} wraps by 360 deg; its turns are counted on"
-            notes.append(record.finding("note", what, "", rows[1:][wraps], channel))
+            what = f"{signal} wraps by 360 deg; its turns are counted on"
+            notes.append(record.finding("note", what, "", rows[1:][wraps], signal))
     return replace(record, values=values), notes
 
 
-def fill(record: Record, longest: float) -> tuple[Record, list[Finding]]:
+def fill(record: Recording, longest: float) -> tuple[Recording, list[Finding]]:
     """Fill holes: angles interpolated, commands held, dropped samples put back.
 
     Args:
@@ -47,8 +47,8 @@ def fill(record: Record, longest: float) -> tuple[Record, list[Finding]]:
     reach = longest * (1 + 1e-9) + period
     record, added = _insert(record, period, reach)
     values = record.values.copy()
-    for column, channel in enumerate(record.channels[1:], 1):
-        _bridge(record.time, values[:, column], reach, held=channel.kind == "command")
+    for column, signal in enumerate(record.signals[1:], 1):
+        _bridge(record.time, values[:, column], reach, held=signal.kind == "command")
     filled = np.isnan(record.values) & ~np.isnan(values) & ~added[:, None]
     record = replace(record, values=values)
     cells, samples = int(filled.sum()), int(added.sum())
@@ -57,13 +57,11 @@ def fill(record: Record, longest: float) -> tuple[Record, list[Finding]]:
     lines = [*record.lines[filled.any(axis=1) | added][:1], *first]
     what = f"repaired: {_count(cells, 'missing cell')} filled, {_count(samples, 'dropped sample')} put back"
     what += f", {_count(lost, 'row')} without a time left out" if lost else ""
-    note = Finding(
-        "warning", what, record.table.source, "angles interpolated, commands held", int(min(lines))
-    )
+    note = Finding("warning", what, record.file.source, "angles interpolated, commands held", int(min(lines)))
     return record, [note]
 
 
-def _insert(record: Record, period: float, reach: float) -> tuple[Record, np.ndarray]:
+def _insert(record: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:
     """Put rows of NaN where samples are missing; also returns which rows are new, shape (R,)."""
     steps = np.diff(record.time)
     gaps = (steps > GAP * period) & (steps <= reach)

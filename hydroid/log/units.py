@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hydroid.log.channels import Record
 from hydroid.log.finding import Finding
 from hydroid.log.log import Floats
+from hydroid.log.signals import Recording
 
 FRACTION = 1.0  # [%]: no valve of a manipulator opens by this little
 MOVES = 3.0  # [deg] in the mean over WINDOW: more than noise and settling make
@@ -17,11 +17,11 @@ LEAST = 300.0  # [% s] of strong command before its effect is judged
 SLOWEST = 0.015  # [deg/(% s)]: 1.5 deg/s at full command; the rig's slowest joint turns 16 times as fast
 
 
-def check_units(record: Record) -> Iterator[Finding]:
+def check_units(record: Recording) -> Iterator[Finding]:
     """Suspect units where the arm's motion does not go with them; silent wherever it can be otherwise."""
     if np.isnan(record.values).any() or len(record.time) < 2 or (np.diff(record.time) <= 0).any():
         return  # has faults to be mended first
-    command, angle = record.signals(max((c.joint for c in record.channels), default=0))
+    command, angle = record.motions(max((c.joint for c in record.signals), default=0))
     angle = np.rad2deg(angle)
     driven = np.flatnonzero(command.any(axis=0) & ~np.isnan(angle[0]))
     if not len(driven):
@@ -36,23 +36,23 @@ def check_units(record: Record) -> Iterator[Finding]:
         )
 
 
-def _fractions(record: Record, driven: np.ndarray, moved: Floats) -> Iterator[Finding]:
+def _fractions(record: Recording, driven: np.ndarray, moved: Floats) -> Iterator[Finding]:
     most = int(moved.argmax())
     if moved[most] > MOVES:
         joint = int(driven[most]) + 1
         what = f"no command exceeds {FRACTION:g} %, yet joint {joint} turns by {moved[most]:.3g} deg"
         hint = "if commands are fractions from -1 to 1, set log.command.scale: 100"
-        channel = next(c for c in record.channels if c.kind == "command" and c.joint == joint)
-        yield record.finding("warning", what, hint, (), channel)
+        signal = next(c for c in record.signals if c.kind == "command" and c.joint == joint)
+        yield record.finding("warning", what, hint, (), signal)
 
 
-def _radians(record: Record, driven: np.ndarray, push: Floats, path: Floats) -> Iterator[Finding]:
+def _radians(record: Recording, driven: np.ndarray, push: Floats, path: Floats) -> Iterator[Finding]:
     judged = push > LEAST
     if judged.any() and ((path > 0) & (path < SLOWEST * push))[judged].all():
         joint = int(driven[judged][0]) + 1
         what = f"no angle exceeds {HALF_TURN:g} deg, and joint {joint} hardly follows strong commands"
-        channel = next(c for c in record.channels if c.kind == "angle" and c.joint == joint)
-        yield record.finding("warning", what, "if angles are in rad, set log.angle.unit: rad", (), channel)
+        signal = next(c for c in record.signals if c.kind == "angle" and c.joint == joint)
+        yield record.finding("warning", what, "if angles are in rad, set log.angle.unit: rad", (), signal)
 
 
 def _means(time: Floats, angle: Floats) -> Floats:

@@ -61,8 +61,11 @@ def test_a_long_hole_is_not_repaired(tmp_path: Path) -> None:
 def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
     table = lines(cells())
     table[1][1] = table[-1][3] = ""
-    found = {(fault.line, fault.column) for fault in faults(save(tmp_path / "log.csv", table), repair=True)}
-    assert found == {(2, "u1_pct"), (81, "q1_deg")}
+    path = save(tmp_path / "log.csv", table)
+    found = faults(path, repair=True)
+    assert {(fault.line, fault.column) for fault in found} == {(2, "u1_pct"), (81, "q1_deg")}
+    assert all("fills only gaps between samples" in fault.hint for fault in found)
+    assert all("or use --repair" in fault.hint for fault in faults(path))
 
 
 def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:

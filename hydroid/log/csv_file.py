@@ -7,9 +7,7 @@ comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, q
 import codecs
 import csv
 import re
-from array import array
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -22,11 +20,10 @@ from hydroid.log.log import Floats
 
 MAX_BYTES = 2**28
 MAX_LINE = 100_000  # characters; also below the csv module's own limit for one cell
-_NAN = float("nan")
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvFile:
     """The lines of a file and its header.
 
     Attributes:
@@ -49,22 +46,7 @@ class Table:
         return cells[column].strip() if column < len(cells) else ""
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """The numbers of some columns.
-
-    Attributes:
-        values: shape (T, columns), NaN where a cell holds no number and in ragged rows.
-        lines: line number of each row [1-based], shape (T,).
-        ragged: rows with more or fewer cells than the header, shape (T,).
-    """
-
-    values: Floats
-    lines: NDArray[np.int64]
-    ragged: NDArray[np.bool_]
-
-
-def open_table(path: Path) -> Table:
+def open_csv(path: Path) -> CsvFile:
     """Read a file and find its header.
 
     Raises:
@@ -89,27 +71,43 @@ def open_table(path: Path) -> Table:
     if all(_is_number(name.replace(",", ".")) for name in names if name):
         hint = "write the columns' names above it (a line that starts with # is a comment)"
         raise LogError("has no header: this line holds numbers", where=f"{source}, line {header}", hint=hint)
-    return Table(source, lines, header, names, separator)
+    return CsvFile(source, lines, header, names, separator)
 
 
-def read_cells(table: Table, columns: Sequence[int]) -> Cells:
-    """Read the numbers of the given columns; what is no number becomes NaN."""
-    width, separator = len(table.names), table.separator
-    values, lines, ragged = array("d"), array("q"), array("b")
-    hole = [_NAN] * len(columns)
-    for number in range(table.header, len(table.lines)):
-        line = table.lines[number]
-        if not _is_content(line, separator):
-            continue
-        if separator != ",":
-            line = line.replace(",", ".")  # decimal commas
-        cells = _split(line, separator)
-        torn = len(cells) < width or (len(cells) > width and any(map(str.strip, cells[width:])))
-        values.extend(hole if torn else _numbers([cells[column] for column in columns], "_" in line))
-        lines.append(number + 1)
-        ragged.append(torn)
-    shape = (len(lines), len(columns))
-    return Cells(np.array(values).reshape(shape), np.array(lines, np.int64), np.array(ragged, np.bool_))
+def read_cells(file: CsvFile, columns: Sequence[int]) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
+    """Read the numbers of the given columns.
+
+    Returns:
+        Numbers, shape (R, columns), NaN where a cell holds none and in ragged rows; the line of each row
+        [1-based], shape (R,); and which rows have more or fewer cells than the header, shape (R,).
+    """
+    width, separator = len(file.names), file.separator
+    below = range(file.header, len(file.lines))
+    numbers = [k for k in below if _is_content(file.lines[k], separator)]
+    rows = [file.lines[k] for k in numbers]
+    lines = np.array(numbers, np.int64) + 1
+    if separator != ",":
+        rows = [row.replace(",", ".") for row in rows]  # decimal commas
+    values = _plain_numbers(rows, columns, width, separator)
+    if values is not None:
+        return values, lines, np.zeros(len(lines), bool)
+    values, ragged = np.full((len(rows), len(columns)), np.nan), np.zeros(len(rows), bool)
+    for k, row in enumerate(rows):
+        cells = _split(row, separator)
+        ragged[k] = len(cells) < width or (len(cells) > width and any(map(str.strip, cells[width:])))
+        if not ragged[k]:
+            values[k] = [_number(cells[column]) for column in columns]
+    return values, lines, ragged
+
+
+def _plain_numbers(rows: Sequence[str], columns: Sequence[int], width: int, separator: str) -> Floats | None:
+    """Read all rows at once; None where a row or a cell is unusual and must be looked at by itself."""
+    if not rows or any(row.count(separator) != width - 1 or '"' in row or "_" in row for row in rows):
+        return None
+    try:
+        return np.loadtxt(rows, delimiter=separator, usecols=columns, comments=None, ndmin=2)
+    except ValueError:
+        return None
 
 
 _IS_CSV = "a log is a CSV file with a header, one row a sample"
@@ -155,16 +153,8 @@ def _split(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
-def _numbers(cells: Sequence[str], grouped: bool) -> list[float]:
-    """All at once, or one by one where any may be none."""
-    if not grouped:
-        with suppress(ValueError):
-            return [*map(float, cells)]
-    return [_number(cell) for cell in cells]
-
-
 def _number(cell: str) -> float:
-    return float(cell) if _is_number(cell) else _NAN
+    return float(cell) if _is_number(cell) else float("nan")
 
 
 def _is_number(cell: str) -> bool:

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.log.csv_file import CsvFile, read_cells
 from hydroid.log.finding import Finding
 from hydroid.log.log import Floats
-from hydroid.log.table import Cells, Table
 from hydroid.settings.log import LogSettings
 
 _LISTED = 40  # column names in a message
@@ -20,7 +20,7 @@ _PRESSURES = (-5e5, 2e8)  # [Pa]: a sensor may be off by its offset, and no hydr
 
 
 @dataclass(frozen=True)
-class Channel:
+class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa].
 
     Attributes:
@@ -47,19 +47,19 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
-    """The used columns of one file, R rows of C channels, time first.
+class Recording:
+    """The used columns of one file, R rows of C signals, time first.
 
     Attributes:
         table: the file.
-        channels: C of them.
+        signals: C of them.
         values: [s, %, rad], shape (R, C), NaN where the file holds no number.
         lines: line of each row [1-based], shape (R,).
         ragged: rows whose number of cells is wrong, shape (R,).
     """
 
-    table: Table
-    channels: tuple[Channel, ...]
+    file: CsvFile
+    signals: tuple[Signal, ...]
     values: Floats
     lines: NDArray[np.int64]
     ragged: NDArray[np.bool_]
@@ -75,104 +75,105 @@ class Record:
         what: str,
         hint: str = "",
         rows: Sequence[int] | NDArray[np.int64] = (),
-        channel: Channel | None = None,
+        signal: Signal | None = None,
     ) -> Finding:
         """Make a finding at the first of `rows`; further ones are counted."""
         if len(rows) > 1:
             last = self.lines[rows[-1]]
             what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to line {last})"
         line = int(self.lines[rows[0]]) if len(rows) else None
-        return Finding(level, what, self.table.source, hint, line, channel.name if channel else "")
+        return Finding(level, what, self.file.source, hint, line, signal.name if signal else "")
 
     def text(self, row: int, column: int) -> str:
-        """Return the cell of a row and a channel as it stands in the file."""
-        name = self.channels[column].name
-        return self.table.text(int(self.lines[row]), self.table.names.index(name))
+        """Return the cell of a row and a signal as it stands in the file."""
+        name = self.signals[column].name
+        return self.file.text(int(self.lines[row]), self.file.names.index(name))
 
-    def signals(self, joints: int) -> tuple[Floats, Floats]:
+    def motions(self, joints: int) -> tuple[Floats, Floats]:
         """Return command [%] and angle [rad], shapes (R, J): 0 where undriven, NaN where unmeasured."""
         command = np.zeros((len(self.values), joints))
         angle = np.full((len(self.values), joints), np.nan)
-        for channel, values in zip(self.channels, self.values.T, strict=True):
-            if channel.kind == "command":
-                command[:, channel.joint - 1] += channel.sign * values
-            elif channel.kind == "angle":
-                angle[:, channel.joint - 1] = values
+        for signal, values in zip(self.signals, self.values.T, strict=True):
+            if signal.kind == "command":
+                command[:, signal.joint - 1] += signal.sign * values
+            elif signal.kind == "angle":
+                angle[:, signal.joint - 1] = values
         return command, angle
 
     def pressures(self, joints: int) -> Floats | None:
         """Return chamber pressures [Pa], shape (R, J, 2), NaN where unmeasured; None: there are none."""
         pressure = np.full((len(self.values), joints, 2), np.nan)
-        measured = [(c, v) for c, v in zip(self.channels, self.values.T, strict=True) if c.kind == "pressure"]
-        for channel, values in measured:
-            pressure[:, channel.joint - 1, channel.chamber] = values
+        measured = [(c, v) for c, v in zip(self.signals, self.values.T, strict=True) if c.kind == "pressure"]
+        for signal, values in measured:
+            pressure[:, signal.joint - 1, signal.chamber] = values
         return pressure if measured else None
 
 
-def map_channels(settings: LogSettings, ranges: Floats) -> list[Channel]:
-    """Return the channels that the settings ask for, time first.
+def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
+    """Return the signals that the settings ask for, time first.
 
     Args:
         settings: the mapping.
         ranges: of the joints [rad], shape (J, 2), ∓inf for a continuous joint.
     """
-    channels = [Channel(settings.time.column, "time", gain=1e-3 if settings.time.unit == "ms" else 1.0)]
+    signals = [Signal(settings.time.column, "time", gain=1e-3 if settings.time.unit == "ms" else 1.0)]
     margin = np.deg2rad(settings.angle_margin_deg)
     for joint in range(1, len(ranges) + 1):
         if command := settings.command_of(joint):
             signs = zip(command.column, (1, -1), strict=False)
             lowest = -100.0 if len(command.column) == 1 else 0.0
-            one = Channel("", "command", joint, command.scale, command.offset, lowest, 100.0)
-            channels += [replace(one, name=name, sign=sign) for name, sign in signs]
+            one = Signal("", "command", joint, command.scale, command.offset, lowest, 100.0)
+            signals += [replace(one, name=name, sign=sign) for name, sign in signs]
     for joint, (low, high) in enumerate(ranges, 1):
         if angle := settings.angle_of(joint):
             unit = np.pi / 180 if angle.unit == "deg" else 1.0
             gain, offset = angle.scale * unit, angle.offset * unit
-            channels.append(Channel(angle.column, "angle", joint, gain, offset, low - margin, high + margin))
+            signals.append(Signal(angle.column, "angle", joint, gain, offset, low - margin, high + margin))
     for joint in range(1, len(ranges) + 1):
         if pressure := settings.pressure_of(joint):
             unit = {"bar": 1e5, "Pa": 1.0, "MPa": 1e6}[pressure.unit]
-            one = Channel("", "pressure", joint, pressure.scale * unit, pressure.offset * unit, *_PRESSURES)
-            channels += [replace(one, name=name, chamber=k) for k, name in enumerate(pressure.column)]
-    return channels
+            one = Signal("", "pressure", joint, pressure.scale * unit, pressure.offset * unit, *_PRESSURES)
+            signals += [replace(one, name=name, chamber=k) for k, name in enumerate(pressure.column)]
+    return signals
 
 
-def missing_columns(table: Table, wanted: Sequence[Channel]) -> list[Finding]:
+def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
     """Return what keeps the mapping from being used on this file: columns that lack or are ambiguous."""
     findings: list[Finding] = []
-    lacking = [channel for channel in wanted if channel.name not in table.names]
+    lacking = [signal for signal in wanted if signal.name not in file.names]
     if lacking:
-        free = sorted(set(table.names).difference(channel.name for channel in wanted))
+        free = sorted(set(file.names).difference(signal.name for signal in wanted))
         first = lacking[:_LACKING]
-        names = ", ".join(f"{channel.name!r} ({channel}{_hint(channel.name, free)})" for channel in first)
+        names = ", ".join(f"{signal.name!r} ({signal}{_hint(signal.name, free)})" for signal in first)
         names += f" and {len(lacking) - _LACKING} more" if len(lacking) > _LACKING else ""
-        have = [name for name in table.names if name]
+        have = [name for name in file.names if name]
         more = f" and {len(have) - _LISTED} more" if len(have) > _LISTED else ""
         hint = (
             f"it has: {', '.join(have[:_LISTED])}{more}; set log.time, log.command, log.angle or log.joints, "
             "where null says that a joint is not in the log"
         )
         what = f"has no column {names}"
-        findings.append(Finding("error", what, table.source, hint, table.header, lacking[0].name))
-    for name, count in Counter(table.names).items():
-        if count > 1 and any(channel.name == name for channel in wanted):
+        findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
+    for name, count in Counter(file.names).items():
+        if count > 1 and any(signal.name == name for signal in wanted):
             what = f"has {count} columns of this name"
-            findings.append(Finding("error", what, table.source, "rename all but one", table.header, name))
-    for name, count in Counter(channel.name for channel in wanted).items():
+            findings.append(Finding("error", what, file.source, "rename all but one", file.header, name))
+    for name, count in Counter(signal.name for signal in wanted).items():
         if count > 1:
-            users = " and ".join(str(channel) for channel in wanted if channel.name == name)
+            users = " and ".join(str(signal) for signal in wanted if signal.name == name)
             what, hint = f"one column cannot be {users}", "mend log.joints in the config"
-            findings.append(Finding("error", what, table.source, hint, table.header, name))
+            findings.append(Finding("error", what, file.source, hint, file.header, name))
     return findings
 
 
-def to_record(table: Table, channels: Sequence[Channel], cells: Cells) -> Record:
-    """Scale the cells to SI; a number too large to reckon with counts as none."""
-    gain, offset = (np.array([getattr(c, name) for c in channels]) for name in ("gain", "offset"))
+def read_recording(file: CsvFile, signals: Sequence[Signal]) -> Recording:
+    """Read the cells of the signals and scale them to SI; a number that is too large counts as none."""
+    cells, lines, ragged = read_cells(file, [file.names.index(signal.name) for signal in signals])
+    gain, offset = (np.array([getattr(c, name) for c in signals]) for name in ("gain", "offset"))
     with np.errstate(all="ignore"):
-        values = cells.values * gain + offset
+        values = cells * gain + offset
         values[~(np.abs(values) < 1e100)] = np.nan
-    return Record(table, tuple(channels), values, cells.lines, cells.ragged)
+    return Recording(file, tuple(signals), values, lines, ragged)
 
 
 def _hint(name: str, names: Sequence[str]) -> str:

@@ -64,7 +64,7 @@ kill-resume: setup  ## 100 runs killed at random moments, resumed, and compared 
 	$(BIN)/python benchmarks/kill_resume.py
 
 slurm: setup  ## the cluster scripts on a real Slurm on this machine (Debian, root); says so where there can be none
-	.ci/slurm $(BIN)/pytest tests/test_cluster_slurm.py
+	.ci/slurm $(BIN)/pytest tests/parallel/test_slurm.py
 
 wheel: setup  ## the wheel in an empty environment, run from an empty folder
 	PYTHON=$(BIN)/python sh .ci/wheel

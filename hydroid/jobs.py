@@ -22,8 +22,7 @@ from hydroid.fitting.validation import ErrorIndices, error_indices
 from hydroid.identified import load_identified
 from hydroid.log import Finding, Log, Warn, check_log, read_log
 from hydroid.parameters import Array
-from hydroid.problem.problem import Problem
-from hydroid.problem.spread import SpreadProblem
+from hydroid.problem.problem import Problem, Spread
 from hydroid.report.write import write_report
 from hydroid.run.folder import RunFolder
 from hydroid.run.run_log import log_end, log_start
@@ -76,7 +75,7 @@ def fit_logs(
     *,
     resume: bool = False,
     repair: bool = False,
-    executor: Executor | None = None,
+    spread: Spread | None = None,
 ) -> tuple[Problem, Fit]:
     """Fit one run: logs in, a run folder out.
 
@@ -88,7 +87,7 @@ def fit_logs(
         warn: takes what is odd about the logs.
         resume: go on where a run in `out` stopped; without one, begin.
         repair: fill short gaps of the logs.
-        executor: workers that simulate; None: this process.
+        spread: workers that simulate; None: this process.
 
     Raises:
         HydroidError: what the user can mend.
@@ -98,7 +97,7 @@ def fit_logs(
     logs = read_logs(paths, settings, findings.append, repair)
     for finding in findings:
         warn(finding)
-    problem = Problem(settings, logs) if executor is None else SpreadProblem(settings, logs, executor)
+    problem = Problem(settings, logs, spread)
     folder = RunFolder(out)
     if not folder.exists:
         check_search(problem)

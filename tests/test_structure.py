@@ -14,7 +14,7 @@ LAYERS = [
     {"estimate"},
     {"identified"},
     {"log", "arm", "hydraulics"},
-    {"simulation", "search", "execution", "parallel"},
+    {"simulation", "search", "parallel"},
     {"problem"},
     {"plant"},
     {"uncertainty"},
@@ -72,9 +72,9 @@ def test_the_search_knows_no_robot():
         assert "mujoco" not in text or path.name == "least_squares.py", path
 
 
-def test_the_execution_knows_no_robot():
-    for path in (ROOT / "execution").glob("*.py"):
-        assert imported_rooms(path) <= {"errors", "settings", "execution"}, path
+def test_the_workers_know_no_robot():
+    for path in (ROOT / "parallel").glob("*.py"):
+        assert imported_rooms(path) <= {"errors", "settings", "parallel"}, path
 
 
 def test_the_command_line_imports_nothing_heavy():

@@ -5,7 +5,19 @@ from typing import Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Dask, Json, Quiet, Repair, Set, Verbose, Workers, overrides, warn
+from hydroid.cli.options import (
+    Config,
+    Dask,
+    DaskInsecure,
+    Json,
+    Quiet,
+    Repair,
+    Set,
+    Verbose,
+    Workers,
+    overrides,
+    warn,
+)
 
 Logs = Annotated[
     list[Path] | None,
@@ -24,7 +36,8 @@ Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-ST
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run in --out, or begin it.")]
 Refinement = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
 Threads = Annotated[
-    int | None, typer.Option(min=0, max=1024, help="Threads; 0: one a core, or one a worker.")
+    int | None,
+    typer.Option(min=0, max=1024, help="Number of threads (0: one per core; one per worker with --dask)."),
 ]
 
 
@@ -38,8 +51,9 @@ def fit_mech(
     resume: Resume = False,
     refinement: Refinement = None,
     threads: Threads = None,
-    workers: Workers = None,
     dask: Dask = None,
+    dask_insecure: DaskInsecure = False,
+    workers: Workers = None,
     setting: Set = None,
     repair: Repair = False,
     json: Json = False,
@@ -66,8 +80,8 @@ def fit_mech(
         quiet=quiet,
         verbose=verbose,
         warn=warn,
-        workers=workers,
         dask=dask,
+        dask_insecure=dask_insecure,
     )
 
 
@@ -88,8 +102,9 @@ def fit_hyd(
         bool | None, typer.Option(help="Then refinement both stages' parameters together.")
     ] = None,
     threads: Threads = None,
-    workers: Workers = None,
     dask: Dask = None,
+    dask_insecure: DaskInsecure = False,
+    workers: Workers = None,
     setting: Set = None,
     repair: Repair = False,
     json: Json = False,
@@ -120,8 +135,8 @@ def fit_hyd(
         quiet=quiet,
         verbose=verbose,
         warn=warn,
-        workers=workers,
         dask=dask,
+        dask_insecure=dask_insecure,
     )
 
 

@@ -25,16 +25,29 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace one setting, such as search.ga.generations=80."),
 ]
-Workers = Annotated[
-    int | None,
-    typer.Option(min=1, max=1024, metavar="N", help="Simulate in N processes; the result is the same."),
-]
 Dask = Annotated[
     str | None,
     typer.Option(
-        metavar="ADDRESS|slurm", help="Simulate on a Dask cluster, or on Slurm jobs (the settings' cluster)."
+        metavar="local[:N]|slurm|ADDRESS",
+        help="Simulate in N processes of this machine, in Slurm jobs (settings: cluster), or on the workers "
+        "of a Dask scheduler (address or scheduler file). The result is the same.",
     ),
 ]
+DaskInsecure = Annotated[
+    bool,
+    typer.Option(
+        "--dask-insecure",
+        help="Accept a --dask address without TLS: anyone who reaches its port can run code as you.",
+    ),
+]
+
+
+def _renamed(value: str | None) -> None:
+    if value is not None:
+        raise typer.BadParameter(f"is now --dask local:{value}")
+
+
+Workers = Annotated[str | None, typer.Option("--workers", hidden=True, callback=_renamed)]
 FitDir = Annotated[
     Path | None, typer.Option("--fit", metavar="DIR", help="Run folder of a fit: its estimate and settings.")
 ]

@@ -10,10 +10,10 @@ import typer
 from hydroid.cli.progress import Progress
 from hydroid.cli.terminal import shown
 from hydroid.errors import RunError, SettingsError
-from hydroid.execution import open_executor
 from hydroid.fitting.fit import Fit
 from hydroid.jobs import fit_logs, load_settings, mechanical_values
 from hydroid.log import Warn
+from hydroid.parallel.cluster import open_workers
 from hydroid.problem.problem import Problem
 from hydroid.report import words
 from hydroid.report.tables import parameter_table
@@ -37,8 +37,8 @@ def run_fits(
     quiet: bool,
     verbose: bool,
     warn: Warn,
-    workers: int | None = None,
     dask: str | None = None,
+    dask_insecure: bool = False,
 ) -> None:
     """Fit over one seed or several and print the tables, or JSON."""
     settings = load_settings(config, changes)
@@ -47,14 +47,14 @@ def run_fits(
     out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.name}"
     results: list[tuple[int, Problem, Fit]] = []
     warn = _silent if verbose else warn  # the log has them
-    with shown(verbose, quiet), open_executor(workers, dask, settings.cluster) as executor:
+    with shown(verbose, quiet), open_workers(dask, settings.cluster, insecure=dask_insecure) as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):
             search = settings.search.model_copy(update={"seed": seed})
             seeded = settings.model_copy(update={"search": search})
             folder = out / f"seed-{seed}" if runs > 1 else out
             options = {"resume": resume, "repair": repair}
             with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
-                problem, fit = fit_logs(seeded, logs, folder, progress, warn, **options, executor=executor)
+                problem, fit = fit_logs(seeded, logs, folder, progress, warn, **options, spread=workers)
             results.append((seed, problem, fit))
             warn = _silent  # the logs are the same for every seed
     table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])

@@ -1,12 +1,14 @@
 """The estimation problem: parameters in, objectives out (equations (17) to (22)).
 
-Evaluating a population is one function, `Problem.evaluate`, behind which threads, processes or a
-cluster may stand; the search knows only its arrays.
+Evaluating a population is one function, `Problem.evaluate`; the search knows only its arrays. Candidates are
+simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -42,12 +44,22 @@ class Evaluation:
         return len(self.overall)
 
 
+class Spread(Protocol):
+    """Computes rows of candidates on workers (`DaskWorkers`)."""
+
+    def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
+        """Apply `target.method`, (m, P) -> (m, columns), to the rows of theta; NaN where no worker can."""
+        ...
+
+
 class Problem:
     """Logs, the model that is to reproduce them, and how the difference is measured.
 
     Args:
         settings: the fit's settings.
         logs: one or more records, each with its own start pose.
+        spread: where candidates are simulated; None: in this process. A worker has `simulation.threads`
+            threads, one where that is 0.
 
     Attributes:
         channels: what is compared, in the order of a row of residuals.
@@ -56,10 +68,11 @@ class Problem:
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
-    def __init__(self, settings: FitSettings, logs: Sequence[Log]) -> None:
+    def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: Spread | None = None) -> None:
         spec = load_model(settings.arm.model, settings.arm)
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
+        self._spread = spread
         self.stage = Stage(settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
@@ -77,13 +90,13 @@ class Problem:
 
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
-        return Problem(self.settings.freed(), self.logs)
+        return Problem(self.settings.freed(), self.logs, self._spread)
 
     def first(self, seconds: float) -> "Problem":
         """Return the same problem up to so long after each log's first command, in one segment a channel."""
         objective = self.settings.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
         settings = self.settings.model_copy(update={"objective": objective})
-        return Problem(settings, [log.first(seconds) for log in self.logs])
+        return Problem(settings, [log.first(seconds) for log in self.logs], self._spread)
 
     def theta(self, unit: Array) -> Array:
         """Return parameter sets, (n, P), from points of the unit box, moved to where what is known holds."""
@@ -91,17 +104,31 @@ class Problem:
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
+        if self._spread is None:
+            values = self.objectives(theta)
+        else:
+            values = self._spread(self._on_worker, "objectives", theta, len(self.bounds) + 1)
+            values[np.isnan(values)] = np.inf
+        return Evaluation(values[:, :-1], values[:, -1])
+
+    def objectives(self, theta: Array) -> Array:
+        """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""
         how = self.settings.objective
-        segments = np.empty((len(theta), len(self.bounds)))
-        overall = np.empty(len(theta))
+        values = np.empty((len(theta), len(self.bounds) + 1))
         for rows in self._chunks(len(theta)):
-            error = self.residuals(theta[rows])
-            segments[rows] = segment_objectives(error, self.measured, self.bounds, how)
-            overall[rows] = overall_objective(error, self.measured, how)
-        return Evaluation(segments, overall)
+            error = self.output_errors(theta[rows])
+            values[rows, :-1] = segment_objectives(error, self.measured, self.bounds, how)
+            values[rows, -1] = overall_objective(error, self.measured, how)
+        return values
 
     def residuals(self, theta: Array) -> Array:
         """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged."""
+        if self._spread is None:
+            return self.output_errors(theta)
+        return self._spread(self._on_worker, "output_errors", theta, len(self.measured))
+
+    def output_errors(self, theta: Array) -> Array:
+        """The residuals of theta, shape (n, P), simulated in this process."""
         responses = self.responses(theta)
         return np.concatenate([channel.residual(responses) for channel in self.channels], axis=1)
 
@@ -114,6 +141,13 @@ class Problem:
         """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""
         angles = [residuals[:, c.rows] / c.weight for c in self.channels if c.quantity == "angle"]
         return np.sqrt(np.mean(np.concatenate(angles, axis=1) ** 2, axis=1))
+
+    @cached_property
+    def _on_worker(self) -> "Problem":
+        """The same problem as a worker has it."""
+        threads = self.settings.simulation.threads or 1
+        simulation = self.settings.simulation.model_copy(update={"threads": threads})
+        return Problem(self.settings.model_copy(update={"simulation": simulation}), self.logs)
 
     def _segments(self, channel: Channel) -> NDArray[np.int64]:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""

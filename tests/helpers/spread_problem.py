@@ -1,36 +1,30 @@
-"""A small problem to spread over workers, and a candidate of it that kills whoever simulates it."""
+"""A small problem to spread over workers, compared bit for bit with the same one in this process."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from conftest import step_log
-from execution_work import die
 
-from hydroid.execution import Executor, Work
 from hydroid.jobs import load_settings
-from hydroid.problem.problem import Problem
+from hydroid.log import Log
+from hydroid.problem.problem import Problem, Spread
+from hydroid.settings.fit import FitSettings
 
-POISON = 1e-3
-"""of the first parameter"""
+PASSIVE = {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.segments": {"equal": 3}}
 
 
-def arguments(**changes: object) -> tuple[Any, ...]:
-    """Arm, settings and logs of a problem with two outputs and two logs."""
-    settings = load_settings(
-        "article-mech",
-        {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.segments": {"equal": 3}}
-        | changes,
-    )
+def arguments(config: str = "article-mech", **changes: Any) -> tuple[FitSettings, list[Log]]:
+    """Settings and logs of a problem with two outputs and two logs."""
+    settings = load_settings(config, (PASSIVE if config == "article-mech" else {}) | changes)
     pose = settings.arm.pose("study")
-    return settings.arm, settings, [step_log(pose, [60.0, -80.0]), step_log(pose, [30.0], joint=3)]
+    return settings, [step_log(pose, [60.0, -80.0]), step_log(pose, [30.0], joint=3)]
 
 
-def some_sets(problem: Problem, n: int) -> np.ndarray:
-    """Random sets; the last one diverges where joints are passive."""
+def random_candidates(problem: Problem, n: int) -> np.ndarray:
+    """Random candidates; where joints are passive the last one diverges."""
     rng = np.random.default_rng(1)
     theta = problem.parameters.from_unit(rng.random((n, int(problem.parameters.free.sum()))))
-    if n > 1:
+    if problem.settings.stage == "mech":
         theta[-1, problem.parameters.names.index("D")] = 0.0
         theta[-1, problem.parameters.names.index("S")] = 1e9
     return theta
@@ -44,31 +38,17 @@ def assert_same(spread: Problem, plain: Problem, theta: np.ndarray) -> None:
     np.testing.assert_array_equal(spread.residuals(theta), plain.residuals(theta))
 
 
-class Poisoned:
-    """An executor whose workers die of a certain candidate."""
+class CountingSpread:
+    """Computes in this process what workers would, and counts the candidates by method."""
 
-    def __init__(self, executor: Executor) -> None:
-        self.executor = executor
+    def __init__(self) -> None:
+        self.counts: dict[str, int] = {}
 
-    @property
-    def workers(self) -> int:
-        return self.executor.workers
+    def __call__(self, target: object, method: str, theta: np.ndarray, columns: int) -> np.ndarray:
+        self.counts[method] = self.counts.get(method, 0) + len(theta)
+        rows = getattr(target, method)(theta)
+        assert rows.shape == (len(theta), columns)
+        return rows
 
-    def map(self, work: Work[Any, Any], chunks: Sequence[Any]) -> list[Any]:
-        return self.executor.map(Work(Deadly(work.pickled)), chunks)
 
-
-class Deadly:
-    """Work that kills its worker where a chunk holds the candidate."""
-
-    def __init__(self, pickled: bytes) -> None:
-        self.pickled = pickled
-        self.function: Callable[[Any], Any] | None = None
-
-    def __call__(self, chunk: Any) -> Any:
-        import pickle
-
-        if np.any(chunk.theta[:, 0] == POISON):
-            die()
-        self.function = self.function or pickle.loads(self.pickled)
-        return self.function(chunk)
+_: type[Spread] = CountingSpread

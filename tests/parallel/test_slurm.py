@@ -13,15 +13,20 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
+from worker_targets import Rows
 
-from hydroid.execution import Work, open_executor
-from hydroid.settings.simulation import ClusterSettings
+from hydroid.parallel.cluster import open_workers
+from hydroid.settings.cluster import ClusterSettings
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("sinfo") is None or "SLURM_CONF" not in os.environ,
-    reason="no Slurm here: .ci/slurm .venv/bin/pytest tests/test_cluster_slurm.py",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        shutil.which("sinfo") is None or "SLURM_CONF" not in os.environ,
+        reason="no Slurm here: .ci/slurm .venv/bin/pytest tests/parallel/test_slurm.py",
+    ),
+]
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples" / "cluster"
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
@@ -143,22 +148,32 @@ def test_dask_workers_in_one_allocation_change_no_bit(site: Path):
     few = ("--ntasks=2", "--mem-per-cpu=1G")
     job = submit("dask.sbatch", "runs/wide", *options, options=few)
     end_of(job)
+    assert "tls://" in told()  # what Dask's scheduler says of itself
+    assert not list(site.glob(".dask-*"))  # the credentials are gone
     run("hydroid", "fit-mech", *options, "--out", "runs/whole")
     assert results("runs/wide") == results("runs/whole")
 
 
-def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(site: Path):
+def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(
+    site: Path, monkeypatch: pytest.MonkeyPatch
+):
     pytest.importorskip("dask_jobqueue")
     settings = ClusterSettings(jobs=2, cores=1, memory="1GiB", walltime="00:10:00")
-    with open_executor(None, "slurm", settings) as cluster:
-        assert cluster is not None
-        assert cluster.map(Work(abs), range(-3, 3)) == [3, 2, 1, 0, 1, 2]
-        wait_for(lambda: cluster.workers == 2)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    theta = np.arange(6.0)[:, None]
+    with open_workers("slurm", settings) as workers:
+        assert workers is not None
+
+        def works() -> bool:
+            return bool((workers(Rows(), "squares", theta, 1) == theta**2).all())
+
+        assert works()
+        wait_for(lambda: workers.count == 2)
         first = set(run("squeue", "--noheader", "--format=%i").split())
         assert len(first) == 2
         run("scancel", min(first))
-        assert cluster.map(Work(abs), range(-3, 3)) == [3, 2, 1, 0, 1, 2]
+        assert works()
         wait_for(lambda: len(set(run("squeue", "--noheader", "--format=%i").split()) - first) == 1)
-        wait_for(lambda: cluster.workers == 2)
-        assert cluster.map(Work(abs), range(-3, 3)) == [3, 2, 1, 0, 1, 2]
+        wait_for(lambda: workers.count == 2)
+        assert works()
     wait_for(lambda: not run("squeue", "--noheader").strip())

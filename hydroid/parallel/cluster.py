@@ -1,0 +1,170 @@
+"""Which Dask scheduler hydroid uses: its own on this machine or for Slurm jobs, or one that runs already.
+
+A Dask scheduler runs whatever code reaches its port. Every scheduler that is started here therefore uses TLS
+with credentials made for the run, and refuses clients and workers without them. A scheduler that was started
+elsewhere needs TLS too, with the credentials of Dask's configuration, unless it listens on the loopback
+interface. `python -m hydroid.parallel.cluster FOLDER` makes credentials for a scheduler and workers that a
+script starts, as examples/cluster/dask.sbatch does.
+"""
+
+import ipaddress
+import json
+import logging
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hydroid.errors import RunError, SettingsError
+from hydroid.parallel.workers import DaskWorkers
+from hydroid.settings.cluster import ClusterSettings
+
+CONNECT = 20.0
+"""seconds in which a scheduler must answer"""
+CLOSED = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+"""Dask's configuration for what is started here: its HTTP servers have no TLS, and serve nothing"""
+
+
+@contextmanager
+def open_workers(
+    dask: str | None, settings: ClusterSettings, *, insecure: bool = False
+) -> Generator[DaskWorkers | None]:
+    """Connect to workers; at the end, stop those that were started here.
+
+    Args:
+        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; `slurm` submits
+            jobs; anything else is the address of a scheduler, or its scheduler file. None: no workers.
+        settings: of the Slurm jobs.
+        insecure: accept an address without TLS that other machines can reach.
+
+    Raises:
+        SettingsError: Dask is not installed, there is no Slurm here, or the address is refused.
+        RunError: no scheduler answers.
+    """
+    if dask is None:
+        yield None
+        return
+    try:
+        from dask import config
+        from distributed import Client
+    except ImportError as error:
+        hint = "install it: pip install 'hydroid[cluster]'"
+        raise SettingsError(f"Dask cannot be imported ({error})", where="--dask", hint=hint) from None
+    with ExitStack() as stack:
+        stack.enter_context(config.set(CLOSED))
+        if local := re.fullmatch(r"local(?::([1-9][0-9]{0,3}))?", dask):
+            target = _start_local(stack, int(local[1] or os.cpu_count() or 1))
+        else:
+            target = _start_slurm(stack, settings) if dask == "slurm" else _address(dask, insecure)
+        try:
+            client: Any = Client(target, timeout=CONNECT)
+        except (OSError, ValueError, TypeError, RuntimeError) as error:
+            words = " ".join(str(error).split())
+            hint = "check the address; for tls:// name the folder of its credentials in DASK_CONFIG"
+            raise RunError(
+                f"no Dask scheduler answers ({words})", where=f"--dask {dask}", hint=hint
+            ) from None
+        stack.callback(_close, client)
+        yield DaskWorkers(client)
+
+
+def write_credentials(folder: Path) -> None:
+    """Write new TLS credentials, as a Dask configuration, into a new folder that only its user can read.
+
+    Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG names the folder.
+
+    Raises:
+        FileExistsError: the folder is there already.
+    """
+    from distributed.security import Security
+
+    security = Security.temporary()
+    configs = {role: security.get_tls_config_for_role(role) for role in ("scheduler", "worker", "client")}
+    tls: dict[str, Any] = {role: {key: c[key] for key in ("cert", "key")} for role, c in configs.items()}
+    tls["ca-file"] = configs["client"]["ca_file"]
+    closed = {name: {"http": {"routes": []}} for name in ("scheduler", "worker")}
+    comm = {"default-scheme": "tls", "require-encryption": True, "tls": tls}
+    folder.mkdir(mode=0o700)
+    (folder / "distributed.yaml").write_text(yaml.safe_dump({"distributed": {"comm": comm} | closed}))
+
+
+def _start_local(stack: ExitStack, count: int) -> Any:
+    from distributed import LocalCluster
+    from distributed.security import Security
+
+    cluster: Any = LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        memory_limit=0,  # unlimited
+        host="127.0.0.1",
+        security=Security.temporary(),
+        dashboard_address=None,  # pyright: ignore[reportArgumentType]  # documented: none
+        silence_logs=logging.CRITICAL,
+    )
+    stack.callback(_close, cluster)
+    return cluster
+
+
+def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
+    if shutil.which("sbatch") is None:
+        raise SettingsError("there is no sbatch here", where="--dask slurm", hint="run on a Slurm machine")
+    from dask_jobqueue.slurm import SLURMCluster
+    from distributed.security import Security
+
+    folder = tempfile.mkdtemp(prefix=".hydroid-dask-", dir=Path.cwd())  # only this user can read it
+    stack.callback(shutil.rmtree, folder, ignore_errors=True)
+    cluster: Any = SLURMCluster(
+        cores=settings.cores,
+        processes=settings.cores,
+        memory=settings.memory,
+        walltime=settings.walltime,
+        queue=settings.queue,
+        log_directory="runs/slurm",
+        security=Security.temporary(),
+        shared_temp_directory=folder,
+        scheduler_options={"dashboard": False, "dashboard_address": ":0"},
+        worker_extra_args=["--no-dashboard"],
+    )
+    stack.callback(_close, cluster)
+    cluster.adapt(minimum_jobs=settings.jobs, maximum_jobs=settings.jobs)  # a job that ends is replaced
+    return cluster
+
+
+def _address(given: str, insecure: bool) -> str:
+    """The address that is given itself or by a scheduler file, if code may be sent there."""
+    from distributed.comm.addressing import get_address_host, parse_address
+
+    address, where = given, f"--dask {given}"
+    try:
+        if Path(given).is_file():
+            address = str(json.loads(Path(given).read_text())["address"])
+        elif given.startswith("local:"):
+            raise ValueError(given)  # not the host of that name
+        scheme, host = parse_address(address)[0], get_address_host(address)
+    except (OSError, ValueError, TypeError, KeyError):
+        hint = "give local[:N], slurm, tls://HOST:PORT, or a scheduler file"
+        raise SettingsError("is no Dask scheduler", where=where, hint=hint) from None
+    with suppress(ValueError):
+        insecure |= ipaddress.ip_address(host).is_loopback
+    if scheme != "tls" and host != "localhost" and not insecure:
+        hint = (
+            "start it with TLS as examples/cluster/dask.sbatch does, or accept the risk with --dask-insecure"
+        )
+        raise SettingsError("without TLS anyone who reaches it can run code as you", where=where, hint=hint)
+    return address
+
+
+def _close(resource: Any) -> None:
+    with suppress(Exception):  # its scheduler may be gone
+        resource.close()
+
+
+if __name__ == "__main__":
+    write_credentials(Path(sys.argv[1]))

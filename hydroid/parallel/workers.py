@@ -1,0 +1,146 @@
+"""Spread the simulation of candidates over Dask workers; no bit of a result depends on their number."""
+
+import logging
+import pickle
+import threading
+from collections.abc import Generator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from importlib.metadata import version
+from itertools import pairwise
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.errors import RunError
+
+Float = NDArray[np.float64]
+
+LOOK = 10.0
+"""seconds between two checks that the scheduler is there and has workers"""
+VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy", "numba")}
+"""packages whose versions decide the bits of a result"""
+
+_log = logging.getLogger(__name__)
+_lock = threading.Lock()
+
+
+class DaskWorkers:
+    """The workers of a scheduler, over which a problem spreads its candidates.
+
+    Args:
+        client: connected to the scheduler.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self.client = client
+        self._sent: WeakKeyDictionary[object, Any] = WeakKeyDictionary()
+
+    @property
+    def count(self) -> int:
+        """Workers connected now; 1 where there is none."""
+        return max(1, len(self.client.nthreads()))
+
+    def __call__(self, target: object, method: str, theta: Float, columns: int) -> Float:
+        """Apply `target.method`, which maps rows (m, P) to rows (m, columns), to theta on the workers.
+
+        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk.
+
+        Args:
+            target: can be pickled; it is sent once.
+            method: its name.
+            theta: shape (n, P).
+            columns: of the result.
+
+        Returns:
+            Shape (n, columns), in theta's order; NaN in the row of a candidate that kills its workers.
+
+        Raises:
+            RunError: the scheduler is gone, or a worker has other VERSIONS.
+        """
+        result = np.full((len(theta), columns), np.nan)
+        with _lost_scheduler(self.client):
+            if target not in self._sent:  # a task and no data: what a dead worker held is computed again
+                self._sent[target] = self.client.submit(bytes, pickle.dumps(target), pure=False)
+            edges = np.linspace(0, len(theta), min(self.count, len(theta)) + 1).astype(int).tolist()
+            parts = [slice(*edge) for edge in pairwise(edges)]
+            failed: list[int] = []
+            for part, rows in zip(parts, self._map(target, method, [theta[p] for p in parts]), strict=True):
+                if rows is None:
+                    failed += range(part.start, part.stop)
+                else:
+                    result[part] = rows
+            # Dask also gives up chunks that waited behind a killer: try each of their candidates alone
+            for i in failed:
+                rows = self._map(target, method, [theta[i : i + 1]])[0]
+                if rows is None:
+                    _log.warning("a candidate has killed worker after worker and counts as infeasible")
+                else:
+                    result[i] = rows[0]
+        return result
+
+    def _map(self, target: object, method: str, chunks: Sequence[Float]) -> list[Float | None]:
+        """Results in the chunks' order; None for a chunk that Dask has given up."""
+        from distributed import wait
+        from distributed.scheduler import KilledWorker
+
+        where: Any = list(self.client.nthreads()) or None
+        futures = [
+            self.client.submit(
+                _apply,
+                self._sent[target],
+                VERSIONS,
+                method,
+                chunk,
+                pure=False,
+                workers=where and where[i % len(where)],  # one each; left to Dask, one may get two short ones
+                allow_other_workers=where is not None,
+            )
+            for i, chunk in enumerate(chunks)
+        ]
+        try:
+            while True:
+                with suppress(TimeoutError):
+                    wait(futures, timeout=LOOK)
+                    break
+                if self.client.status in ("closing", "closed"):
+                    raise ConnectionError("no answer")
+                if not self.client.nthreads():
+                    _log.warning("the Dask scheduler has no workers; waiting for some")
+            if all(future.status == "finished" for future in futures):
+                return self.client.gather(futures)
+            return [None if isinstance(f.exception(), KilledWorker) else f.result() for f in futures]
+        finally:
+            with suppress(Exception):  # the scheduler may be gone
+                self.client.cancel(futures)
+
+
+def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Float) -> Float:
+    """Compute a chunk in a worker, one at a time however many threads it has."""
+    for name, ours in versions.items():
+        if VERSIONS[name] != ours:
+            words = f"a Dask worker has {name} {VERSIONS[name]}, here is {ours}"
+            raise RunError(words, hint="install the same everywhere: others may compute other bits")
+    with _lock:
+        return getattr(_loaded(pickled), method)(theta)
+
+
+@lru_cache(maxsize=8)
+def _loaded(pickled: bytes) -> Any:
+    return pickle.loads(pickled)
+
+
+@contextmanager
+def _lost_scheduler(client: Any) -> Generator[None]:
+    """Turn the many errors that follow the loss of a scheduler into one."""
+    try:
+        yield
+    except Exception as error:
+        if not isinstance(error, OSError | CancelledError) and client.status == "running":
+            raise
+        words = " ".join(str(error).split()) or type(error).__name__
+        hint = "start it again, and continue with --resume"
+        raise RunError(f"the Dask scheduler is gone ({words})", hint=hint) from None

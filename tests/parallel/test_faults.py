@@ -1,0 +1,304 @@
+"""Workers that die, schedulers that are lost, fits that are stopped: slow, since processes start and end."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from spread_problem import arguments, assert_same, random_candidates
+from worker_targets import DEADLY, Deadly, Rows
+
+from hydroid.errors import RunError
+from hydroid.parallel import cluster
+from hydroid.parallel.cluster import open_workers, write_credentials
+from hydroid.parallel.workers import DaskWorkers
+from hydroid.problem.problem import Memo, Problem
+from hydroid.settings.cluster import ClusterSettings
+
+dask = pytest.importorskip("dask")
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
+TESTS = Path(__file__).parents[1]
+LOG = TESTS.parent / "examples" / "logs" / "rig_shoulder_1.csv"
+NINE = np.arange(18.0).reshape(9, 2)
+
+
+@pytest.fixture(autouse=True)
+def in_time() -> Iterator[None]:
+    """No test waits for ever: this ends it wherever it waits, and its clean-up still runs."""
+
+    def late(number: int, frame: object) -> None:
+        pytest.fail("took longer than five minutes")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(300)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[DaskWorkers]:
+    # a chunk that kills is tried once more and not three times: each death costs seconds
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        open_workers("local:2", ClusterSettings()) as opened,
+    ):
+        assert opened is not None
+        yield opened
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 200
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def deadly(candidate: int) -> np.ndarray:
+    theta = NINE.copy()
+    theta[candidate, 0] = DEADLY
+    return theta
+
+
+def test_a_killed_workers_candidates_are_simulated_by_another(two: DaskWorkers, tmp_path: Path):
+    theta, deaths = deadly(4), tmp_path / "deaths"
+    np.testing.assert_array_equal(two(Deadly(Rows(), deaths, times=1), "squares", theta, 2), theta**2)
+    assert deaths.read_text() == "x"
+
+
+def test_workers_that_were_killed_while_idle_are_replaced(two: DaskWorkers):
+    rows = Rows()
+    before = set(two(rows, "process", NINE, 1)[:, 0])
+    for process in before:
+        os.kill(int(process), signal.SIGKILL)
+    assert not before & set(two(rows, "process", NINE, 1)[:, 0])
+
+
+def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path: Path):
+    problem = Problem(*arguments())
+    theta = random_candidates(problem, 7)[:6]
+    healthy, others = problem.evaluate(theta), np.arange(6) != 3
+    theta[3, 0] = DEADLY
+
+    def spread(target: object, method: str, theta: np.ndarray, columns: int) -> np.ndarray:
+        return two(Deadly(target, tmp_path / "deaths"), method, theta, columns)
+
+    memo = Memo(Problem(*arguments(), spread))
+    result = memo.evaluate(theta)
+    assert np.isinf(result.overall[3])
+    assert np.isinf(result.segments[3]).all()
+    assert memo.infeasible == 1
+    np.testing.assert_array_equal(result.segments[others], healthy.segments[others])
+    assert len((tmp_path / "deaths").read_text()) == 4  # two tries in its chunk, two alone
+    residuals = memo.problem.residuals(theta[2:5])
+    assert np.isnan(residuals[1]).all()
+    np.testing.assert_array_equal(residuals[::2], problem.residuals(theta[2:5:2]))
+
+
+class Site:
+    """A scheduler and workers started from the command line, with credentials made for the run."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.config, self.file = folder, folder / "private", folder / "scheduler.json"
+        write_credentials(self.config)
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self.file)
+        wait_for(lambda: self.file.exists() and self.file.stat().st_size)
+        self.address: str = json.loads(self.file.read_text())["address"]
+
+    def start(self, *arguments: object) -> None:
+        command = [sys.executable, "-m", "dask", *map(str, arguments), "--no-dashboard"]
+        environment = os.environ | {"DASK_CONFIG": str(self.config), "PYTHONPATH": os.pathsep.join(sys.path)}
+        with (self.folder / "log.txt").open("ab") as log:
+            self.processes.append(
+                subprocess.Popen(
+                    command, cwd=self.folder, env=environment, stdout=log, stderr=log, start_new_session=True
+                )
+            )
+
+    def worker(self) -> None:
+        file = ("--scheduler-file", self.file)
+        self.start("worker", *file, "--nthreads", "1", "--host", "127.0.0.1", "--no-nanny")
+
+    def kill(self, number: int) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(self.processes[number].pid, signal.SIGKILL)
+        self.processes[number].wait()
+
+    def end(self) -> None:
+        for number in reversed(range(len(self.processes))):
+            self.kill(number)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    started = Site(tmp_path)
+    yield started
+    started.end()
+
+
+def test_a_scheduler_of_a_script_refuses_foreigners(site: Site, monkeypatch: pytest.MonkeyPatch):
+    assert site.address.startswith("tls://")
+    monkeypatch.setattr(cluster, "CONNECT", 2.0)
+    for given in (site.address, site.address.replace("tls", "tcp"), str(site.file)):
+        with (
+            pytest.raises(RunError, match="no Dask scheduler answers"),
+            open_workers(given, ClusterSettings()),
+        ):
+            pass
+    with pytest.raises(OSError, match=r"[Tt]imed out|TLS|SSL"):
+        distributed.Client(site.address, security=distributed.Security.temporary(), timeout=2.0)
+
+
+def test_one_two_and_four_workers_and_one_killed_change_no_bit(site: Site, tmp_path: Path):
+    plain = Problem(*arguments())
+    theta = random_candidates(plain, 9)
+    with (
+        dask.config.set(dask.config.collect([str(site.config)], {})),
+        open_workers(str(site.file), ClusterSettings()) as workers,
+    ):
+        assert workers is not None
+        spread = Problem(*arguments(), workers)
+        for count in (1, 2, 4):
+            while len(site.processes) <= count:
+                site.worker()
+            wait_for(lambda count=count: len(workers.client.nthreads()) == count)
+            assert_same(spread, plain, theta)
+        # killed while it computes, and nobody replaces it
+        dying = Deadly(Rows(), tmp_path / "deaths", times=1)
+        np.testing.assert_array_equal(workers(dying, "squares", deadly(2), 2), deadly(2) ** 2)
+        wait_for(lambda: workers.count == 3)
+        assert_same(spread, plain, theta)
+
+
+def test_a_lost_scheduler_is_one_error(site: Site):
+    site.worker()
+    with (
+        dask.config.set(dask.config.collect([str(site.config)], {})),
+        dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
+        open_workers(str(site.file), ClusterSettings()) as workers,
+    ):
+        assert workers is not None
+        rows = Rows()
+        np.testing.assert_array_equal(workers(rows, "squares", NINE, 2), NINE**2)
+        site.kill(0)
+        for _ in range(2):
+            with pytest.raises(RunError, match="the Dask scheduler is gone"):
+                workers(rows, "squares", NINE, 2)
+        wait_for(lambda: workers.client.status == "closed")
+        with pytest.raises(RunError, match="the Dask scheduler is gone"):
+            workers(rows, "squares", NINE, 2)
+
+
+SBATCH = """#!/bin/sh
+# stands in for Slurm's: runs the job at once, in a session of its own
+cp "$1" "{folder}/job.sh"
+setsid sh -c 'echo $$ >> "{folder}/jobs"; exec bash "{folder}/job.sh"' >> "{folder}/job.log" 2>&1 &
+echo "Submitted batch job $!"
+"""
+
+
+def test_slurm_jobs_become_workers_with_credentials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name, text in (("sbatch", SBATCH.format(folder=tmp_path)), ("scancel", "#!/bin/sh\n")):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    monkeypatch.chdir(tmp_path)
+    settings = ClusterSettings(jobs=1, cores=2, memory="1GiB", walltime="00:10:00", queue="debug")
+    try:
+        with open_workers("slurm", settings) as workers:
+            assert workers is not None
+            np.testing.assert_array_equal(workers(Rows(), "squares", NINE, 2), NINE**2)
+            wait_for(lambda: workers.count == 2)
+            address = workers.client.scheduler_info()["address"]
+            assert address.startswith("tls://")
+            (private,) = tmp_path.glob(".hydroid-dask-*")
+            assert private.stat().st_mode & 0o077 == 0
+            with pytest.raises(OSError, match=r"[Tt]imed out|TLS|SSL"):
+                distributed.Client(address, security=distributed.Security.temporary(), timeout=2.0)
+        assert not private.exists()
+    finally:
+        for pid in (tmp_path / "jobs").read_text().split():
+            with suppress(ProcessLookupError):
+                os.killpg(int(pid), signal.SIGKILL)
+    script = (tmp_path / "job.sh").read_text()
+    for line in ("-p debug", "-t 00:10:00", "--mem=1G", "--cpus-per-task=2"):
+        assert f"#SBATCH {line}" in script
+    assert "--nthreads 1" in script
+    assert f"--tls-key {private}" in script
+
+
+QUICK = ["--algorithm", "ga", "--set", "search.ga.population=6", "--set", "refinement.iterations=1"]
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three seconds of a virtual rig's log."""
+    path = tmp_path_factory.mktemp("log") / "short.csv"
+    path.write_text("\n".join(LOG.read_text().splitlines()[:301]) + "\n")
+    return path
+
+
+def test_a_fit_with_workers_is_the_fit_without(short: Path, tmp_path: Path):
+    for name, more in (("alone", ["--threads", "1"]), ("spread", ["--dask", "local:2"])):
+        command = [sys.executable, "-m", "hydroid", "fit-mech", short, "--out", name, "--quiet", *QUICK]
+        done = subprocess.run(
+            [*command, "--set", "search.ga.generations=2", *more],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=240,
+        )
+        assert done.returncode == 0, done.stderr
+        assert not done.stderr
+    for file in ("estimate.yaml", "history.csv"):
+        assert (tmp_path / "alone" / file).read_bytes() == (tmp_path / "spread" / file).read_bytes()
+
+
+@pytest.mark.parametrize("end", ["SIGTERM", "SIGINT to the group", "SIGKILL"])
+def test_a_stopped_fit_leaves_no_process(short: Path, tmp_path: Path, end: str):
+    command = [
+        sys.executable,
+        "-m",
+        "hydroid",
+        "fit-mech",
+        short,
+        "--out",
+        "run",
+        "--dask",
+        "local:2",
+        *QUICK,
+    ]
+    run = subprocess.Popen(
+        [*command, "--set", "search.ga.generations=100000"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        wait_for((tmp_path / "run" / "checkpoint.npz").exists)  # the first one comes after some seconds
+        children = psutil.Process(run.pid).children(recursive=True)
+        assert sum("spawn_main" in " ".join(child.cmdline()) for child in children) == 2
+        if end == "SIGINT to the group":
+            os.killpg(run.pid, signal.SIGINT)
+        else:
+            run.send_signal(signal.Signals[end])
+        _, errors = run.communicate(timeout=100)
+        wait_for(lambda: not any(child.is_running() for child in children))
+    finally:
+        run.kill()  # with it end its workers, whatever went wrong here
+    if end != "SIGKILL":
+        assert run.returncode == 130, errors
+        assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"
+        assert "Traceback" not in errors

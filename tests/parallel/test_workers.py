@@ -1,0 +1,178 @@
+"""Two workers on this machine: what they compute, and who is refused."""
+
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import psutil
+import pytest
+from spread_problem import CountingSpread, arguments, assert_same, random_candidates
+from typer.testing import CliRunner
+from worker_targets import Rows
+
+from hydroid.errors import ModelError, RunError, SettingsError
+from hydroid.parallel import cluster, workers
+from hydroid.parallel.cluster import open_workers, write_credentials
+from hydroid.parallel.workers import DaskWorkers
+from hydroid.problem.problem import Problem
+from hydroid.settings.cluster import ClusterSettings
+
+distributed = pytest.importorskip("distributed")
+NINE = np.arange(18.0).reshape(9, 2)
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[DaskWorkers]:
+    with open_workers("local:2", ClusterSettings()) as opened:
+        assert opened is not None
+        yield opened
+
+
+def opened(dask: str | None, **options: bool) -> None:
+    with open_workers(dask, ClusterSettings(), **options):
+        pass
+
+
+def test_rows_come_in_order_from_several_processes(two: DaskWorkers):
+    rows = Rows()
+    for theta in (NINE, NINE[:1], NINE[:0]):
+        np.testing.assert_array_equal(two(rows, "squares", theta, 2), theta**2)
+    processes = set(two(rows, "process", NINE, 1)[:, 0])
+    assert len(processes) == two.count == 2
+    assert os.getpid() not in processes
+
+
+@pytest.mark.parametrize("config", ["article-mech", "article-hyd"])
+def test_workers_change_no_bit(two: DaskWorkers, config: str):
+    settings, logs = arguments(config)
+    plain, spread = Problem(settings, logs), Problem(settings, logs, two)
+    theta = random_candidates(plain, 9)
+    if config == "article-mech":
+        assert np.isinf(plain.evaluate(theta).overall).tolist() == [False] * 8 + [True]
+    assert_same(spread, plain, theta)
+    assert_same(spread.first(0.5), plain.first(0.5), theta[:3])
+
+
+def test_threads_of_a_worker_and_freed_parameters_change_no_bit(two: DaskWorkers):
+    settings, logs = arguments(**{"simulation.threads": 2, "objective.norm": 2, "parameters.K.fixed": 0.2})
+    plain, spread = Problem(settings, logs), Problem(settings, logs, two)
+    theta = random_candidates(plain, 3)
+    assert_same(spread, plain, theta)
+    assert spread.freed().parameters.free.all()
+    assert_same(spread.freed(), plain.freed(), theta)
+
+
+def test_whatever_a_problem_becomes_is_spread_too():
+    spread = CountingSpread()
+    problem = Problem(*arguments(), spread)
+    theta = random_candidates(problem, 2)
+    for variant in (problem, problem.first(0.5), problem.freed(), problem.freed().first(0.5)):
+        variant.residuals(theta)
+        variant.evaluate(theta)
+    assert spread.counts == {"output_errors": 8, "objectives": 8}
+
+
+def test_errors_come_through(two: DaskWorkers):
+    with pytest.raises(ModelError, match=r"^arm.xml: has no such joint; take another$"):
+        two(Rows(), "refused", NINE, 2)
+    with pytest.raises(IndexError, match="out of bounds"):
+        two(Rows(), "failed", NINE, 2)
+    np.testing.assert_array_equal(two(Rows(), "squares", NINE, 2), NINE**2)
+
+
+def test_workers_of_another_version_are_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(workers, "VERSIONS", workers.VERSIONS | {"mujoco": "0.0"})
+    with pytest.raises(RunError, match=r"a Dask worker has mujoco .*, here is 0.0"):
+        two(Rows(), "squares", NINE, 2)
+
+
+def test_only_the_loopback_listens_with_tls_and_no_page_is_served(two: DaskWorkers):
+    info = two.client.scheduler_info()
+    for address in (info["address"], *info["workers"]):
+        assert address.startswith("tls://127.0.0.1:")
+    this = psutil.Process()
+    sockets = [s for p in (this, *this.children(recursive=True)) for s in p.net_connections("inet")]
+    assert {s.laddr.ip for s in sockets if s.status == "LISTEN"} == {"127.0.0.1"}
+    for page in ("info/main/workers.html", "json/counts.json", "status"):
+        with pytest.raises(HTTPError, match="404"):
+            urlopen(f"http://127.0.0.1:{info['services']['dashboard']}/{page}")
+
+
+def test_a_foreign_client_is_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
+    """Without credentials, with those of another run, and without TLS."""
+    address = two.client.scheduler_info()["address"]
+    monkeypatch.setattr(cluster, "CONNECT", 2.0)
+    with pytest.raises(RunError, match="no Dask scheduler answers"):
+        opened(address)
+    with pytest.raises(RunError, match="no Dask scheduler answers"):
+        opened(address.replace("tls", "tcp"))
+    for other in (distributed.Security.temporary(), distributed.Security(require_encryption=True)):
+        with pytest.raises((OSError, TypeError)):
+            distributed.Client(address, security=other, timeout=2.0)
+    assert two.count == 2
+
+
+@pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json"])
+def test_an_address_without_tls_is_refused_where_others_reach_it(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path("file.json").write_text('{"address": "tcp://10.0.0.1:8786"}')
+    with pytest.raises(SettingsError, match=rf"--dask {address}: without TLS anyone .*--dask-insecure"):
+        opened(address)
+
+
+@pytest.mark.parametrize(
+    ("address", "insecure"),
+    [
+        ("tcp://127.0.0.1:1", False),
+        ("localhost:1", False),
+        ("tcp://[::1]:1", False),
+        ("tcp://0.0.0.0:1", True),
+    ],
+)
+def test_the_loopback_and_a_flag_are_enough(address: str, insecure: bool, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    with pytest.raises(RunError, match="no Dask scheduler answers"):
+        opened(address, insecure=insecure)
+
+
+@pytest.mark.parametrize("dask", ["local:0", "local:many", "carrier-pigeon://somewhere", "log.csv"])
+def test_what_is_no_scheduler_is_said_so(dask: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv").write_text("t,u\n")
+    with pytest.raises(SettingsError, match="no Dask scheduler; give local"):
+        opened(dask)
+
+
+def test_no_workers_no_slurm_and_no_dask(monkeypatch: pytest.MonkeyPatch):
+    with open_workers(None, ClusterSettings()) as nothing:
+        assert nothing is None
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(SettingsError, match="no sbatch"):
+        opened("slurm")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SettingsError, match=r"pip install 'hydroid\[cluster\]'"):
+        opened("local")
+
+
+def test_only_the_user_can_read_credentials(tmp_path: Path):
+    folder = tmp_path / "private"
+    write_credentials(folder)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert "BEGIN CERTIFICATE" in (folder / "distributed.yaml").read_text()
+    with pytest.raises(FileExistsError):
+        write_credentials(folder)
+
+
+def test_the_old_option_names_the_new_one():
+    from hydroid.cli.app import app
+
+    result = CliRunner().invoke(app, ["fit-mech", "log.csv", "--workers", "4"])
+    assert result.exit_code == 2
+    assert "is now --dask local:4" in result.output

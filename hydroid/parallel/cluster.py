@@ -13,10 +13,13 @@ import logging
 import os
 import re
 import shutil
+import signal
 import sys
 import tempfile
+import warnings
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -99,17 +102,33 @@ def _start_local(stack: ExitStack, count: int) -> Any:
     from distributed import LocalCluster
     from distributed.security import Security
 
-    cluster: Any = LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        memory_limit=0,  # unlimited
-        host="127.0.0.1",
-        security=Security.temporary(),
-        dashboard_address=None,  # pyright: ignore[reportArgumentType]  # documented: none
-        silence_logs=logging.CRITICAL,
-    )
+    with _signals_blocked(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the port of the HTTP server that serves nothing
+        cluster: Any = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            memory_limit=0,  # unlimited
+            host="127.0.0.1",
+            security=Security.temporary(),
+            dashboard_address=None,  # pyright: ignore[reportArgumentType]  # documented: none
+            silence_logs=logging.CRITICAL,
+        )
     stack.callback(_close, cluster)
     return cluster
+
+
+@contextmanager
+def _signals_blocked() -> Generator[None]:
+    """Let threads that start in here, and their processes, ignore Ctrl-C and a cluster's notice."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # it would unblock them
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGUSR1})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:

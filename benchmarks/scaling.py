@@ -2,9 +2,9 @@
 
     python benchmarks/scaling.py [--rounds 5]
 
-One record of 75 s on the arm with seven moving joints, both stages. Every round measures all variants in turn,
-so that other load on the machine affects them alike; medians are printed. The two costs of a chunk are processor
-time, which other load hardly changes.
+One record of 75 s on the arm with seven moving joints, both stages. Every round measures all variants in
+turn, so that other load on the machine affects them alike; printed are medians. The two costs of a chunk are
+processor time, which other load hardly changes.
 """
 
 import argparse

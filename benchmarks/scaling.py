@@ -22,7 +22,7 @@ from hydroid.jobs import load_settings
 from hydroid.parallel.cluster import open_workers
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem, Spread
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 POPULATIONS, WORKERS = (70, 20), (1, 2, 4)
 STAGES = {"mechanical": "article-mech", "hydraulic": "article-hyd"}

@@ -15,7 +15,6 @@ import numpy as np
 from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import read_values
-from hydroid.execution import Executor
 from hydroid.fitting.fit import Fit, Watcher, fit
 from hydroid.fitting.search import check_search
 from hydroid.fitting.validation import ErrorIndices, error_indices

@@ -27,7 +27,7 @@ import yaml
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.parallel.workers import DaskWorkers
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""

@@ -22,7 +22,7 @@ from hydroid.parallel import cluster
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Memo, Problem
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")

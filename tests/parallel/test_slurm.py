@@ -18,7 +18,7 @@ import pytest
 from worker_targets import Rows
 
 from hydroid.parallel.cluster import open_workers
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 pytestmark = [
     pytest.mark.slow,

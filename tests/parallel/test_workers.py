@@ -20,7 +20,7 @@ from hydroid.parallel import cluster, workers
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
-from hydroid.settings.cluster import ClusterSettings
+from hydroid.settings.simulation import ClusterSettings
 
 distributed = pytest.importorskip("distributed")
 NINE = np.arange(18.0).reshape(9, 2)

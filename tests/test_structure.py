@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 # a room may import rooms of a lower layer, and itself
 LAYERS = [
     {"errors", "__init__"},
-    {"assets", "files", "parameters", "settings"},
+    {"assets", "files", "parameters", "progress", "settings"},
     {"estimate"},
     {"identified"},
     {"log", "arm", "hydraulics"},

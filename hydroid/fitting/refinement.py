@@ -10,7 +10,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import Refinement, least_squares
 from hydroid.settings.search import RefinementSettings
-from hydroid.uncertainty.noise import statement_unit
+from hydroid.uncertainty.noise import prior_weight
 
 ROUNDS = 4
 """times at most that the noise is estimated, to weigh the logs against what is known"""
@@ -30,7 +30,7 @@ def refine(
     """Improve an estimate by bounded least squares.
 
     Statements of `problem.priors` join as residuals of (value - known) / sd times what a score counts
-    beside the logs' noise (`statement_unit`), which is taken at the start, and again at the result, until it
+    beside the logs' noise (`prior_weight`), which is taken at the start, and again at the result, until it
     settles.
 
     Args:
@@ -89,7 +89,7 @@ def _refine(
 
 
 def _noise(problem: Problem, simulate: Callable[[Array], Array], theta: Array) -> float:
-    return statement_unit(problem.channels, simulate(theta[None])[0], problem.settings.objective)
+    return prior_weight(problem.channels, simulate(theta[None])[0], problem.settings.objective)
 
 
 def _words(result: Refinement, simulated: int) -> str:

@@ -1,1 +1,1 @@
-"""What the data tell at an estimate: derivatives, noise, intervals, directions that stay open."""
+"""Uncertainty of an estimate: derivatives, noise, covariance, unidentifiable directions, profiles."""

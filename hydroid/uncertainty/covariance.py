@@ -1,21 +1,21 @@
-"""How well the data determine each parameter: covariance, intervals, flags.
+"""Covariance of an estimate, the intervals that follow from it, and how well each parameter is determined.
 
-The estimate minimises the weighted squares of the residuals, and of the statements' scores times the
-residual's level; the noise need not be white, nor the weights match it. With J the derivatives of all that
-per relative change, shape (p, R), and S the covariance of the noise, that of the estimate is the *sandwich*
+The estimate minimises the weighted sum of squares of the residuals and of the priors' scores. The noise need
+not be white, and the weights need not match it. Let J, shape (p, R), be the derivatives of all these
+residuals per relative change of the free parameters, and S the covariance of the noise. The covariance of the
+estimate is then the *sandwich*
 
     C = (J J')^-1 J S J' (J J')^-1        (P. J. Huber, 1967; G. A. F. Seber and C. J. Wild, 1989)
 
-which for white noise of one level is the usual s² (J J')^-1. All of it goes through one singular value
-decomposition J = V D U, C^-1 = G' G with G = (U S U')^-1/2 D V': directions that the data do not feel keep a
-singular value of exactly zero, and nothing is squared on the way.
+For white noise of one level this is the usual s² (J J')^-1. It is computed from one singular value
+decomposition J = V D U as C^-1 = G' G with G = (U S U')^-1/2 D V'. No product J J' is formed, and a direction
+that the residuals do not depend on keeps a singular value of exactly zero.
 
-It is a first-order, local look, and holds as far as the model does: an error of the model that shifts an
-estimate is in no interval. An estimate on a bound is treated as if the bound were not there, and gets no
-interval.
+The covariance is a local, first-order approximation, and it assumes that the model is right: an interval does
+not contain the shift of an estimate that a wrong model causes. At a bound the covariance is computed as if
+there were none, and the parameter gets no interval.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +43,7 @@ DOUBT_ABOVE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What the data say about P parameters, p of them free, at an estimate.
+    """How well the data determine P parameters, p of them free, at an estimate.
 
     Attributes:
         theta: the estimate, shape (P,).
@@ -51,12 +51,12 @@ class Uncertainty:
         noise: of each channel.
         free: which parameters are free, shape (P,).
         root: G of C^-1 = G' G, shape (p, p): a relative change v of the free parameters is |G v| standard
-            deviations away from the estimate.
-        relative: relative standard deviation of each parameter, shape (P,); inf where it is not determined,
-            NaN where it is fixed.
-        interval: of 95 %, from Student's t, shape (P, 2); infinite where not determined, NaN where fixed or
-            at a bound.
-        correlation: of the free parameters' estimates, shape (p, p); NaN where not determined.
+            deviations long.
+        relative: relative standard deviation of each parameter, shape (P,); inf where it is not
+            identifiable, NaN where it is fixed.
+        interval: of 95 %, from Student's t, shape (P, 2); infinite where not identifiable, NaN where fixed
+            or at a bound.
+        correlation: of the free parameters' estimates, shape (p, p); NaN where not identifiable.
         freedom: degrees of freedom of the noise's level.
         status: of each parameter.
     """
@@ -79,64 +79,54 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
-    """Return how well the problem's data determine theta, shape (P,), with the noise that they show there."""
-    slopes = jacobian(problem, theta)
+    """Return how well the problem's data determine theta, shape (P,), for the noise that they show there."""
+    derivatives = jacobian(problem, theta)
     noise = tuple(
-        channel_noise(channel, slopes.residual[channel.rows], problem.settings.objective)
+        channel_noise(channel, derivatives.residual[channel.rows], problem.settings.objective)
         for channel in problem.channels
     )
-    return judge(problem, theta, slopes, noise)
+    return uncertainty_from(problem, theta, derivatives, noise)
 
 
-def judge(problem: Problem, theta: Array, slopes: Jacobian, noise: tuple[Noise, ...]) -> Uncertainty:
-    """Return the uncertainty from derivatives and the residual's noise: `uncertainty` without simulations."""
-    free = problem.parameters.free
-    root, noise, freedom = _root(problem, slopes, noise)
-    covariance, lost = covariance_of(root)
+def uncertainty_from(
+    problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...]
+) -> Uncertainty:
+    """Return the uncertainty from the derivatives and the residual's noise, without simulations."""
+    free, parameters = problem.parameters.free, problem.parameters.parameters
+    root, noise, freedom = _root(problem, derivatives, noise)
+    covariance, unmeasured = covariance_of(root)
     relative = np.full(len(theta), np.nan)
-    relative[free] = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
-    # with few independent samples Student's t is wide: so wide must a flag's limits be taken
-    widening = float(student.ppf(0.5 + COVERAGE / 2, freedom) / normal.ppf(0.5 + COVERAGE / 2))
-    unknown = widening * relative > UNIDENTIFIABLE_ABOVE
-    relative[unknown] = np.inf
-    bound: list[Side | None] = [
-        next((side for side, at in at_bounds(parameter, value) if at), None)
-        for parameter, value in zip(problem.parameters.parameters, theta, strict=True)
-    ]
-    half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative * slopes.scale
+    relative[free] = np.where(unmeasured, np.inf, np.sqrt(np.diag(covariance)))
+    quantile = float(student.ppf(0.5 + COVERAGE / 2, freedom))
+    # with a small effective sample size the intervals are wider, and the flags are set accordingly
+    widened = relative * quantile / float(normal.ppf(0.5 + COVERAGE / 2))
+    unidentifiable = widened > UNIDENTIFIABLE_ABOVE
+    relative[unidentifiable] = np.inf
+    bounds = [_bound(*pair) for pair in zip(parameters, theta, strict=True)]
+    half = quantile * relative * derivatives.scale
     interval = np.stack([theta - half, theta + half], axis=1)
-    interval[[side is not None for side in bound] & ~unknown] = np.nan
+    interval[[bound is not None for bound in bounds] & ~unidentifiable] = np.nan
     status = tuple(
-        _status(widening * float(relative[i]), slopes, i, bound[i])
-        if free[i]
-        else ParameterStatus(Flag.FIXED)
+        _status(float(widened[i]), derivatives, i, bounds[i]) if free[i] else ParameterStatus(Flag.FIXED)
         for i in range(len(theta))
     )
-    deviation = np.where(unknown[free], np.nan, relative[free])
+    deviation = np.where(unidentifiable[free], np.nan, relative[free])
+    correlation = covariance / np.outer(deviation, deviation)
     return Uncertainty(
-        theta,
-        slopes,
-        noise,
-        free,
-        root,
-        relative,
-        interval,
-        covariance / np.outer(deviation, deviation),
-        freedom,
-        status,
+        theta, derivatives, noise, free, root, relative, interval, correlation, freedom, status
     )
 
 
 def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return (G' G)^-1 over the felt directions, (p, p), and who has a part in the others, (p,)."""
+    """Return (G' G)^-1 over the measured directions, (p, p), and which parameters need the others, (p,)."""
     _, values, directions = np.linalg.svd(root)
-    felt = values > RANK_TOLERANCE * values.max(initial=0.0)
-    known = directions[felt] / values[felt, None]
-    return known.T @ known, np.linalg.norm(directions[~felt], axis=0) > NULL_COMPONENT
+    measured = values > RANK_TOLERANCE * values.max(initial=0.0)
+    inverse = directions[measured] / values[measured, None]
+    return inverse.T @ inverse, np.linalg.norm(directions[~measured], axis=0) > NULL_COMPONENT
 
 
 def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, NDArray[np.bool_]], ...]:
-    """Whether values lie at each bound."""
+    """Return for each bound whether values lie at it."""
     margin = BOUND_MARGIN * (parameter.upper - parameter.lower)
     return (
         ("lower", np.asarray(value - parameter.lower <= margin)),
@@ -144,55 +134,53 @@ def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, N
     )
 
 
-def decompose(free: NDArray[np.bool_], slopes: Jacobian) -> tuple[Array, Array, Array]:
-    """Return V, D, U of J = V D U: directions (p, p), strengths (p,), what they do to residuals (p, R + M).
+def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Array, Array]:
+    """Return V, D, U of J = V D U: directions (p, p), singular values (p,), effects (p, R + M).
 
-    A strength that is not beyond what two steps of the differences differ by is 0.
+    The effects are unit rows of residuals with the M priors behind them. A singular value that is no larger
+    than the difference between two steps' derivatives is 0.
     """
-    felt = np.nan_to_num(np.hstack([slopes.slopes, slopes.unit * slopes.statements])[free])
-    directions, values, course = np.linalg.svd(felt, full_matrices=False)
-    error = np.linalg.norm(directions.T @ np.nan_to_num(slopes.error[free]), axis=1)
+    rows = np.hstack([derivatives.slopes, derivatives.prior_weight * derivatives.prior_slopes])[free]
+    directions, values, effects = np.linalg.svd(np.nan_to_num(rows), full_matrices=False)
+    error = np.linalg.norm(directions.T @ np.nan_to_num(derivatives.error[free]), axis=1)
     values[values <= np.maximum(error, RANK_TOLERANCE * values[0])] = 0.0
-    return directions, values, course
+    return directions, values, effects
 
 
 def _root(
-    problem: Problem, slopes: Jacobian, noise: tuple[Noise, ...]
+    problem: Problem, derivatives: Jacobian, noise: tuple[Noise, ...]
 ) -> tuple[Array, tuple[Noise, ...], float]:
-    """Return G, shape (p, p), the noise with what the fit took up, its degrees of freedom."""
-    directions, values, course = decompose(problem.parameters.free, slopes)
-    unit = slopes.unit
-    count = len(slopes.residual)
-    statements = unit**2 * course[:, count:] @ course[:, count:].T
-    parts = [course[:, channel.rows] for channel in problem.channels]
-    scatter = statements + _sum(
-        process.covariance_of(part) for process, part in zip(noise, parts, strict=True)
-    )
-    taken = values > 0
+    """Return G, shape (p, p), the noise with what the fit absorbed, its degrees of freedom."""
+    directions, values, effects = decompose(problem.parameters.free, derivatives)
+    priors = effects[:, len(derivatives.residual) :]
+    parts = [effects[:, channel.rows] for channel in problem.channels]
+
+    def scatter(noise: tuple[Noise, ...]) -> Array:
+        """U S U', shape (p, p)."""
+        channels = [process.covariance_of(part) for process, part in zip(noise, parts, strict=True)]
+        return derivatives.prior_weight**2 * priors @ priors.T + np.sum(channels, axis=0)
+
+    fitted = values > 0
+    spread = scatter(noise)[np.ix_(fitted, fitted)]
     noise = tuple(
-        unbiased(process, part[taken], scatter[np.ix_(taken, taken)])
-        if process.source == "residual"
-        else process
+        unbiased(process, part[fitted], spread) if process.source == "residual" else process
         for process, part in zip(noise, parts, strict=True)
     )
-    scatter = statements + _sum(
-        process.covariance_of(part) for process, part in zip(noise, parts, strict=True)
-    )
-    strength, axes = np.linalg.eigh(scatter)
-    inverse = (axes / np.sqrt(np.maximum(strength, np.finfo(float).tiny))) @ axes.T
-    # the strength of slow noise is known as from half its effective samples: AR(1), delta method at 0 Hz
+    variance, axes = np.linalg.eigh(scatter(noise))
+    inverse = (axes / np.sqrt(np.maximum(variance, np.finfo(float).tiny))) @ axes.T
+    # the level of slow noise is known as from half its effective samples: AR(1), delta method at 0 Hz
     freedom = 0.5 * sum(process.effective_sample_size for process in noise) - np.count_nonzero(values)
     return inverse @ (values[:, None] * directions.T), noise, max(freedom, 1.0)
 
 
-def _sum(matrices: Iterable[Array]) -> Array:
-    return np.sum(list(matrices), axis=0)
+def _bound(parameter: Parameter, value: float) -> Side | None:
+    return next((side for side, at in at_bounds(parameter, value) if at), None)
 
 
-def _status(relative: float, slopes: Jacobian, i: int, at_bound: Side | None) -> ParameterStatus:
+def _status(relative: float, derivatives: Jacobian, i: int, at_bound: Side | None) -> ParameterStatus:
     return ParameterStatus(
-        Flag.NO_EFFECT if slopes.without_effect[i] else flag_of(relative),
+        Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(relative),
         at_bound,
-        float(slopes.doubt[i]) if slopes.doubt[i] > DOUBT_ABOVE else None,
-        diverges=not np.isfinite(slopes.slopes[i]).all(),
+        float(derivatives.doubt[i]) if derivatives.doubt[i] > DOUBT_ABOVE else None,
+        diverges=not np.isfinite(derivatives.slopes[i]).all(),
     )

@@ -9,142 +9,170 @@ from scipy.stats import chi2
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
+from hydroid.progress import Progress, no_progress
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, decompose
 
-POINTS = 6
-"""grid points on each side of the estimate"""
-REACH = 3.0
-"""standard deviations that the grid reaches; of a parameter that is not determined it covers the bounds"""
 THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
+STEPS_PER_REACH = 6
+"""points of a profile on each side, if the deviance is the parabola of the linear approximation"""
+REACH = 3.0
+"""standard deviations that these points would reach; of an unidentifiable parameter, up to its bound"""
+MAX_POINTS = 12
+"""points on each side at most; the steps grow after STEPS_PER_REACH"""
+ZOOMS = 4
+"""times that steps are made smaller because the interval ends within the first two"""
+BETTER_BELOW = -0.1
+"""deviance below which a profile has found a better optimum, and not only the estimate's rounding"""
 QUICK = RefinementSettings(iterations=20, step_tolerance=1e-10)
-STEPS = 4
-"""Gauss-Newton steps of a bootstrap's fit"""
-CHUNK = 50
+BOOTSTRAP_STEPS = 4
+"""Gauss-Newton steps of a refit"""
+BATCH = 50
 """refits that are simulated together"""
 
-Tell = Callable[[str, int, int], None]
-"""is told what is being done, how much of it is done, and how much there is"""
+Residuals = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Deviance of a parameter held at several values, the others fitted anew.
+    """Deviance of a parameter held at several values, the others fitted again.
 
     Attributes:
         name: of the parameter.
-        values: it was held at, increasing, the estimate among them, shape (n,).
+        values: it was held at, increasing, the estimate among them, shape (n,). They end where the interval
+            has ended.
         deviance: rise of the cost in units of the noise, (n,): about ((value - estimate) / sd)² near it.
         interval: where the deviance stays below THRESHOLD; a side on which it does so throughout is infinite.
+        lowest: all parameters at the point of the lowest deviance, shape (P,).
     """
 
     name: str
     values: Array
     deviance: Array
     interval: tuple[float, float]
+    lowest: Array
+
+    @property
+    def better_optimum(self) -> bool:
+        """Whether a point fits better than the estimate, which then is no optimum."""
+        return bool(self.deviance.min() < BETTER_BELOW)
 
 
-def profile(problem: Problem, found: Uncertainty, name: str) -> Profile:
-    """Hold a parameter on a grid of values and refinement the others, each from its neighbour's result.
+def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
+    """Hold a parameter at several values and fit the others, each time from the neighbour's result.
 
-    With autocorrelated noise the rise of a sum of squares is no likelihood ratio; it is scaled so that its
+    With autocorrelated noise the rise of a sum of squares is no likelihood ratio. It is scaled so that its
     curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
 
     Raises:
         SettingsError: no free parameter of that name.
     """
     names = problem.parameters.names
-    if name not in names or not found.free[names.index(name)]:
-        free = ", ".join(n for n, is_free in zip(names, found.free, strict=True) if is_free)
-        raise SettingsError(f"no free parameter {name!r} to profile", where="--profile", hint=f"free: {free}")
+    if name not in names or not uncertainty.free[names.index(name)]:
+        free = ", ".join(n for n, is_free in zip(names, uncertainty.free, strict=True) if is_free)
+        raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {free}")
     i = names.index(name)
-    lower, upper = problem.parameters.lower[i], problem.parameters.upper[i]
-    reach = REACH * found.standard_deviation[i]
-    low, high = max(lower, found.theta[i] - reach), min(upper, found.theta[i] + reach)
-    residuals, scale = _with_statements(problem, found), _deviance_unit(found, i)
-    at = float(np.sum(residuals(found.theta[None])[0] ** 2))
-    sides: list[list[tuple[float, float]]] = []
-    for end in (low, high):
-        start, side = found.theta, list[tuple[float, float]]()
-        for value in np.linspace(found.theta[i], end, POINTS + 1)[1:] if end != found.theta[i] else ():
-            start, cost = _fit_others(problem, residuals, start, i, float(value))
-            side.append((float(value), (cost - at) / scale))
-        sides.append(side)
-    points = [*reversed(sides[0]), (float(found.theta[i]), 0.0), *sides[1]]
-    values, deviance = np.array(points).T
+    theta, residuals = uncertainty.theta, _with_priors(problem, uncertainty)
+    cost, unit = float(np.sum(residuals(theta[None])[0] ** 2)), _deviance_unit(uncertainty, i)
+
+    def point(start: Array, value: float) -> tuple[float, Array]:
+        others, square = _fit_others(problem, residuals, start, i, value)
+        return (square - cost) / unit, others
+
+    reach = REACH * float(uncertainty.standard_deviation[i])
+    sides: list[list[tuple[float, Array]]] = []
+    for bound in (problem.parameters.lower[i], problem.parameters.upper[i]):
+        room = float(bound - theta[i])
+        step = float(np.sign(room)) * min(abs(room), reach) / STEPS_PER_REACH
+        sides.append(_walk(point, theta, i, float(bound), step))
+    points = [*reversed(sides[0]), (0.0, theta), *sides[1]]
+    deviance, values = np.array([d for d, _ in points]), np.array([t[i] for _, t in points])
     centre = len(sides[0])
-    return Profile(
-        name,
-        values,
-        deviance,
-        (
-            _crossing(values[centre::-1], deviance[centre::-1], -np.inf),
-            _crossing(values[centre:], deviance[centre:], np.inf),
-        ),
+    interval = (
+        _crossing(values[centre::-1], deviance[centre::-1], -np.inf),
+        _crossing(values[centre:], deviance[centre:], np.inf),
     )
+    return Profile(name, values, deviance, interval, points[int(np.argmin(deviance))][1])
 
 
-def bootstrap(problem: Problem, found: Uncertainty, count: int, seed: int, tell: Tell) -> Array:
-    """Refit `count` times after the residual was redrawn in blocks; estimates of shape (count, P).
+def bootstrap(
+    problem: Problem, uncertainty: Uncertainty, count: int, seed: int, progress: Progress = no_progress
+) -> Array:
+    """Refit `count` times after the residual was redrawn in blocks; return the estimates, shape (count, P).
 
-    Blocks are ten times as long as the noise's memory, drawn from the log's ring of residuals, the same for
-    all channels of a log (H. R. Künsch, 1989); they are scaled up by what the fit took of the noise. The fits
-    are Gauss-Newton steps with the estimate's own derivatives, within the directions that the data feel.
+    Blocks are ten correlation times long, drawn with wrap-around from the log's residuals, the same for all
+    channels of a log (H. R. Künsch, 1989). They are scaled up by the noise that the fit absorbed. A refit
+    takes Gauss-Newton steps with the derivatives of the estimate, along the directions that are measured.
     """
-    rng, rows = np.random.default_rng(seed), found.jacobian.residual
-    pseudo = _pseudo_inverse(found)
-    residuals = _with_statements(problem, found)
-    base, free = residuals(found.theta[None])[0], found.free
+    rng, rows = np.random.default_rng(seed), uncertainty.jacobian.residual
+    pseudo, residuals = _pseudo_inverse(uncertainty), _with_priors(problem, uncertainty)
+    base, free = residuals(uncertainty.theta[None])[0], uncertainty.free
     lower, upper = problem.parameters.lower[free], problem.parameters.upper[free]
-    out = np.tile(found.theta, (count, 1))
-    for first in range(0, count, CHUNK):
-        part = slice(first, min(first + CHUNK, count))
-        tell("refits", first, count)
-        shift = np.zeros((part.stop - part.start, base.size))
-        shift[:, : rows.size] = _redrawn(problem, found, part.stop - part.start, rng) - rows
-        for _ in range(STEPS):
-            now = residuals(out[part]) + shift
-            step = -(now @ pseudo) * found.jacobian.scale[free]
-            out[part.start : part.stop, free] = np.clip(
-                out[part][:, free] + np.nan_to_num(step), lower, upper
-            )
-    return out
+    estimates = np.tile(uncertainty.theta, (count, 1))
+    for first in range(0, count, BATCH):
+        progress("refits", first, count)
+        batch = estimates[first : first + BATCH]  # a view: filled in place
+        shift = np.zeros((len(batch), base.size))
+        shift[:, : rows.size] = _redrawn(problem, uncertainty, len(batch), rng) - rows
+        for _ in range(BOOTSTRAP_STEPS):
+            step = -((residuals(batch) + shift) @ pseudo) * uncertainty.jacobian.scale[free]
+            batch[:, free] = np.clip(batch[:, free] + np.nan_to_num(step), lower, upper)
+    return estimates
 
 
-def _redrawn(problem: Problem, found: Uncertainty, count: int, rng: np.random.Generator) -> Array:
+def _walk(
+    point: Callable[[Array, float], tuple[float, Array]], theta: Array, i: int, bound: float, step: float
+) -> list[tuple[float, Array]]:
+    """Deviances and refitted parameters at values further and further from the estimate.
+
+    Ends beyond THRESHOLD or at the bound. Where that takes fewer than three steps they were too long, and
+    shorter ones are taken.
+    """
+    points: list[tuple[float, Array]] = []
+    for _ in range(ZOOMS if step else 0):
+        points, value, length = [], float(theta[i]), step
+        while value != bound and len(points) < MAX_POINTS and not (points and points[-1][0] > THRESHOLD):
+            length *= 1.5 if len(points) >= STEPS_PER_REACH else 1.0
+            value += length
+            if abs(bound - value) < 1e-6 * abs(length) or (value - bound) * step > 0:
+                value = bound
+            points.append(point(points[-1][1] if points else theta, value))
+        if len(points) > 2 or points[-1][0] <= THRESHOLD:
+            break
+        step = (float(points[-1][1][i]) - float(theta[i])) / STEPS_PER_REACH
+    return points
+
+
+def _redrawn(problem: Problem, uncertainty: Uncertainty, count: int, rng: np.random.Generator) -> Array:
     """Residuals put together from blocks of the log's own, shape (count, R)."""
-    out = np.empty((count, found.jacobian.residual.size))
+    residual = uncertainty.jacobian.residual
+    drawn = np.empty((count, residual.size))
     for log in dict.fromkeys(channel.log for channel in problem.channels):
-        mine = [(c, n) for c, n in zip(problem.channels, found.noise, strict=True) if c.log == log]
-        samples = len(mine[0][0].measured)
-        memory = max(noise.correlation_time for _, noise in mine)
-        block = int(min(max(np.ceil(samples ** (1 / 3)), 10 * memory), max(samples // 10, 1)))
+        pairs = [p for p in zip(problem.channels, uncertainty.noise, strict=True) if p[0].log == log]
+        samples = len(pairs[0][0].measured)
+        longest = 10 * max(noise.correlation_time for _, noise in pairs)
+        block = int(min(max(np.ceil(samples ** (1 / 3)), longest), max(samples // 10, 1)))
         starts = rng.integers(samples, size=(count, -(-samples // block)))
         index = ((starts[:, :, None] + np.arange(block)).reshape(count, -1) % samples)[:, :samples]
-        for channel, noise in mine:
-            residual = found.jacobian.residual[channel.rows]
-            level = float(np.sqrt(np.mean(residual**2)))
-            residual = residual - residual.mean()
-            out[:, channel.rows] = residual[index] * (noise.level / level if level > 0 else 0.0)
-    return out
+        for channel, noise in pairs:
+            own = residual[channel.rows]
+            level = float(np.sqrt(np.mean(own**2)))
+            drawn[:, channel.rows] = (own - own.mean())[index] * (noise.level / level if level > 0 else 0.0)
+    return drawn
 
 
-def _with_statements(problem: Problem, found: Uncertainty) -> Callable[[Array], Array]:
-    """Residuals with the statements' scores below them, as the refinement has them, (n, P) -> (n, R + M)."""
-    unit, priors = found.jacobian.unit, problem.priors
-
-    def residuals(theta: Array) -> Array:
-        return np.hstack([problem.residuals(theta), unit * priors.scores(theta)])
-
-    return residuals
+def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
+    """Residuals with the priors' weighted scores behind them, as in a refinement: (n, P) -> (n, R + M)."""
+    weight = uncertainty.jacobian.prior_weight
+    return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
 
 
 def _fit_others(
-    problem: Problem, residuals: Callable[[Array], Array], start: Array, i: int, value: float
+    problem: Problem, residuals: Residuals, start: Array, i: int, value: float
 ) -> tuple[Array, float]:
-    """Refinement all but parameter i, held at a value; the result, shape (P,), and its sum of squares."""
+    """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
     parameters = problem.parameters
     column = int(np.sum(parameters.free[:i]))
 
@@ -161,31 +189,32 @@ def _fit_others(
     return full(result.point[None])[0], 2 * result.cost_after
 
 
-def _pseudo_inverse(found: Uncertainty) -> Array:
-    """Relative changes that best explain a residual with its statements, shape (R + M, p)."""
-    directions, values, course = decompose(found.free, found.jacobian)
-    taken = values > 0
-    return course[taken].T @ (directions[:, taken] / values[taken]).T
+def _pseudo_inverse(uncertainty: Uncertainty) -> Array:
+    """Relative changes that best explain residuals with the priors' scores, shape (R + M, p)."""
+    directions, values, effects = decompose(uncertainty.free, uncertainty.jacobian)
+    measured = values > 0
+    return effects[measured].T @ (directions[:, measured] / values[measured]).T
 
 
-def _deviance_unit(found: Uncertainty, i: int) -> float:
+def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
     """Rise of the sum of squares that is one unit of deviance of parameter i."""
-    bread = np.sum(_pseudo_inverse(found) ** 2, axis=0)  # diagonal of (J J')^-1
-    column = int(np.sum(found.free[:i]))
-    if np.isfinite(found.relative[i]) and bread[column] > 0:
-        return float(found.relative[i] ** 2 / bread[column])
-    known = np.isfinite(found.relative[found.free]) & (bread > 0)
+    bread = np.sum(_pseudo_inverse(uncertainty) ** 2, axis=0)  # diagonal of (J J')^-1
+    relative = uncertainty.relative[uncertainty.free]
+    known = np.isfinite(relative) & (bread > 0)
+    column = int(np.sum(uncertainty.free[:i]))
+    if known[column]:
+        return float(relative[column] ** 2 / bread[column])
     if known.any():
-        return float(np.max(found.relative[found.free][known] ** 2 / bread[known]))
-    return float(np.mean([noise.level**2 for noise in found.noise]))
+        return float(np.max(relative[known] ** 2 / bread[known]))
+    return float(np.mean([noise.level**2 for noise in uncertainty.noise]))
 
 
-def _crossing(values: Array, deviance: Array, none: float) -> float:
-    """Where the deviance first rises above THRESHOLD, its root interpolated; `none` where it never does."""
-    root = np.sqrt(np.maximum(deviance, 0.0))
+def _crossing(values: Array, deviance: Array, unlimited: float) -> float:
+    """Where the deviance rises above THRESHOLD, its root interpolated; `unlimited` where it does not."""
     above = np.flatnonzero(deviance > THRESHOLD)
     if not len(above):
-        return none
+        return unlimited
     b = int(above[0])
-    share = (np.sqrt(THRESHOLD) - root[b - 1]) / (root[b] - root[b - 1])
-    return float(values[b - 1] + share * (values[b] - values[b - 1]))
+    root = np.sqrt(np.maximum(deviance[b - 1 : b + 1], 0.0))
+    part = (np.sqrt(THRESHOLD) - root[0]) / (root[1] - root[0])
+    return float(values[b - 1] + part * (values[b] - values[b - 1]))

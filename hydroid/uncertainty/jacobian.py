@@ -1,4 +1,4 @@
-"""What moves the residuals at one parameter set: derivatives by finite differences whose step is checked."""
+"""Derivatives of the residuals at one parameter vector, by finite differences whose step is checked."""
 
 from dataclasses import dataclass
 
@@ -7,40 +7,40 @@ from numpy.typing import NDArray
 
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.noise import statement_unit
+from hydroid.uncertainty.noise import prior_weight
 
 STEP = 1e-4
 """relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""
-WIDER = 10.0
-"""how much wider the step is that checks it"""
-DOUBTFUL = 0.02
-"""two steps whose derivatives differ by more than this part disagree; the wider looks over small jumps"""
-SMALL = 0.01
-"""of a bounds' width: a value below it changes by parts of this instead of its own"""
+CHECK_FACTOR = 10.0
+"""the step that checks it is this many times wider"""
+STEPS_DISAGREE_ABOVE = 0.02
+"""relative difference of two steps' derivatives above which the wider one counts: it averages small jumps"""
+MIN_SCALE = 0.01
+"""part of the bounds' width: a smaller value is changed by parts of this instead of its own"""
 NO_EFFECT_BELOW = 1e-6
-"""a parameter that moves the response less than this times the strongest one's has no effect on it"""
+"""a parameter whose effect is below this part of the strongest one's has none"""
 
 
 @dataclass(frozen=True, eq=False)
 class Jacobian:
-    """Derivatives at a parameter set, per relative change of each of its P parameters.
+    """Derivatives at a parameter vector, per relative change of each of its P parameters.
 
     Attributes:
         residual: weighted output errors there [rad], shape (R,).
         slopes: their derivatives, shape (P, R); NaN of a fixed parameter, and where simulations diverge on
             both sides.
-        statements: derivatives of the M statements' scores, shape (P, M).
+        prior_slopes: derivatives of the M priors' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
-        error: by how much two steps' derivatives differ, shape (P, R).
-        unit: what a statement's score counts in the refinement, in units of the residual [rad].
+        error: difference between two steps' derivatives, shape (P, R).
+        prior_weight: what a score of 1 counts beside the residuals [rad] (`noise.prior_weight`).
     """
 
     residual: Array
     slopes: Array
-    statements: Array
+    prior_slopes: Array
     scale: Array
     error: Array
-    unit: float
+    prior_weight: float
 
     @property
     def effects(self) -> Array:
@@ -49,12 +49,12 @@ class Jacobian:
 
     @property
     def without_effect(self) -> NDArray[np.bool_]:
-        """Parameters that the outputs do not feel at all, shape (P,)."""
+        """Parameters that the outputs do not depend on, shape (P,)."""
         return self.effects <= NO_EFFECT_BELOW * np.nanmax(self.effects, initial=0.0)
 
     @property
     def doubt(self) -> Array:
-        """Part by which two steps' derivatives differ, shape (P,); 0 where there is no effect."""
+        """Relative difference between two steps' derivatives, shape (P,); 0 where there is no effect."""
         length, error = np.linalg.norm(self.slopes, axis=1), np.linalg.norm(self.error, axis=1)
         return np.where(self.without_effect, 0.0, error / np.maximum(length, np.finfo(float).tiny))
 
@@ -63,45 +63,42 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     """Return the derivatives at theta, shape (P,), from 1 + 4 p simulations, p parameters being free.
 
     Differences are central, or one-sided and of second order at a bound. Each is taken with two steps; where
-    these disagree the wider counts, and `doubt` says by how much.
+    these disagree the wider one counts, and `doubt` is their difference.
     """
     scale, free = relative_scale(problem.parameters, theta), problem.parameters.free
-    at = problem.residuals(theta[None])[0]
-    fine, wide = (_slopes(problem, theta, at, scale, step) for step in (STEP, WIDER * STEP))
+    residual = problem.residuals(theta[None])[0]
+    fine, wide = (_slopes(problem, theta, residual, step * scale) for step in (STEP, CHECK_FACTOR * STEP))
     error = fine - wide
     length = np.linalg.norm(wide, axis=1)
-    disagree = ~(np.linalg.norm(error, axis=1) <= DOUBTFUL * length) & np.isfinite(length)
+    agree = np.linalg.norm(error, axis=1) <= STEPS_DISAGREE_ABOVE * length
+    slopes, errors = np.full((2, len(theta), residual.size), np.nan)
+    slopes[free] = np.where((~agree & np.isfinite(length))[:, None], wide, fine) * scale[free, None]
+    errors[free] = error * scale[free, None]
     change = np.diag(STEP * scale)
     scores = problem.priors.scores(np.vstack([theta + change, theta - change]))
-    statements = (scores[: len(theta)] - scores[len(theta) :]) / (2 * STEP)
-    slopes, errors = np.full((2, len(theta), at.size), np.nan)
-    slopes[free], errors[free] = np.where(disagree[:, None], wide, fine), error
-    unit = statement_unit(problem.channels, at, problem.settings.objective)
-    return Jacobian(at, slopes, statements, scale, errors, unit)
+    prior_slopes = (scores[: len(theta)] - scores[len(theta) :]) / (2 * STEP)
+    weight = prior_weight(problem.channels, residual, problem.settings.objective)
+    return Jacobian(residual, slopes, prior_slopes, scale, errors, weight)
 
 
 def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
-    """Return what a relative change of 1 is, shape (P,): the value, or SMALL of its bounds' width if more."""
-    return np.maximum(np.abs(theta), SMALL * (parameters.upper - parameters.lower))
+    """Return what a relative change of 1 is, shape (P,): the value, or MIN_SCALE of the bounds' width."""
+    return np.maximum(np.abs(theta), MIN_SCALE * (parameters.upper - parameters.lower))
 
 
-def _slopes(problem: Problem, theta: Array, at: Array, scale: Array, step: float) -> Array:
-    """Derivatives from the parabola through each free parameter's value and two others, shape (p, R)."""
-    first, second = _sides(problem.parameters, theta, scale, step)
-    free, count = problem.parameters.free, int(problem.parameters.free.sum())
-    changed = np.vstack([np.diag(first * scale)[free], np.diag(second * scale)[free]])
-    rows = problem.residuals(theta + changed)
-    first, second = first[free, None], second[free, None]
-    near, far = (rows[:count] - at) / first, (rows[count:] - at) / second
-    both = (near * second - far * first) / (second - first)
-    alone = np.where(np.isfinite(near), near, far)  # where one side diverges
-    return np.where(np.isfinite(both), both, alone)
+def _slopes(problem: Problem, theta: Array, residual: Array, step: Array) -> Array:
+    """Derivatives from the parabola through each free parameter's value and two others, shape (p, R).
 
-
-def _sides(parameters: ParameterSet, theta: Array, scale: Array, step: float) -> tuple[Array, Array]:
-    """Two relative changes of each parameter, on both sides, or on one where a bound is near."""
-    low, high = np.minimum(parameters.lower, theta), np.maximum(parameters.upper, theta)
-    above, below = theta + step * scale > high, theta - step * scale < low
+    The two lie on both sides, a step (P,) away, or both on one side where a bound is near.
+    """
+    free, parameters = problem.parameters.free, problem.parameters
+    above = theta + step > np.maximum(parameters.upper, theta)
+    below = theta - step < np.minimum(parameters.lower, theta)
     first = np.where(above, -step, step)
     second = np.where(above, -2 * step, np.where(below, 2 * step, -step))
-    return first, second
+    rows = problem.residuals(theta + np.vstack([np.diag(first)[free], np.diag(second)[free]]))
+    first, second = first[free, None], second[free, None]
+    near, far = (rows[: len(first)] - residual) / first, (rows[len(first) :] - residual) / second
+    both = (near * second - far * first) / (second - first)
+    one_side = np.where(np.isfinite(near), near, far)  # where the other one diverges
+    return np.where(np.isfinite(both), both, one_side)

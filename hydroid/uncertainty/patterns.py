@@ -1,4 +1,4 @@
-"""Directions that experience or the equations make suspect, and what they leave determined."""
+"""Patterns: directions that the equations make suspect, and the numbers that stay determined along them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +17,9 @@ COIL = ("force_1", "force_2", "stroke_1", "stroke_2")
 CURRENTS = ("current_max", "current_min")
 RATED = "rated_current"
 STEP = 1e-5
+"""relative step of the derivatives in `_null`"""
+NULL_TOLERANCE = 1e-6
+"""singular values below this part of the largest are zero there"""
 
 
 class DirectionKind(StrEnum):
@@ -54,32 +57,32 @@ class Pattern:
     numbers: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
-def patterns(problem: Problem, found: Uncertainty) -> Iterator[Pattern]:
-    """Yield what is worth a try, the simplest first."""
-    names = [n for n, free in zip(problem.parameters.names, found.free, strict=True) if free]
-    yield from _alone(found, names)
-    yield from _solenoids(problem, found, names)
-    yield from _common_scale(problem, found, names)
+def patterns(problem: Problem, uncertainty: Uncertainty) -> Iterator[Pattern]:
+    """Yield the directions to test, the simplest first."""
+    names = [n for n, free in zip(problem.parameters.names, uncertainty.free, strict=True) if free]
+    yield from _alone(uncertainty, names)
+    yield from _solenoids(problem, uncertainty, names)
+    yield from _common_scale(problem, uncertainty, names)
 
 
-def _alone(found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
-    """Parameters without effect, and those whose own effect drowns in the noise."""
-    idle = found.jacobian.without_effect[found.free]
+def _alone(uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+    """Parameters without effect, and those whose own effect is below the noise."""
+    idle = uncertainty.jacobian.without_effect[uncertainty.free]
     for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
         if none:
             yield Pattern(DirectionKind.NO_EFFECT, (name,), direction[None])
     for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
-        if not none and np.linalg.norm(found.root @ direction) < 1 / WEAK_ABOVE:
+        if not none and np.linalg.norm(uncertainty.root @ direction) < 1 / WEAK_ABOVE:
             yield Pattern(DirectionKind.SINGLE, (name,), direction[None])
 
 
-def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
-    """The equation of motion (1) is linear in these: one factor on all of them cancels.
+def _common_scale(problem: Problem, uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+    """A common factor on all parameters that the equation of motion (1) is linear in.
 
-    What is fixed (the jaws' mass) does not scale along: the free masses then differ from the common factor by
-    what makes up for it best.
+    A fixed mass, such as the jaws', does not change with them. The free masses then differ from the common
+    factor by what makes up for it best.
     """
-    settings, idle = problem.settings.parameters, found.jacobian.without_effect[found.free]
+    settings, idle = problem.settings.parameters, uncertainty.jacobian.without_effect[uncertainty.free]
     linear = np.array([settings[name].quantity in MECHANICAL_UNITS for name in names]) & ~idle
     mass = np.array([settings[name].quantity == "mass" for name in names]) & linear
     if linear.sum() < 2:
@@ -87,19 +90,19 @@ def _common_scale(problem: Problem, found: Uncertainty, names: Sequence[str]) ->
     changes = linear.astype(float)
     if mass.any():
         # least squares with a penalty: a change of 100 % from the common factor counts as much as the noise
-        felt = np.vstack([found.root[:, mass], np.eye(mass.sum())])
-        target = np.append(-found.root @ changes, np.zeros(mass.sum()))
-        changes[mass] += np.linalg.lstsq(felt, target)[0]
+        matrix = np.vstack([uncertainty.root[:, mass], np.eye(mass.sum())])
+        target = np.append(-uncertainty.root @ changes, np.zeros(mass.sum()))
+        changes[mass] += np.linalg.lstsq(matrix, target)[0]
     order = [*np.flatnonzero(linear & ~mass).tolist(), *np.flatnonzero(mass).tolist()]
     yield Pattern(DirectionKind.COMMON_SCALE, tuple(names[i] for i in order), changes[None])
 
 
-def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
-    """F1, F2, x1, x2 act through δ and k i0² alone; these and the currents through δ and k i²."""
+def _solenoids(problem: Problem, uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
+    """F1, F2, x1 and x2 act through δ and k i0² alone; with the currents through δ and k i²."""
     if problem.settings.stage != "hyd":
         return
     settings = problem.settings.parameters
-    values = dict(zip(problem.parameters.names, found.theta, strict=True))
+    values = dict(zip(problem.parameters.names, uncertainty.theta, strict=True))
     for joints in {tuple(p.joints or ()) for p in settings.values() if p.quantity in COIL}:
         mine = {p.quantity: n for n, p in settings.items() if tuple(p.joints or ()) == joints}
         nominal = problem.settings.hydraulics.model_dump()
@@ -118,14 +121,14 @@ def _solenoids(problem: Problem, found: Uncertainty, names: Sequence[str]) -> It
 
 
 def _acting(at: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """δ [mm], k i0², k I_max², k I_min² [N·mm²]: all through which coil and currents act."""
+    """Return δ [mm], k i0², k I_max², k I_min² [N·mm²], through which coil and currents act."""
     k, gap = force_curve(at["force_1"], at["force_2"], at["stroke_1"], at["stroke_2"], at[RATED])
     currents = (RATED, *CURRENTS)
     return (float(gap), *(float(k) * at[q] ** 2 for q in currents))  # pyright: ignore[reportReturnType]
 
 
 def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> Array:
-    """Relative changes of `free` that leave the numbers `held` of what acts as they are, (m, len(free))."""
+    """Relative changes of `free` that leave the numbers `held` of `_acting` as they are, (m, len(free))."""
     if not free:
         return np.empty((0, 0))
     columns = []
@@ -136,7 +139,7 @@ def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> 
         columns.append((high - low) / (2 * STEP))
     matrix = np.array(columns).T
     _, values, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(values > 1e-6 * values[0]))
+    rank = int(np.sum(values > NULL_TOLERANCE * values[0]))
     return directions[rank:]
 
 

@@ -1,6 +1,5 @@
-"""What each parameter does to each output against time (article 3.1 and figure 10)."""
+"""Sensitivity of each output to each parameter against time (article 3.1 and figure 10)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +7,10 @@ from numpy.typing import NDArray
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
+from hydroid.progress import Progress, no_progress
 from hydroid.uncertainty.jacobian import jacobian
 
-COUNT = 20
+SWEEP_POINTS = 20
 """values of each parameter within its bounds, as in the article"""
 
 
@@ -18,9 +18,12 @@ COUNT = 20
 class Sweep:
     """Local and global sensitivity of all channels.
 
-    free: indices of the F free parameters, shape (F,). slopes: change of each channel per 1 % of each of
-    them [rad or Pa], one array (F, T) a channel; NaN where the changed set diverges. values: of each within
-    its bounds, shape (F, COUNT). responses: each channel at these [rad or Pa], (F, COUNT, T) a channel.
+    Attributes:
+        free: indices of the F free parameters, shape (F,).
+        slopes: change of each channel per 1 % of each free parameter [rad or Pa], one array (F, T) per
+            channel; NaN where the simulation diverges.
+        values: of each free parameter within its bounds, shape (F, SWEEP_POINTS).
+        responses: each channel at these [rad or Pa], one array (F, SWEEP_POINTS, T) per channel.
     """
 
     free: NDArray[np.intp]
@@ -29,23 +32,23 @@ class Sweep:
     responses: tuple[Array, ...]
 
 
-def sweep(problem: Problem, theta: Array, tell: Callable[[str, int, int], None]) -> Sweep:
-    """Return how the channels depend on each free parameter around theta, shape (P,), and over its bounds.
+def sweep(problem: Problem, theta: Array, progress: Progress = no_progress) -> Sweep:
+    """Return how the channels change with each free parameter, near theta, shape (P,), and over its bounds.
 
     Slopes are those of `jacobian`; 1 % of a value near 0 is 1 % of its scale.
     """
     parameters = problem.parameters
     free = np.flatnonzero(parameters.free)
     slopes = -0.01 * jacobian(problem, theta).slopes[free]
-    values = np.linspace(parameters.lower[free], parameters.upper[free], COUNT, axis=1)
+    values = np.linspace(parameters.lower[free], parameters.upper[free], SWEEP_POINTS, axis=1)
     count = len(free)
-    responses = tuple(np.empty((count, COUNT, len(c.measured))) for c in problem.channels)
+    responses = tuple(np.empty((count, SWEEP_POINTS, len(c.measured))) for c in problem.channels)
     for i, column in enumerate(free):
-        points = np.tile(theta, (COUNT, 1))
+        points = np.tile(theta, (SWEEP_POINTS, 1))
         points[:, column] = values[i]
         rows = problem.residuals(points)
         for channel, response in zip(problem.channels, responses, strict=True):
             response[i] = channel.measured - rows[:, channel.rows] / channel.weight
-        tell("values of parameters", COUNT * (i + 1), COUNT * count)
+        progress("values of parameters", SWEEP_POINTS * (i + 1), SWEEP_POINTS * count)
     changes = tuple(slopes[:, channel.rows] / channel.weight for channel in problem.channels)
     return Sweep(free, changes, values, responses)

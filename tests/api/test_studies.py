@@ -20,7 +20,7 @@ from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 from hydroid.simulating import simulate_log
 from hydroid.uncertainty.surface import surface
-from hydroid.uncertainty.sweep import COUNT, sweep
+from hydroid.uncertainty.sweep import SWEEP_POINTS, sweep
 
 TRUTH = {
     "K": 0.2,
@@ -79,7 +79,7 @@ def test_a_parameter_without_effect_moves_nothing_anywhere_within_its_bounds(pro
     idle = list(TRUTH).index("M1")
     assert np.abs(found.slopes[0][idle]).max() < 1e-9 * np.abs(found.slopes[0]).max()
     assert np.ptp(found.responses[0][idle], axis=0).max() < 1e-9
-    assert found.responses[0].shape == (9, COUNT, len(problem.logs[0].time))
+    assert found.responses[0].shape == (9, SWEEP_POINTS, len(problem.logs[0].time))
 
 
 def test_only_free_parameters_are_swept(study_log: Log):

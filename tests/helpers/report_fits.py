@@ -18,7 +18,7 @@ from hydroid.search.least_squares import Ending, Refinement
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
-from hydroid.uncertainty.covariance import Uncertainty, judge
+from hydroid.uncertainty.covariance import Uncertainty, uncertainty_from
 from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.jacobian import Jacobian, relative_scale
 from hydroid.uncertainty.noise import channel_noise
@@ -138,10 +138,10 @@ def make_uncertainty(
         np.zeros((len(theta), 0)),
         relative_scale(problem.parameters, theta),
         np.zeros_like(slopes),
-        unit=1.0,
+        prior_weight=1.0,
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
-    return judge(problem, theta, at, noise)
+    return uncertainty_from(problem, theta, at, noise)
 
 
 class Folder(RunFolder):

@@ -12,11 +12,11 @@ from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings, PriorSettings
-from hydroid.uncertainty.covariance import judge, uncertainty
+from hydroid.uncertainty.covariance import uncertainty, uncertainty_from
 from hydroid.uncertainty.flags import Flag, ParameterStatus
-from hydroid.uncertainty.intervals import REACH, THRESHOLD, bootstrap, profile
+from hydroid.uncertainty.intervals import THRESHOLD, bootstrap, profile
 from hydroid.uncertainty.jacobian import jacobian
-from hydroid.uncertainty.noise import FLOOR, Noise, channel_noise, fit_noise
+from hydroid.uncertainty.noise import MIN_LEVEL, Noise, channel_noise, fit_noise
 
 DEG = np.deg2rad(1.0)
 AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
@@ -108,7 +108,7 @@ def test_the_sandwich_is_right_where_weights_and_noise_do_not_match():
     expected = bread @ (columns * weight**4 * scatter**2 @ columns.T) @ bread
     at = jacobian(problem, THETA)
     noise = tuple(Noise(500, w * s, np.empty(0), "settings") for w, s in zip(weights, levels, strict=True))
-    found = judge(problem, THETA, at, noise)
+    found = uncertainty_from(problem, THETA, at, noise)
     np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-6)
 
 
@@ -232,7 +232,7 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     how, rng = problem.settings.objective, np.random.default_rng(6)
     residual = rng.normal(0, 0.3 * DEG, 1000)
     assert channel_noise(channel, residual, how).source == "residual"
-    assert channel_noise(channel, 1e-6 * residual, how).level == FLOOR["angle"]
+    assert channel_noise(channel, 1e-6 * residual, how).level == MIN_LEVEL["angle"]
     given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
     assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
     weighted = channel_noise(
@@ -265,7 +265,9 @@ def test_the_profile_of_a_linear_problem_is_its_parabola():
     one = profile(problem, found, "b")
     deviation = found.standard_deviation[1]
     np.testing.assert_allclose(one.deviance, ((one.values - theta[1]) / deviation) ** 2, atol=2e-3)
-    np.testing.assert_allclose(one.values[[0, -1]], theta[1] + REACH * deviation * np.array([-1, 1]))
+    # half a standard deviation a step, until beyond the interval
+    np.testing.assert_allclose(one.values, theta[1] + np.arange(-4, 4.5) / 2 * deviation)
+    assert not one.better_optimum
     half = np.sqrt(THRESHOLD) * deviation
     np.testing.assert_allclose(one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4)
     with pytest.raises(SettingsError, match="no free parameter 'z'"):
@@ -278,6 +280,17 @@ def test_the_profile_of_what_is_not_determined_has_no_end():
     problem = Linear(columns, THETA @ columns + np.random.default_rng(0).normal(0, DEG, 1000), THETA)
     found = uncertainty(problem, THETA)
     assert profile(problem, found, "a").interval == (-np.inf, np.inf)
+
+
+def test_a_profile_from_no_optimum_finds_the_better_one():
+    problem, theta = white_problem(noise_deg=0.1)
+    deviation = uncertainty(problem, theta).standard_deviation[1]
+    off = theta + np.array([0.0, 2 * deviation, 0.0])
+    found = profile(problem, uncertainty(problem, off), "b")
+    assert found.better_optimum
+    np.testing.assert_allclose(found.lowest, theta, atol=0.3 * deviation)
+    cost = np.sum(problem.residuals(np.stack([off, found.lowest])) ** 2, axis=1)
+    assert cost[1] < cost[0]
 
 
 @pytest.mark.parametrize("phi", [0.0, AR1])

@@ -39,15 +39,14 @@ def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm
 
 def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
-    log, candidates = problem.logs[0], problem.stage.candidates(theta).arm
+    log, candidates = problem.logs[0], problem.stage.candidates(theta)
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm.model, arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
     reduced.model.qpos_spring[:] = log.angle[0, moving]
     batch = Batch(reduced.model, nsim=len(theta))
-    inertials = reduced.inertials(candidates.mass)
-    for name in ("mass", "inertia", "ipos", "iquat"):
-        batch.expand(f"body_{name}")[:] = getattr(inertials, name)
+    for name, value in reduced.inertials(candidates.mass).items():
+        batch.expand(name)[:] = value
     batch.expand("dof_damping")[:] = candidates.damping[:, moving]
     batch.expand("jnt_stiffness")[:] = candidates.stiffness[:, moving]
     batch.set_const()

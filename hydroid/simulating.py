@@ -11,10 +11,12 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import write_atomic
+from hydroid.identified import IdentifiedModel
 from hydroid.log import Log, Warn, read_log, write_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
+from hydroid.report.actuator import actuator_card, write_actuator
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import HydraulicSimulation, Response
 
@@ -155,3 +157,18 @@ def _response(
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=source)
     return response
+
+
+def plot_actuator(identified: IdentifiedModel, joint: int, out: Path) -> list[Path]:
+    """Draw the curves of one actuator, joint 1-based, and return the files.
+
+    Raises:
+        SettingsError: no such joint, no hydraulics, or no force-stroke curve.
+        RunError: `out` cannot be written.
+    """
+    settings = identified.settings
+    if settings.stage != "hyd":
+        hint = "use --config fit-hyd"
+        raise SettingsError("stage mech has no actuators", where=identified.source, hint=hint)
+    candidate = Stage(settings).candidates(identified.theta[None])
+    return write_actuator(out, actuator_card(settings.arm, candidate, joint, identified.source))

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
-from hydroid.simulation import ArmParameters
+from hydroid.simulation import Candidates
 
 # an example's time says nothing on a machine that is busy with something else
 settings.register_profile("hydroid", deadline=None)
@@ -38,10 +38,10 @@ def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: i
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def candidates(arm: Arm, n: int, seed: int = 0) -> ArmParameters:
+def candidates(arm: Arm, n: int, seed: int = 0) -> Candidates:
     """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
     rng = np.random.default_rng(seed)
     joints = np.ones((1, len(arm.joint_names)))
     shared = [rng.uniform(0.5, 2.0, (n, 1)) * value * joints for value in (0.2, 231.8, 53.4)]
     mass = rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses
-    return ArmParameters(*shared, friction=np.zeros((n, len(arm.joint_names))), mass=mass)
+    return Candidates(*shared, friction=np.zeros((n, len(arm.joint_names))), mass=mass)

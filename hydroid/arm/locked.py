@@ -20,32 +20,9 @@ from hydroid.settings.arm import Arm
 
 Array = NDArray[np.float64]
 
-_OPTIONS = (
-    "timestep",
-    "gravity",
-    "integrator",
-    "solver",
-    "iterations",
-    "tolerance",
-    "jacobian",
-    "enableflags",
-)
-_JOINT_FIELDS = ("range", "limited", "margin", "solref", "solimp", "stiffness", "stiffnesspoly")
-_DOF_FIELDS = ("damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp")
-
-
-@dataclass(frozen=True)
-class Inertials:
-    """What MuJoCo asks of B bodies, the world first, in n variants; fields as in mjModel's `body_...`."""
-
-    mass: Array
-    """[kg], shape (n, B)"""
-    ipos: Array
-    """centre of mass in the body's frame [m], shape (n, B, 3)"""
-    iquat: Array
-    """orientation of the principal axes in the body's frame, quaternion (w, x, y, z), shape (n, B, 4)"""
-    inertia: Array
-    """principal moments [kg·m²], shape (n, B, 3)"""
+_OPTIONS = "timestep gravity integrator solver iterations tolerance jacobian enableflags".split()
+_JOINT_FIELDS = "range limited margin solref solimp stiffness stiffnesspoly".split()
+_DOF_FIELDS = "damping dampingpoly armature frictionloss solref solimp".split()
 
 
 @dataclass(frozen=True)
@@ -69,16 +46,25 @@ class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 
     model: mujoco.MjModel
-    """one body a moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
+    """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
     joints: tuple[str, ...]
-    """the moving joints in the order of qpos and qvel"""
+    """the moving joints in the order of qpos and qvel, (V,)"""
+    columns: NDArray[np.intp]
+    """the same among the arm's joints, 0-based, shape (V,)"""
+    pose: Array
+    """where they start [rad], shape (V,)"""
     parts: tuple[_Part, ...]
 
-    def inertials(self, masses: Array) -> Inertials:
+    def inertials(self, masses: Array) -> dict[str, Array]:
         """Fuse the links; row k depends on masses[k] alone, to the last bit.
 
         Args:
             masses: of the links [kg], shape (n, L), columns as in `Arm.link_names`.
+
+        Returns:
+            The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape (n, B);
+            body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4); body_inertia [kg·m²],
+            shape (n, B, 3).
         """
         n, bodies = len(masses), self.model.nbody
         weights = [np.full(n, p.mass) if p.column is None else masses[:, p.column] for p in self.parts]
@@ -93,11 +79,11 @@ class LockedArm:
             away = part.centre - ipos[:, part.body]
             tensor[:, part.body] += weight[:, None, None] * (part.inertia + _steiner(away))
         inertia, iquat = _principal(tensor)
-        return Inertials(mass, ipos, iquat, inertia)
+        return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
 
 
-def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
-    """Lock all joints but the moving ones.
+class Fusion:
+    """Which bodies move as one while some joints are locked.
 
     Args:
         spec: the arm's model, as `load_model` returns it.
@@ -105,80 +91,90 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
         moving: names of the joints that stay, in any order.
         pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is ignored.
 
-    Raises:
-        ModelError: nothing to move, a name that is no joint, or a body without mass.
-    """
-    joints = tuple(name for name in arm.joint_names if name in moving)
-    if not joints or len(joints) < len(set(moving)):
-        wrong = sorted(set(moving) - set(joints))
-        what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
-        raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
-    with quiet_mujoco():
-        full = spec.compile()
-    data = mujoco.MjData(full)
-    for name, angle in zip(arm.joint_names, pose, strict=True):
-        if name not in joints:
-            data.joint(name).qpos[0] = angle
-    mujoco.mj_kinematics(full, data)
+    Attributes:
+        joints: the moving joints in the arm's order.
+        kept: bodies that remain, the world first.
+        carrier: for each body the kept body that it moves with.
 
-    kept = [0, *(int(full.joint(name).bodyid[0]) for name in joints)]
-    carrier = _carriers(full, kept)
-    parts = _parts(full, data, arm, kept, carrier)
-    model = _skeleton(full, data, kept, carrier, joints)
-    locked = LockedArm(model, joints, parts)
-    _write(locked, np.array([full.body(name).mass[0] for name in arm.link_names]))
+    Raises:
+        ModelError: nothing to move, or a name that is no joint.
+    """
+
+    def __init__(self, spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> None:
+        self.joints = tuple(name for name in arm.joint_names if name in moving)
+        if not self.joints or len(self.joints) < len(set(moving)):
+            wrong = sorted(set(moving) - set(self.joints))
+            what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
+            raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
+        with quiet_mujoco():
+            self.full = spec.compile()
+        self.data = mujoco.MjData(self.full)
+        for name, angle in zip(arm.joint_names, pose, strict=True):
+            if name not in self.joints:
+                self.data.joint(name).qpos[0] = angle
+        mujoco.mj_kinematics(self.full, self.data)
+        self.kept = [0, *(int(self.full.joint(name).bodyid[0]) for name in self.joints)]
+        self.carrier: list[int] = []
+        for body in range(self.full.nbody):
+            parent = self.full.body_parentid[body]
+            self.carrier.append(body if body in self.kept else self.carrier[parent])
+
+    def place(self, body: int, carrier: int) -> tuple[Array, Array]:
+        """Return position [m] and quaternion (w, x, y, z) of a body in a carrier's frame."""
+        data, turn = self.data, np.empty(4)
+        mujoco.mju_mulQuat(turn, data.xquat[carrier] * [1, -1, -1, -1], data.xquat[body])
+        return data.xmat[carrier].reshape(3, 3).T @ (data.xpos[body] - data.xpos[carrier]), turn
+
+
+def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
+    """Lock all joints but the moving ones; arguments and errors as of `Fusion`.
+
+    Raises:
+        ModelError: also a body without mass.
+    """
+    fusion = Fusion(spec, arm, moving, pose)
+    columns = np.array([arm.joint_names.index(name) for name in fusion.joints])
+    locked = LockedArm(_skeleton(fusion), fusion.joints, columns, pose[columns], _parts(fusion, arm))
+    masses = np.array([fusion.full.body(name).mass[0] for name in arm.link_names])
+    for name, value in locked.inertials(masses[None]).items():
+        getattr(locked.model, name)[:] = value[0]
+    with quiet_mujoco():
+        mujoco.mj_setConst(locked.model, mujoco.MjData(locked.model))
     return locked
 
 
-def _carriers(full: mujoco.MjModel, kept: Sequence[int]) -> list[int]:
-    """For each body of the full model the kept body that it moves with, shape (bodies,)."""
-    carrier: list[int] = []
-    for body in range(full.nbody):
-        carrier.append(body if body in kept else carrier[full.body_parentid[body]])
-    return carrier
-
-
-def _parts(
-    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: Sequence[int], carrier: Sequence[int]
-) -> tuple[_Part, ...]:
+def _parts(fusion: Fusion, arm: Arm) -> tuple[_Part, ...]:
     """Every body that moves and has mass, seen from its carrier."""
+    full, data = fusion.full, fusion.data
     column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
     parts: list[_Part] = []
-    for body in range(full.nbody):
+    for body, carrier in enumerate(fusion.carrier):
         mass = float(full.body_mass[body])
-        if carrier[body] == 0 or (mass == 0 and body not in column):
+        if carrier == 0 or (mass == 0 and body not in column):
             continue
         if mass == 0:
             raise ModelError(f"body {full.body(body).name!r} has no mass", where=arm.name)
-        frame = data.xmat[carrier[body]].reshape(3, 3)
+        frame = data.xmat[carrier].reshape(3, 3)
         axes = frame.T @ data.ximat[body].reshape(3, 3)
-        centre = frame.T @ (data.xipos[body] - data.xpos[carrier[body]])
+        centre = frame.T @ (data.xipos[body] - data.xpos[carrier])
         inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
-        parts.append(_Part(kept.index(carrier[body]), column.get(body), mass, centre, inertia))
-    for place, body in enumerate(kept[1:], start=1):
+        parts.append(_Part(fusion.kept.index(carrier), column.get(body), mass, centre, inertia))
+    for place, body in enumerate(fusion.kept[1:], start=1):
         if all(part.body != place for part in parts):
             raise ModelError(f"body {full.body(body).name!r} moves and has no mass", where=arm.name)
     return tuple(parts)
 
 
-def _skeleton(
-    full: mujoco.MjModel,
-    data: mujoco.MjData,
-    kept: Sequence[int],
-    carrier: Sequence[int],
-    joints: Sequence[str],
-) -> mujoco.MjModel:
+def _skeleton(fusion: Fusion) -> mujoco.MjModel:
     """The chain of kept bodies with the joints' properties; what it weighs is still to be written."""
-    spec = mujoco.MjSpec()
+    full, spec = fusion.full, mujoco.MjSpec()
     bodies = {0: spec.worldbody}
-    for name, body in zip(joints, kept[1:], strict=True):
-        parent = carrier[full.body_parentid[body]]
-        frame = data.xmat[parent].reshape(3, 3)
-        turn = np.empty(4)
-        mujoco.mju_mulQuat(turn, data.xquat[parent] * [1, -1, -1, -1], data.xquat[body])
+    for name, body in zip(fusion.joints, fusion.kept[1:], strict=True):
+        parent = fusion.carrier[full.body_parentid[body]]
+        position, turn = fusion.place(body, parent)
         bodies[body] = bodies[parent].add_body(
             name=full.body(body).name,
-            pos=frame.T @ (data.xpos[body] - data.xpos[parent]),
+            pos=position,
             quat=turn,
             simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
             explicitinertial=True,
@@ -195,20 +191,11 @@ def _skeleton(
     # what the skeleton has not got costs a tenth of a step to look for; a diverged candidate must stay diverged
     idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
-    chosen = [full.joint(name).id for name in joints]
-    for prefix, fields in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
-        for field in fields:
-            getattr(model, prefix + field)[:] = getattr(full, prefix + field)[chosen]
+    chosen = [full.joint(name).id for name in fusion.joints]
+    for prefix, names in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
+        for name in names:
+            getattr(model, prefix + name)[:] = getattr(full, prefix + name)[chosen]
     return model
-
-
-def _write(locked: LockedArm, masses: Array) -> None:
-    """Give the model the inertials of one set of link masses [kg], shape (L,)."""
-    inertials, model = locked.inertials(masses[None]), locked.model
-    model.body_mass[:], model.body_ipos[:] = inertials.mass[0], inertials.ipos[0]
-    model.body_iquat[:], model.body_inertia[:] = inertials.iquat[0], inertials.inertia[0]
-    with quiet_mujoco():
-        mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def _steiner(away: Array) -> Array:

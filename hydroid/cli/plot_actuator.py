@@ -17,9 +17,10 @@ def plot_actuator(
     quiet: Quiet = False,
 ) -> None:
     """Draw an actuator's calibration, current, force, spool, opening, flow and torque (PNG and SVG)."""
-    from hydroid.viewer.choice import choose
-    from hydroid.viewer.show import plot_actuator
+    from hydroid.identified import load_identified
+    from hydroid.simulating import plot_actuator
 
-    files = plot_actuator(choose(config, params, overrides(setting)), joint, out)
+    chosen = load_identified(params, config, overrides(setting), default="fit-hyd", nominal=True)
+    files = plot_actuator(chosen, joint, out)
     if not quiet:
         typer.echo(str(files[0]))

@@ -36,10 +36,10 @@ def view(
         if log is None:
             raise SettingsError("needs a LOG.csv: a file has no sliders", where="--gif")
         _render_without_display()
-    from hydroid.viewer.choice import choose
+    from hydroid.identified import load_identified
     from hydroid.viewer.show import animate, view
 
-    chosen = choose(config, params, overrides(setting))
+    chosen = load_identified(params, config, overrides(setting), default="fit-hyd", nominal=True)
     if chosen.nominal and not quiet:
         which = ", ".join(chosen.nominal) if params else "all parameters"
         typer.echo(f"hydroid: note: nominal values for {which}", err=True)

@@ -27,7 +27,7 @@ from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
-from hydroid.simulation.record import Record
+from hydroid.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Problem:
         return segment_bounds(channel.measured, period, how) + channel.rows.start
 
     def _chunks(self, n: int) -> Iterator[slice]:
-        size = min(simulation.record.chunk for simulation in self._simulations)
+        size = min(simulation.scenario.chunk for simulation in self._simulations)
         return (slice(i, min(i + size, n)) for i in range(0, n, size))
 
 
@@ -187,10 +187,10 @@ def make_simulation(
     payload = settings.payloads.get(Path(log.source).name)
     if payload:
         spec = add_payload(spec, settings.arm, payload)
-    record = Record(spec, settings.arm, log, outputs, settings.simulation)
+    scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
     if settings.stage == "mech":
-        return MechanicalSimulation(record, settings.simulation)
-    return HydraulicSimulation(record, settings.arm, settings.hydraulics, settings.simulation, pressures)
+        return MechanicalSimulation(scenario, settings.simulation)
+    return HydraulicSimulation(scenario, settings.arm, settings.hydraulics, settings.simulation, pressures)
 
 
 class Memo:

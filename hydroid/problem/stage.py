@@ -1,9 +1,7 @@
 """The two stages of the article: which parameters are free, and where each enters (section 3, (15), (16))."""
 
 from collections.abc import Sequence
-from dataclasses import fields
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,8 +11,8 @@ from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import QUANTITIES
-from hydroid.settings.problem import ParameterSettings
-from hydroid.simulation import ArmParameters, Candidates
+from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
+from hydroid.simulation import Candidates
 
 
 class Stage:
@@ -41,7 +39,7 @@ class Stage:
 
     def candidates(self, theta: Array) -> Candidates:
         """Spread theta, shape (n, P), over joints, links and actuators."""
-        arm = {f.name: np.zeros((len(theta), len(self._arm.joint_names))) for f in fields(ArmParameters)}
+        arm = {name: np.zeros((len(theta), len(self._arm.joint_names))) for name in MECHANICAL_UNITS}
         arm["mass"] = np.tile(self._arm.masses, (len(theta), 1))
         actuators = None
         if self._hydraulics is not None:
@@ -53,7 +51,7 @@ class Stage:
                 arm[quantity][:, slots] = theta[:, column, None]
             elif actuators is not None:
                 actuators[quantity][:, slots] = theta[:, column, None] * QUANTITIES[quantity].factor
-        return Candidates(ArmParameters(**arm), actuators)
+        return Candidates(**arm, actuators=actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
         """Refuse commands that nothing turns into torque: stage 1 needs gain and damping of active joints.
@@ -76,26 +74,6 @@ class Stage:
                     where="parameters",
                     hint="add one, or leave the joint's command out with log.joints",
                 )
-
-    def write_into(self, spec: mujoco.MjSpec, theta: Array) -> None:
-        """Set the arm's MJCF to theta, shape (P,): masses with inertias, dampers, springs, friction, gain.
-
-        The motor of a joint then takes the command in %. Springs are slack at their `springref`, which a
-        simulation sets to its start pose.
-        """
-        values = self.candidates(theta[None]).arm
-        for name, mass, nominal in zip(self._arm.link_names, values.mass[0], self._arm.masses, strict=True):
-            body = spec.body(name)
-            body.fullinertia = np.asarray(body.fullinertia) * (
-                mass / nominal
-            )  # the tensor scales with the mass
-            body.mass = mass
-        for j, name in enumerate(self._arm.joint_names):
-            joint, motor = spec.joint(name), spec.actuator(name)
-            joint.damping[0], joint.stiffness[0] = values.damping[0, j], values.stiffness[0, j]
-            joint.frictionloss = values.friction[0, j]
-            if self._hydraulics is None:
-                motor.gear[0] = values.gain[0, j]
 
     def _refuse_overlap(self) -> None:
         taken: dict[tuple[str, int], str] = {}

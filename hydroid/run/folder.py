@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
+import numpy as np
 
+from hydroid.arm.export import copy_model
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
@@ -17,7 +18,8 @@ from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.journal import Journal
 from hydroid.fitting.search import Checkpoint, SearchState
-from hydroid.identified import write_settings
+from hydroid.identified import IdentifiedModel, write_settings
+from hydroid.plant import Plant
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run.checkpoint import read_checkpoint, write_checkpoint
 from hydroid.run.identity import (
@@ -31,7 +33,6 @@ from hydroid.run.identity import (
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
 from hydroid.run.summary import summarise
-from hydroid.settings.arm import load_arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
@@ -66,7 +67,7 @@ class RunFolder:
             RunError: the folder cannot be written, or holds other files.
         """
         self._refuse_other_files()
-        self._write_model(load_model(settings.arm.model, settings.arm))
+        copy_model(load_model(settings.arm.model, settings.arm), self.path / "model")
         write_settings(self.path, settings)
         files = {"files": self._hashes(), "origin": model_hash(settings.arm), "status": "running"}
         self.write("run.json", json.dumps(identity(settings, logs) | files, indent=2) + "\n")
@@ -112,11 +113,17 @@ class RunFolder:
         return load(self.path / "config.yaml", FitSettings, overrides)
 
     def write_estimate(self, problem: Problem, fit: Fit) -> None:
-        """Write `estimate.yaml` and the fitted MJCF."""
+        """Write `estimate.yaml` and the fitted arm in `model/`."""
         write_estimate(self.path, summarise(problem, fit))
-        spec = load_model(self.path / "model" / "arm.xml", load_arm(self.path / "arm.yaml"))
-        problem.stage.write_into(spec, fit.best.theta)
-        self._write_xml(spec, "fitted.xml")
+        log, settings = problem.logs[0], self.settings()
+        theta = fit.best.theta
+        driven = {int(j) + 1 for j in np.flatnonzero(log.driven)} | set(settings.outputs)
+        payload = settings.payloads.get(Path(log.source).name, 0.0)
+        source = str(self.path / "estimate.yaml")
+        identified = IdentifiedModel(settings, theta, source)
+        plant = Plant(identified, joints=sorted(driven), payload=payload)
+        plant.reset(log.start)
+        plant.export(self.path / "model")
 
     def status(self, word: str) -> None:
         """Record how far the run is: running, interrupted or done."""
@@ -167,30 +174,3 @@ class RunFolder:
             return
         if not self.path.is_dir() or any(self.path.iterdir()):
             raise RunError("exists and holds no run", where=str(self.path), hint="choose another --out")
-
-    def _write_model(self, spec: mujoco.MjSpec) -> None:
-        """Copy the MJCF with its meshes, so that the run can be read where the original is gone."""
-        home, kept = Path(spec.modelfiledir).resolve(), dict[str, bytes]()
-        for number, mesh in enumerate(spec.meshes):
-            if not mesh.file:
-                continue  # its vertices stand in the MJCF
-            source = home / spec.meshdir / mesh.file
-            try:
-                content = source.read_bytes()
-            except OSError as error:
-                raise RunError(f"mesh cannot be read ({error.strerror})", where=str(source)) from None
-            # meshes of different folders may bear one name
-            taken = kept.get(source.name, content) != content
-            mesh.file = f"{number}_{source.name}" if taken else source.name
-            kept[mesh.file] = content
-        for name, content in kept.items():
-            self.write(f"model/meshes/{name}", content)
-        for pictures, folder in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
-            for picture in pictures:
-                picture.file = picture.file and str(home / folder / picture.file)  # these stay where they are
-        self._write_xml(spec, "arm.xml")
-
-    def _write_xml(self, spec: mujoco.MjSpec, name: str) -> None:
-        spec.modelfiledir, spec.meshdir = str((self.path / "model").resolve()), "meshes"
-        spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
-        self.write(f"model/{name}", spec.to_xml())

@@ -1,7 +1,7 @@
-"""Populations of arms in, angles out: the only room that steps MuJoCo."""
+"""Populations of arms in, angles out: the only package that steps MuJoCo."""
 
+from hydroid.simulation.candidates import Candidates, Response
 from hydroid.simulation.hydraulic import HydraulicSimulation
 from hydroid.simulation.mechanical import MechanicalSimulation
-from hydroid.simulation.population import ArmParameters, Candidates, Response
 
-__all__ = ["ArmParameters", "Candidates", "HydraulicSimulation", "MechanicalSimulation", "Response"]
+__all__ = ["Candidates", "HydraulicSimulation", "MechanicalSimulation", "Response"]

@@ -5,28 +5,25 @@ Each candidate is rolled out by compiled code alone (`hydroid.simulation.rollout
 are threads; candidates are independent, and no thread count changes a bit.
 """
 
-import logging
 import os
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import has_force_curve, linkages
+from hydroid.arm.quiet import quiet_mujoco
+from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
+from hydroid.hydraulics.records import has_force_curve
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.population import Array, Candidates, Population, Response, in_chunks, quiet_mujoco
-from hydroid.simulation.record import Record
-from hydroid.simulation.rollout import Machine, compile_rollout
-from hydroid.simulation.run import HydraulicRun, Start
-
-_log = logging.getLogger(__name__)
+from hydroid.simulation.actuators import ArmActuators
+from hydroid.simulation.candidates import Array, Candidates, Response, in_chunks
+from hydroid.simulation.rollout import HydraulicArm, compile_rollout
+from hydroid.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -44,44 +41,44 @@ class Trace:
     force: Array
 
 
+@dataclass(frozen=True)
+class _Start:
+    """Candidates at the start of a log: what they change in the model, and their actuators."""
+
+    values: dict[str, Array]
+    actuator: Actuator
+    state: ActuatorState
+
+
 class HydraulicSimulation:
-    """Simulates candidates on one record with their actuators.
+    """Simulates candidates on one log with their actuators.
 
     Args:
-        record: the record; its active joints have hydraulics.
+        scenario: what is simulated; its active joints have hydraulics.
         arm: the arm's settings, for the cylinders' triangles.
         hydraulics: settings of the chain.
         settings: threads.
         pressures: active joints whose chamber pressures are wanted in the response, 0-based.
-
-    Attributes:
-        joints: those with actuators and those they couple with, 0-based among the arm's, shape (J,).
-        command: held during each step [%], shape (steps, J).
     """
 
     def __init__(
         self,
-        record: Record,
+        scenario: Scenario,
         arm: Arm,
         hydraulics: HydraulicSettings,
         settings: SimulationSettings,
         pressures: Sequence[int] = (),
     ) -> None:
-        compile_rollout(lambda: _log.warning("compiling the actuator's kernels, once on this machine ..."))
-        self.record, self._hydraulics = record, hydraulics
+        compile_rollout()
+        self.scenario, self._steps = scenario, settings.steps_per_sample
         self._threads = settings.threads or os.cpu_count() or 1
-        self._steps = settings.steps_per_sample
-        prescribed = np.array([], int) if record.prescribed is None else record.prescribed.columns
-        # joints that follow the log keep their servo; all others couple through their inertia and belong in
-        self._columns = np.setdiff1d(np.arange(len(record.joints)), prescribed)
-        self.joints = record.joints[self._columns]
-        self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
-        driven = [int(j) for j in self.joints if record.active[j]]
-        self._linkages = linkages(arm, [int(j) for j in self.joints], driven)
-        self._entries = mass_entries(record.arm.model)[np.ix_(self._columns, self._columns)]
-        self.command = np.ascontiguousarray(record.command[:, self._columns])
-        none = np.empty((len(self.command), 0))
-        self._servo = none if record.prescribed is None else np.ascontiguousarray(record.prescribed.torque)
+        prescribed = scenario.prescribed
+        self._follows = np.array([], np.intp) if prescribed is None else prescribed.columns
+        self._actuators = ArmActuators(arm, scenario.arm, scenario.active, hydraulics, self._follows)
+        self._pressures = np.searchsorted(self._actuators.joints, np.array(pressures, int))
+        self._command = np.ascontiguousarray(scenario.command[:, self._actuators.columns])
+        none = np.empty((len(self._command), 0))
+        self._servo = none if prescribed is None else np.ascontiguousarray(prescribed.torque)
 
     def simulate(self, candidates: Candidates) -> Response:
         """Simulate n candidates, whatever n is.
@@ -90,70 +87,70 @@ class HydraulicSimulation:
             Angles of the outputs, and the pressures asked for, at the log's samples; the first is the start.
             A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
-        return in_chunks(self._simulate_chunk, candidates, self.record.chunk)
+        return in_chunks(self._simulate_chunk, candidates, self.scenario.chunk)
 
     def trace(self, candidates: Candidates) -> Trace:
         """Simulate one candidate and keep what its actuators did."""
-        run = self.begin(candidates)
+        arm = self._arm()
         with quiet_mujoco():
-            _, seen = run.follow(self.command, self._steps, observe=True)
+            _, seen = self._follow(arm, self._start(candidates, arm), 0, observe=True)
         assert seen is not None
-        return Trace(self.joints + 1, seen.pressure, seen.flow, seen.spool, seen.force)
-
-    def begin(self, candidates: Candidates) -> HydraulicRun:
-        """Put one feasible candidate at the start of the record, to be stepped as one likes."""
-        return HydraulicRun(self._start(candidates), 0, self._machine())
+        return Trace(self._actuators.joints + 1, seen.pressure, seen.flow, seen.spool, seen.force)
 
     def _simulate_chunk(self, candidates: Candidates) -> Response:
         assert candidates.actuators is not None
-        n, samples = len(candidates), 1 + len(self.command) // self._steps
-        angle = np.full((n, samples, len(self.record.outputs)), np.nan)
+        n, samples = len(candidates), 1 + len(self._command) // self._steps
+        angle = np.full((n, samples, len(self.scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
         exists = np.flatnonzero(has_force_curve(candidates.actuators))
-        if exists.size:
-            start, threads = self._start(candidates[exists]), min(self._threads, exists.size)
-            free = deque(self._machine() for _ in range(threads))
+        if not exists.size:
+            return Response(angle, np.zeros(n, dtype=bool), pressure)
+        threads = min(self._threads, exists.size)
+        free = deque(self._arm() for _ in range(threads))
 
-            def simulate(candidate: int) -> None:
-                machine = free.pop()
-                run = HydraulicRun(start, candidate, machine)
-                followed, seen = run.follow(self.command, self._steps, observe=pressure is not None)
-                if run.healthy:
-                    angle[exists[candidate]] = followed[:, self.record.outputs]
-                    if pressure is not None and seen is not None:
-                        pressure[exists[candidate]] = seen.pressure[:, self._pressures]
-                free.append(machine)
+        def simulate(row: int) -> None:
+            arm = free.pop()
+            followed, seen = self._follow(arm, start, row, observe=pressure is not None)
+            if arm.healthy:
+                angle[exists[row]] = followed[:, self.scenario.outputs]
+                if pressure is not None and seen is not None:
+                    pressure[exists[row]] = seen.pressure[:, self._pressures]
+            free.append(arm)
 
-            with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
-                deque(pool.map(simulate, range(exists.size)), maxlen=0)
+        with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
+            start = self._start(candidates[exists], free[0])
+            deque(pool.map(simulate, range(exists.size)), maxlen=0)
         feasible: NDArray[np.bool_] = np.all(np.isfinite(angle), axis=(1, 2))
         return Response(angle, feasible, pressure)
 
-    def _start(self, candidates: Candidates) -> Start:
-        assert candidates.actuators is not None
-        record = self.record
-        population = Population(record.arm, len(candidates), self._threads, record.prescribed)
-        balance = population.start(candidates.arm, record.joints, record.pose)[:, self._columns]
-        actuator = Actuator(
-            candidates.actuators[:, self.joints],  # pyright: ignore[reportArgumentType]  # still a recarray
-            self._linkages,
-            candidates.arm.damping[:, self.joints],
-            record.arm.model.opt.timestep,
-            self._hydraulics,
-            self._entries,
-        )
-        state = actuator.start(population.position[:, self._columns], balance)
-        return Start(population, actuator, state, self._servo)
+    def _arm(self) -> HydraulicArm:
+        return HydraulicArm(self.scenario.arm.model, self._actuators.columns, self._follows, self._steps)
 
-    def _machine(self) -> Machine:
-        return Machine(self.record.arm.model, self._columns, self.record.prescribed)
+    def _start(self, candidates: Candidates, arm: HydraulicArm) -> _Start:
+        """Balance all candidates, one after another, on one arm."""
+        values, pose = self.scenario.values(candidates), self.scenario.arm.pose
+        balance = np.array([arm.start(values, row, pose) for row in range(len(candidates))])
+        return _Start(values, *self._actuators.start(candidates, pose, balance))
 
+    def _follow(
+        self, arm: HydraulicArm, start: _Start, row: int, *, observe: bool
+    ) -> tuple[Array, Observation | None]:
+        """Simulate one candidate under the log's commands.
 
-def mass_entries(model: mujoco.MjModel) -> NDArray[np.intp]:
-    """Where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (V, V)."""
-    entries = np.zeros((model.nv, model.nv), np.intp)
-    for i in range(model.nv):
-        for place in range(model.M_rowadr[i], model.M_rowadr[i] + model.M_rownnz[i]):
-            j = model.M_colind[place]
-            entries[i, j] = entries[j, i] = place
-    return entries
+        Returns:
+            Angles of the moving joints [rad], shape (1 + T, V), and what can be measured on the actuators,
+            samples in the place of candidates: at the start and after each sample.
+        """
+        samples, pose = len(self._command) // self._steps, self.scenario.arm.pose
+        arm.start(start.values, row, pose)
+        angle = np.full((1 + samples, len(pose)), np.nan)
+        state = start.state.joints[row]
+        seen = np.zeros((1 + samples if observe else 1, len(state)), state.dtype)
+        angle[0], seen[0] = pose, state
+        commands = np.concatenate([start.state.commands[1:], self._command])
+        arm.attach(start.actuator, state, row)
+        arm.roll(commands, angle[1:], seen[1:], self._servo)
+        if not observe:
+            return angle, None
+        states, one = ActuatorState(seen, commands), slice(row, row + 1)
+        return angle, start.actuator.observe(states, angle[:, self._actuators.columns], one)

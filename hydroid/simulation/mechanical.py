@@ -1,25 +1,34 @@
-"""Stage 1: the hydraulics as a gain, tau = K u + tau0 on every driven joint (article section 3)."""
+"""Stage 1: the hydraulics as a gain, tau = K u + tau0 on every driven joint (article section 3).
+
+The whole population is stepped by `mujoco.batch`. Every candidate starts at rest in the log's first pose, in
+static balance with gravity: its springs are slack there, and a constant torque tau0 = g(q0), computed anew for
+every candidate, holds it.
+"""
 
 from typing import Any
 
+import mujoco
 import numpy as np
+from mujoco.batch import Batch, SimulationError
+from numpy.typing import NDArray
 
+from hydroid.arm.quiet import quiet_mujoco
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.population import Candidates, Population, Response, in_chunks
-from hydroid.simulation.record import Record
+from hydroid.simulation.candidates import Array, Candidates, Response, in_chunks
+from hydroid.simulation.scenario import Scenario
 
 
 class MechanicalSimulation:
-    """Simulates candidates on one record by `Batch.rollout`.
+    """Simulates candidates on one log by `Batch.rollout`.
 
     Args:
-        record: the record.
+        scenario: what is simulated.
         settings: threads.
     """
 
-    def __init__(self, record: Record, settings: SimulationSettings) -> None:
-        self.record, self._threads = record, settings.threads
-        self._population: Population | None = None
+    def __init__(self, scenario: Scenario, settings: SimulationSettings) -> None:
+        self.scenario, self._threads = scenario, settings.threads
+        self._batch: ArmBatch | None = None
 
     def simulate(self, candidates: Candidates) -> Response:
         """Simulate n candidates, whatever n is.
@@ -27,29 +36,91 @@ class MechanicalSimulation:
         Returns:
             Angles of the outputs at the log's samples, shape (n, T, K); the first sample is the start pose.
         """
-        return in_chunks(self._simulate_chunk, candidates, self.record.chunk)
+        return in_chunks(self._simulate_chunk, candidates, self.scenario.chunk)
 
     def _simulate_chunk(self, candidates: Candidates) -> Response:
-        record, n = self.record, len(candidates)
-        population = self._room(n)
-        balance = population.start(candidates.arm, record.joints, record.pose)
+        scenario, n = self.scenario, len(candidates)
+        if self._batch is None or self._batch.size < n:  # made once, and again only for more candidates
+            self._batch = ArmBatch(scenario.arm.model, n, self._threads)
+            self._torque, self._angle = np.empty((2, n, *scenario.command.shape))
+        balance = self._batch.start(scenario.values(candidates), scenario.arm.pose)
         torque, angle = self._torque[:n], self._angle[:n]
-        np.multiply(candidates.arm.gain[:, None, record.joints], record.command, out=torque)
+        np.multiply(candidates.gain[:, None, scenario.arm.columns], scenario.command, out=torque)
         torque += balance[:, None]
-        if record.prescribed is not None:
-            torque[:, :, record.prescribed.columns] = record.prescribed.torque
-        feasible = population.roll(torque, angle)
-        out = record.sampled(angle[:, :, record.outputs])
+        if scenario.prescribed is not None:
+            torque[:, :, scenario.prescribed.columns] = scenario.prescribed.torque
+        feasible = self._batch.roll(torque, angle)
+        out = scenario.sampled(angle[:, :, scenario.outputs])
         out[~feasible] = np.nan
         return Response(out, feasible)
 
-    def _room(self, n: int) -> Population:
-        """The population to step, with its buffers: made once, and again only for a larger one."""
-        if self._population is None or self._population.size < n:
-            self._population = Population(self.record.arm, n, self._threads, self.record.prescribed)
-            self._torque, self._angle = np.empty((2, n, *self.record.command.shape))
-        return self._population
-
     def __getstate__(self) -> dict[str, Any]:
         """Leave threads and buffers behind when a simulation is sent to another process."""
-        return self.__dict__ | {"_population": None, "_torque": None, "_angle": None}
+        return self.__dict__ | {"_batch": None, "_torque": None, "_angle": None}
+
+
+class ArmBatch:
+    """Up to `size` candidates of one arm, stepped together on a thread pool.
+
+    Args:
+        model: the arm without the joints that do not move.
+        size: candidates of one call.
+        threads: threads that step them; 0 is one per core. Results do not depend on it.
+    """
+
+    def __init__(self, model: mujoco.MjModel, size: int, threads: int) -> None:
+        self.size = size
+        self._batch = Batch(model, nsim=size, nthread=threads)
+        self._failed = np.zeros(size, dtype=bool)
+        # before the first call: a derived field bound between calls reads zero
+        self._bias = self._batch.bind("qfrc_bias")
+        self._position, self._velocity = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self._applied = self._batch.bind("qfrc_applied")
+        self._expanded: dict[str, Array] = {}
+
+    def start(self, values: dict[str, Array], pose: Array) -> Array:
+        """Put the candidates into `pose` at rest and return what holds them there.
+
+        Args:
+            values: what n <= size candidates change in the model, as `Scenario.values` returns it.
+            pose: angles of the moving joints [rad], shape (V,).
+
+        Returns:
+            tau0 = g(q0) of equation (1) [N·m], shape (n, V).
+        """
+        n = len(values["body_mass"])
+        ids = np.arange(n)
+        for name, value in values.items():
+            if name not in self._expanded:
+                self._expanded[name] = self._batch.expand(name)
+            self._expanded[name][:n] = value
+        with quiet_mujoco():
+            self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+            self._batch.set_const(ids)
+            self._position[:n] = pose
+            self._applied[:n] = 0.0
+            self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        self._batch.warning[:n], self._failed[:n] = 0, False
+        return self._bias[:n].copy()
+
+    def roll(self, torque: Array, out: Array) -> NDArray[np.bool_]:
+        """Step candidates from their start under the given joint torques.
+
+        Args:
+            torque: applied at each step [N·m], shape (n, steps, V), C-contiguous.
+            out: receives the angles after each step [rad], shape (n, steps, V).
+
+        Returns:
+            Which candidates stayed finite and drew no warning of MuJoCo's, shape (n,).
+        """
+        n, steps, _ = torque.shape
+        spec = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
+        with quiet_mujoco():
+            try:
+                self._batch.rollout(steps, torque, spec, ("qpos",), np.arange(n), {"qpos": out})
+            except SimulationError as error:
+                self._failed[error.ids] = True
+        # a candidate whose warnings rose stopped there; what it recorded after that is no simulation
+        finite = np.isfinite([self._position, self._velocity]).all(axis=(0, 2)) & ~self._failed
+        healthy = finite & ~self._batch.warning[:, :, 1].any(axis=1)
+        return healthy[:n] & np.isfinite(out[:, -1]).all(axis=-1)

@@ -4,13 +4,13 @@
 every step, threads wait for the interpreter. So the compiled loop calls `mj_step` of MuJoCo's own library
 itself, on an MjModel and MjData of the bindings, and no thread needs Python before the record's end. The bits
 are those of `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process instead of
-raising; a model that gets through `Population.start` has none to expect.
+raising; a model that gets through `SingleArm.start` has none to expect.
 """
 
 import ctypes
+import logging
 import threading
-from collections.abc import Callable
-from copy import copy
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,12 +18,16 @@ import llvmlite.binding
 import mujoco
 import numpy as np
 from numba import njit, types
+from numba.core import event
 from numpy.typing import NDArray
 
+from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.kernel import SOURCE, Exchange, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
-from hydroid.simulation.population import Array, Population
-from hydroid.simulation.prescribed import Prescribed
+from hydroid.simulation.candidates import Array
+from hydroid.simulation.single import SingleArm
+
+_log = logging.getLogger(__name__)
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
 _library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
@@ -31,7 +35,7 @@ llvmlite.binding.add_symbol("mj_step", ctypes.cast(_library.mj_step, ctypes.c_vo
 _mj_step: Any = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 
 
-class Arm(NamedTuple):
+class Handles(NamedTuple):
     """One MuJoCo simulation for compiled code: addresses, and live arrays over its V moving joints."""
 
     model: int
@@ -43,32 +47,31 @@ class Arm(NamedTuple):
     armature: Array
     warnings: NDArray[np.int32]
     columns: NDArray[np.intp]
-    """joints with actuators, (J,)"""
+    """joints with actuators and those they couple with, (J,)"""
     own: Array
     """the arm's own armature of these [kg·m²], (J,)"""
     follows: NDArray[np.intp]
     """joints that follow a log, (P,)"""
 
 
-class Machine:
-    """A MuJoCo simulation that candidates of a population take in turn.
+class HydraulicArm(SingleArm):
+    """An arm that is stepped with its actuators by compiled code.
 
     Args:
-        model: the arm's; each candidate brings its own values.
-        columns: joints with actuators among the moving ones, shape (J,).
-        prescribed: those that follow the log, if any.
-
-    Attributes:
-        arm: what compiled code sees of it.
+        model: of the arm; it is copied.
+        columns: the moving joints that `ArmActuators` names, shape (J,).
+        follows: those that follow a log, shape (P,).
+        steps: of MuJoCo in one sample.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, columns: NDArray[np.intp], prescribed: Prescribed | None
+        self, model: mujoco.MjModel, columns: NDArray[np.intp], follows: NDArray[np.intp], steps: int
     ) -> None:
-        self._model, self._data = copy(model), mujoco.MjData(model)
-        m, d = self._model, self._data
+        super().__init__(model)
+        m, d = self.model, self.data
         model_address, data_address = _addresses(m, d)
-        self.arm = Arm(
+        self._steps = steps
+        self._handles = Handles(
             model=model_address,
             data=data_address,
             angle=d.qpos,
@@ -79,19 +82,39 @@ class Machine:
             warnings=d.warning.number,
             columns=columns,
             own=model.dof_armature[columns],
-            follows=np.array([], np.intp) if prescribed is None else prescribed.columns,
+            follows=follows,
         )
 
-    def take(self, population: Population, candidate: int) -> None:
-        """Become a candidate of a population as it stands at its start."""
-        population.copy(candidate, self._model, self._data)
-        self._model.dof_damping[self.arm.columns] = 0.0  # the actuators integrate it
+    def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
+        """Put one candidate into `pose` at rest and return what holds it there, as `SingleArm.start`."""
+        balance = super().start(values, row, pose)
+        self.model.dof_damping[self._handles.columns] = 0.0  # the actuators integrate it
+        return balance
 
-    @property
-    def healthy(self) -> np.bool_:
-        """Whether the candidate is finite and drew no warning of MuJoCo's."""
-        arm = self.arm
-        return np.isfinite([arm.angle, arm.velocity]).all() & ~arm.warnings.any()
+    def attach(self, actuator: Actuator, state: NDArray[np.void], row: int) -> None:
+        """Take the actuators of one candidate of a population; `state`, (J,) of JOINT_STATE, changes with each step."""
+        self._plugin, self._state, self._row = actuator.plugin, state, row
+
+    def roll(self, commands: Array, angle: Array, seen: NDArray[np.void], servo: Array) -> None:
+        """Step the arm, up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
+
+        Args:
+            commands: held during each of T steps [%], after those before the start, shape (past + T steps, J).
+            angle: receives the angles after each of T samples [rad], shape (T, V).
+            seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
+            servo: torque of the joints that follow a log at each step [N·m], shape (T steps, P).
+        """
+        roll(
+            self._handles,
+            self._plugin,
+            self._row,
+            self._state,
+            commands,
+            servo,
+            self._steps,
+            angle,
+            seen,
+        )
 
 
 def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
@@ -126,7 +149,7 @@ def roll(
     """Roll one candidate out, up to the first warning of MuJoCo's.
 
     Args:
-        arm: an `Arm`, at the start.
+        arm: `Handles`, at the start.
         plugin: of the population.
         candidate: which one of it.
         state: its actuators, shape (J,) of JOINT_STATE.
@@ -164,17 +187,29 @@ def roll(
                 seen[k // steps] = state
 
 
-def compile_rollout(announce: Callable[[], object]) -> None:
-    """Make the compiled loop ready; call `announce` if that is more than reading it from numba's cache."""
-    timer = threading.Timer(1.0, announce)
-    timer.start()
-    try:
-        one, column = np.ones(1), np.zeros(1, np.intp)
-        warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-        arm = Arm(0, 0, one, one, one, one, one, warnings, column, one, column)
-        record, square = np.ones((1, 1), COEFFICIENTS), np.ones((1, 1))
-        plugin = Plugin(record, square, order=column, entries=column[None], idle=0, period=0.01, substeps=1)
-        state, nothing = np.zeros(1, JOINT_STATE), np.empty((0, 1))
+class _Announcement(event.Listener):
+    """Says once that numba compiles, which it does only where its cache holds nothing usable."""
+
+    def __init__(self) -> None:
+        self._made = False
+
+    def on_start(self, event: Any) -> None:
+        if not self._made:
+            _log.warning("compiling the actuator's kernels, once on this machine ...")
+        self._made = True
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@cache
+def compile_rollout() -> None:
+    """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
+    one, column = np.ones(1), np.zeros(1, np.intp)
+    warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
+    arm = Handles(0, 0, one, one, one, one, one, warnings, column, one, column)
+    table, square = np.ones((1, 1), COEFFICIENTS), np.ones((1, 1))
+    plugin = Plugin(table, square, order=column, entries=column[None], idle=0, period=0.01, substeps=1)
+    state, nothing = np.zeros(1, JOINT_STATE), np.empty((0, 1))
+    with event.install_listener("numba:compile", _Announcement()):
         roll(arm, plugin, 0, state, nothing, nothing, 1, nothing, np.empty((0, 1), JOINT_STATE))
-    finally:
-        timer.cancel()

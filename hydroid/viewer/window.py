@@ -1,4 +1,4 @@
-"""A player on the screen, in MuJoCo's own viewer and in real time; or as pictures in a file."""
+"""A plant on the screen, in MuJoCo's own viewer and in real time; or as pictures in a file."""
 
 import io
 import sys
@@ -12,7 +12,8 @@ from typing import Any, Protocol
 import mujoco
 
 from hydroid.errors import RunError
-from hydroid.viewer.player import Player
+from hydroid.plant import Plant
+from hydroid.viewer.playback import Playback
 
 FRAME = 1 / 60
 """between two pictures of the viewer [s]"""
@@ -35,32 +36,33 @@ class Viewer(Protocol):
 
 
 def play(
-    player: Player,
+    playback: Playback,
     viewer: Viewer,
     clock: Callable[[], float] = time.perf_counter,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
-    """Show a player in real time until the window is closed; the viewer's reset starts it again.
+    """Show a plant in real time until the window is closed; the viewer's reset starts it again.
 
     Raises:
         RunError: the simulation diverged.
     """
-    begun = clock()
+    plant, begun = playback.plant, clock()
     while viewer.is_running():
         frame = clock()
-        begun += max(0.0, frame - begun - player.time - LATE) if player.time < player.duration else 0.0
-        player.advance(frame - begun)
-        viewer.set_texts((None, None, *player.words()))
+        begun += max(0.0, frame - begun - plant.time - LATE) if plant.time < playback.duration else 0.0
+        playback.advance(frame - begun)
+        viewer.set_texts((None, None, *playback.captions()))
+        before = plant.data.time
         viewer.sync()
-        if player.data.time < player.time:
-            player.restart()
+        if plant.data.time < before:
+            playback.restart()
             begun = clock()
         sleep(max(0.0, FRAME - (clock() - frame)))
 
 
 @contextmanager
-def window(player: Player) -> Generator[Viewer]:
-    """Open MuJoCo's viewer on a player's arm; it closes with the context.
+def window(plant: Plant) -> Generator[Viewer]:
+    """Open MuJoCo's viewer on a plant; it closes with the context.
 
     Raises:
         RunError: this machine cannot show a window.
@@ -71,19 +73,17 @@ def window(player: Player) -> Generator[Viewer]:
 
         if sys.platform != "darwin":
             _try_window()
-        viewer = mujoco.viewer.launch_passive(player.model, player.data, show_left_ui=False)
+        viewer = mujoco.viewer.launch_passive(plant.model, plant.data, show_left_ui=False)
     except (ImportError, RuntimeError) as error:
         hint = "without a display write a file with --gif OUT.gif"
         raise RunError(f"no window can be opened ({error})", hint=hint) from None
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
-            viewer.cam.lookat[:] = player.model.stat.center
-            viewer.cam.distance = 2.3 * player.model.stat.extent
-            viewer.cam.azimuth, viewer.cam.elevation = (
-                135.0,
-                -25.0,
-            )  # where the model's camera `corner` stands
+            viewer.cam.lookat[:] = plant.model.stat.center
+            viewer.cam.distance = 2.3 * plant.model.stat.extent
+            # where the model's camera `corner` stands
+            viewer.cam.azimuth, viewer.cam.elevation = 135.0, -25.0
         yield viewer
     finally:
         viewer.close()
@@ -106,25 +106,27 @@ def _try_window() -> None:
         raise RuntimeError("no display, or no OpenGL on it")
 
 
-def animation(player: Player, camera: str = "corner") -> bytes:
-    """Render a player's record to its end as an animated GIF.
+def animation(playback: Playback, camera: str = "corner") -> bytes:
+    """Render a playback to its end as an animated GIF.
 
     Raises:
         RunError: the simulation diverged, or this machine cannot render.
     """
     from PIL import Image  # comes with matplotlib
 
+    plant = playback.plant
     try:
-        renderer = mujoco.Renderer(player.model, height=SIZE[1], width=SIZE[0])
-    except (mujoco.FatalError, ImportError, RuntimeError) as error:
-        hint = "install libEGL (Mesa's needs no GPU)"
+        renderer = mujoco.Renderer(plant.model, height=SIZE[1], width=SIZE[0])
+    except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
+        hint = "install libEGL or libOSMesa (Mesa's need no GPU)"
         raise RunError(f"no picture can be rendered ({error})", hint=hint) from None
     frames: list[Image.Image] = []
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # most of the time where there is no GPU
+    named = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_CAMERA, camera) >= 0
     with renderer:
-        for k in range(round(player.duration / GIF_FRAME) + 1):
-            player.advance(k * GIF_FRAME)
-            renderer.update_scene(player.data, camera)
+        for k in range(round(playback.duration / GIF_FRAME) + 1):
+            playback.advance(k * GIF_FRAME)
+            renderer.update_scene(plant.data, camera if named else -1)
             frames.append(Image.fromarray(renderer.render()).quantize(128))
     buffer = io.BytesIO()
     pause = round(1e3 * GIF_FRAME)  # [ms]

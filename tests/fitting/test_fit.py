@@ -180,28 +180,6 @@ def test_a_damaged_checkpoint_is_an_error_not_a_traceback(tmp_path, keep):
         folder.checkpoint()
 
 
-def test_the_fitted_model_answers_commands_in_percent(tmp_path):
-    """The written MJCF, driven through its motors, moves as the simulation of the estimate does."""
-    import mujoco
-
-    settings, arm, log, path = make(tmp_path, refinement=None)
-    folder = RunFolder(tmp_path / "run")
-    result = run(folder, settings, arm, log, path, Watcher())
-    shutil.copytree(folder.path / "model", tmp_path / "elsewhere")  # it needs nothing from where it came
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "elsewhere" / "fitted.xml"))
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos_spring[:] = log.angle[0]
-    mujoco.mj_forward(model, data)
-    data.qfrc_applied[:] = data.qfrc_bias
-    angle = [data.qpos[1]]
-    for command in log.command[:-1]:
-        data.ctrl[:] = command
-        mujoco.mj_step(model, data)
-        angle.append(data.qpos[1])
-    np.testing.assert_allclose(angle, result.best.responses[0][:, 0], atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -9,7 +9,7 @@ from hydroid.hydraulics.records import Records, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.simulation.population import quiet_mujoco
+from hydroid.arm.quiet import quiet_mujoco
 
 DAMPING, STIFFNESS, PERIOD = 231.8, 53.4, 0.01
 TEN = (

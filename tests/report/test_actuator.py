@@ -5,17 +5,22 @@ import pytest
 from matplotlib.axes import Axes
 
 from hydroid.errors import SettingsError
+from hydroid.identified import load_identified
+from hydroid.problem.stage import Stage
 from hydroid.report.actuator import ActuatorCard, actuator_card, write_actuator
 from hydroid.report.plots.actuator import PANELS, overview, single
 from hydroid.settings.arm import Arm
 from hydroid.simulation import Candidates
-from hydroid.viewer.choice import choose
 
 
 @pytest.fixture(scope="module")
 def candidate() -> Candidates:
-    settings = {"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "hydraulics.current_max": 1.2}
-    return choose("fit-hyd", None, settings).candidate
+    return nominal({"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "hydraulics.current_max": 1.2})
+
+
+def nominal(settings: dict[str, float]) -> Candidates:
+    found = load_identified(None, "fit-hyd", settings, nominal=True)
+    return Stage(found.settings).candidates(found.theta[None])
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +89,7 @@ def test_every_kind_of_joint_can_be_drawn_and_all_panels_are_on_one_page(
 
 
 def test_a_set_without_a_force_stroke_curve_is_refused_in_words(arm: Arm):
-    infeasible = choose("fit-hyd", None, {"parameters.F1.fixed": 500}).candidate
+    infeasible = nominal({"parameters.F1.fixed": 500})
     with pytest.raises(SettingsError, match=r"joint 2: no .* curve runs through 500 N at 0\.8 mm"):
         actuator_card(arm, infeasible, 2, "test")
     actuator_card(arm, infeasible, 1, "test")  # the others have one

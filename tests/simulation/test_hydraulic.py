@@ -1,6 +1,8 @@
 """Stage 2 as the fit sees it: commands in, angles out, through the whole chain beside MuJoCo."""
 
-from copy import copy
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +17,10 @@ from hydroid.hydraulics.records import linkages, nominal_parameters
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import Candidates, HydraulicSimulation
-from hydroid.simulation.hydraulic import mass_entries
-from hydroid.simulation.population import Population, quiet_mujoco
-from hydroid.simulation.record import Record
-from hydroid.simulation.rollout import compile_rollout, roll
+from hydroid.simulation.actuators import mass_entries
+from hydroid.simulation.rollout import compile_rollout
+from hydroid.simulation.scenario import Scenario
+from hydroid.simulation.single import SingleArm
 
 JOINTS = range(7)
 SHOULDER = [1]
@@ -26,8 +28,8 @@ SHOULDER = [1]
 
 def simulation(spec, arm, log, outputs=SHOULDER, hydraulics=None, **settings) -> HydraulicSimulation:
     chosen = SimulationSettings(**settings)
-    record = Record(spec, arm, log, list(outputs), chosen)
-    return HydraulicSimulation(record, arm, hydraulics or HydraulicSettings(), chosen)
+    scenario = Scenario(spec, arm, log, list(outputs), chosen)
+    return HydraulicSimulation(scenario, arm, hydraulics or HydraulicSettings(), chosen)
 
 
 def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:
@@ -36,7 +38,7 @@ def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:
     actuators = nominal_parameters(arm, HydraulicSettings(**hydraulics), JOINTS, n)
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
         actuators[name] *= rng.uniform(0.7, 1.4, (n, 1))
-    return Candidates(arms(arm, n, seed), actuators)
+    return replace(arms(arm, n, seed), actuators=actuators)
 
 
 @pytest.fixture(scope="module")
@@ -74,12 +76,10 @@ def test_the_answer_converges_with_mujocos_step(spec, arm, steps):
 
 def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, steps):
     everyone = candidates(arm, 2)
-    stiff = replace(everyone.arm, stiffness=np.where(np.arange(7) == 1, everyone.arm.stiffness, 1e5))
-    stiff = replace(stiff, damping=np.where(np.arange(7) == 1, everyone.arm.damping, 1e4))
+    stiff = replace(everyone, stiffness=np.where(np.arange(7) == 1, everyone.stiffness, 1e5))
+    stiff = replace(stiff, damping=np.where(np.arange(7) == 1, everyone.damping, 1e4))
     locked = simulation(spec, arm, steps).simulate(everyone).angle
-    passive = simulation(spec, arm, steps, other_joints="passive").simulate(
-        Candidates(stiff, everyone.actuators)
-    )
+    passive = simulation(spec, arm, steps, other_joints="passive").simulate(stiff)
     np.testing.assert_allclose(passive.angle, locked, atol=np.deg2rad(0.1))
 
 
@@ -97,7 +97,7 @@ def test_only_products_that_the_chain_knows_matter(spec, arm, steps):
     along.force_1, along.force_2 = 4 * coil / (x1 + gap) ** 2, 4 * coil / (x2 + gap) ** 2
     along.current_max, along.current_min = a.current_max / 2, a.current_min / 2
     run = simulation(spec, arm, steps).simulate
-    np.testing.assert_allclose(run(Candidates(one.arm, along)).angle, run(one).angle, atol=1e-9)
+    np.testing.assert_allclose(run(replace(one, actuators=along)).angle, run(one).angle, atol=1e-9)
 
 
 def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
@@ -112,14 +112,14 @@ def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
     broken = everyone.actuators.copy()
     force = broken.force_2
     force[1] = 100.0  # the force would grow with the stroke
-    response = run(Candidates(everyone.arm, broken))
+    response = run(replace(everyone, actuators=broken))
     np.testing.assert_array_equal(response.feasible, [True, False, True])
     np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
     assert np.isnan(response.angle[1]).all()
     assert capfd.readouterr() == ("", "")
     assert not Path("MUJOCO_LOG.TXT").exists()
     broken.force_2 = 100.0
-    nobody = run(Candidates(everyone.arm, broken))
+    nobody = run(replace(everyone, actuators=broken))
     assert not nobody.feasible.any()
 
 
@@ -145,18 +145,16 @@ def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, ste
     one = candidates(arm, 1, delay=0.033)
     run = simulation(spec, arm, steps, [1, 3], HydraulicSettings(delay=0.033), other_joints="passive")
     together = run.simulate(one).angle[0]
-    record = run.record
-    population = Population(record.arm, 1, 1)
-    balance = population.start(one.arm, record.joints, record.pose)
-    model = copy(record.arm.model)
-    data = mujoco.MjData(model)
-    population.copy(0, model, data)
+    locked = run.scenario.arm
+    stepped = SingleArm(locked.model)
+    balance = stepped.start(run.scenario.values(one), 0, locked.pose)[None]
+    model, data = stepped.model, stepped.data
     model.dof_damping[:] = 0.0
     assert one.actuators is not None
     actuator = Actuator(
         one.actuators,
         linkages(arm, JOINTS, [1, 3]),
-        one.arm.damping,
+        one.damping,
         0.01,
         HydraulicSettings(delay=0.033),
         mass_entries(model),
@@ -165,7 +163,7 @@ def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, ste
     angle = [data.qpos.copy()]
     for command in steps.command[:-1]:
         torque, armature = actuator.advance(state, command, data.qpos[None], data.qvel[None], data.M[None])
-        data.qfrc_applied[:], model.dof_armature[:] = torque[0], record.arm.model.dof_armature + armature[0]
+        data.qfrc_applied[:], model.dof_armature[:] = torque[0], locked.model.dof_armature + armature[0]
         mujoco.mj_step(model, data)
         data.qpos[:] = actuator.close(state, data.qvel[None], data.M[None])[0]
         angle.append(data.qpos.copy())
@@ -178,10 +176,10 @@ def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, 
     everyone = candidates(arm, 3)
     run = simulation(spec, arm, steps, other_joints="passive", threads=1)
     healthy = run.simulate(everyone).angle
-    stiffness = everyone.arm.stiffness.copy()
+    stiffness = everyone.stiffness.copy()
     stiffness[1, 4] = 1e9  # MuJoCo's spring is explicit in the angle: at 0.01 s it blows up
     capfd.readouterr()
-    response = run.simulate(Candidates(replace(everyone.arm, stiffness=stiffness), everyone.actuators))
+    response = run.simulate(replace(everyone, stiffness=stiffness))
     np.testing.assert_array_equal(response.feasible, [True, False, True])
     assert np.isnan(response.angle[1]).all()
     np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
@@ -189,23 +187,21 @@ def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, 
     assert not Path("MUJOCO_LOG.TXT").exists()
 
 
-def test_single_steps_are_the_whole_record(spec, arm, steps):
-    """As the viewer does it: with a delay, and joints that follow the log."""
-    one = candidates(arm, 1, delay=0.033)
-    run = simulation(spec, arm, steps, hydraulics=HydraulicSettings(delay=0.033), other_joints="measured")
-    whole = run.simulate(one).angle[0, :, 0]
-    live = run.begin(one)
-    with quiet_mujoco():
-        for command, angle in zip(run.command, whole, strict=False):
-            assert live.position[0, 1] == angle
-            live.step(command)
-    assert live.healthy
+def test_reading_the_compiled_loop_from_the_cache_is_not_announced(caplog):
+    compile_rollout()
+    compile_rollout.cache_clear()
+    compile_rollout()
+    assert "compiling" not in caplog.text
 
 
-def test_compiling_is_announced_only_when_it_happens(spec, arm, steps):
-    compile_rollout(lambda: None)
-    said: list[str] = []
-    compile_rollout(lambda: said.append("compiling"))
-    assert not said
-    simulation(spec, arm, steps, other_joints="measured").simulate(candidates(arm, 1))
-    assert len(roll.signatures) == 1  # what was made ready is what is used
+@pytest.mark.slow
+def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
+    """The message follows numba's cache, not the time that reading it takes."""
+    program = "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    said = [
+        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True).stderr
+        for _ in range(2)
+    ]
+    assert said[0].count("compiling the actuator's kernels") == 1
+    assert said[1] == ""

@@ -8,22 +8,15 @@ from conftest import candidates, step_log
 from scipy.integrate import solve_ivp
 
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation import ArmParameters, Candidates, MechanicalSimulation
-from hydroid.simulation.record import Record
+from hydroid.simulation import Candidates, MechanicalSimulation
+from hydroid.simulation.scenario import Scenario
 
 SHOULDER = [1]
 
 
-class Simulation(MechanicalSimulation):
-    """With the arm's parameters alone."""
-
-    def simulate(self, parameters: ArmParameters):
-        return super().simulate(Candidates(parameters))
-
-
-def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
+def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> MechanicalSimulation:
     chosen = SimulationSettings(**settings)
-    return Simulation(Record(spec, arm, log, list(outputs), chosen), chosen)
+    return MechanicalSimulation(Scenario(spec, arm, log, list(outputs), chosen), chosen)
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
@@ -108,7 +101,7 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
 @pytest.mark.parametrize("other", ["locked", "passive"])
 def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, study_log, other):
     one = candidates(arm, 3)
-    scaled = ArmParameters(*(1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)))
+    scaled = Candidates(*(1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)))
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
 
@@ -136,8 +129,8 @@ def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other
 
 def test_memory_for_a_chunk_is_bounded(spec, arm, study_log):
     small = simulation(spec, arm, study_log, other_joints="passive", chunk_mib=1)
-    assert small.record.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
-    assert simulation(spec, arm, study_log, other_joints="passive").record.chunk > small.record.chunk
+    assert small.scenario.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
+    assert simulation(spec, arm, study_log, other_joints="passive").scenario.chunk > small.scenario.chunk
 
 
 def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, study_log, capfd, tmp_path, monkeypatch):

@@ -1,0 +1,300 @@
+"""The plant: an identified arm, hydraulics included, to be stepped in a program of one's own.
+
+    plant = load_plant("runs/a")
+    q = plant.reset()
+    while plant.time < 10:
+        q = plant.step(controller(q))
+
+It gives, bit for bit, what the simulations of a fit give. `model` and `data` are MuJoCo's: contact forces apart,
+whatever acts on them (`xfrc_applied`, a changed `qpos`) acts on the plant; `qfrc_applied` is the plant's own.
+Between two steps use `mj_kinematics` to refresh positions of bodies.
+"""
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hydroid.arm.export import copy_model, write_fitted
+from hydroid.arm.locked import Fusion, lock
+from hydroid.arm.mjcf import arm_mjcf, dressed_model
+from hydroid.arm.model import load_model
+from hydroid.arm.payload import add_payload
+from hydroid.arm.quiet import quiet_mujoco
+from hydroid.errors import RunError, SettingsError
+from hydroid.estimate import write_estimate
+from hydroid.hydraulics.actuator import ActuatorState
+from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
+from hydroid.identified import IdentifiedModel, load_identified, write_settings
+from hydroid.problem.stage import Stage
+from hydroid.settings.hydraulics import QUANTITIES
+from hydroid.simulation.actuators import ArmActuators
+from hydroid.simulation.rollout import HydraulicArm, compile_rollout
+from hydroid.simulation.scenario import model_values
+from hydroid.simulation.single import SingleArm
+
+Array = NDArray[np.float64]
+
+
+class Plant:
+    """An identified arm with J joints that is stepped under commands.
+
+    Args:
+        identified: settings and parameters.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared. With
+            `other_joints: passive` in the settings all others move under their springs and dampers; otherwise
+            they are locked where `reset` puts them.
+        period: how long one command is held [s], a multiple of MuJoCo's step; by default the logs' period.
+        payload: mass in the gripper [kg].
+
+    Attributes:
+        joints: those that take commands.
+        model: the arm in MuJoCo, with one motor per moving joint whose `ctrl` holds the command; locked joints
+            are fused. `reset` to a pose with other angles of locked joints replaces it.
+        data: its state.
+
+    Raises:
+        SettingsError: a joint that does not exist, a period that is no multiple, a payload without a place, or
+            parameters without a force-stroke curve.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+
+    def __init__(
+        self,
+        identified: IdentifiedModel,
+        *,
+        joints: Sequence[int] | None = None,
+        period: float | None = None,
+        payload: float = 0.0,
+    ) -> None:
+        settings = identified.settings
+        arm = settings.arm
+        self.identified, self.joints = identified, tuple(sorted(set(joints or settings.outputs)))
+        self._active = np.isin(np.arange(1, 1 + len(arm.joints)), self.joints)
+        if np.sum(self._active) < len(self.joints):
+            raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joints {self.joints}")
+        moving = self._active | (settings.simulation.other_joints == "passive")
+        self._moving = [name for name, moves in zip(arm.joint_names, moving, strict=True) if moves]
+        self.timestep = settings.log.period_s / settings.simulation.steps_per_sample
+        self.period = settings.log.period_s if period is None else period
+        self._steps = round(self.period / self.timestep)
+        if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
+            raise SettingsError(f"must be a multiple of {self.timestep:g} s", where=f"period {self.period:g} s")
+        self._spec = load_model(arm.model, arm)
+        if payload:
+            self._spec = add_payload(self._spec, arm, payload)
+        self._candidate = Stage(settings).candidates(identified.theta[None])
+        self._locked_pose: Array | None = None
+        if self._candidate.actuators is not None:
+            if not has_force_curve(self._candidate.actuators)[0]:
+                what = "no solenoid has this force-stroke curve: it needs F1 > F2 and F1/F2 < (x2/x1)²"
+                raise SettingsError(what, where=identified.source)
+            compile_rollout()
+        self.reset()
+
+    @property
+    def time(self) -> float:
+        """Since the reset [s]."""
+        return self._taken * self.timestep
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all joints, (J,)."""
+        return self.identified.settings.arm.joint_names
+
+    @property
+    def command(self) -> Array:
+        """What the motors' controls in `data.ctrl` hold [%], shape (J,)."""
+        command = np.zeros(len(self._pose))
+        command[self._columns] = self.data.ctrl
+        return command * self._active
+
+    @property
+    def angle(self) -> Array:
+        """Joint angles [rad], shape (J,), a copy."""
+        angle = self._pose.copy()
+        angle[self._columns] = self.data.qpos
+        return angle
+
+    @property
+    def pressure(self) -> Array:
+        """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
+        pressure = np.full((len(self._pose), 2), np.nan)
+        if isinstance(self._arm, HydraulicArm):
+            seen = self._actuator.observe(ActuatorState(self._state[None], self._commands), self.data.qpos[None])
+            pressure[self._active] = seen.pressure[0, self._active[self._columns]]
+        return pressure
+
+    def reset(self, pose: str | ArrayLike | None = None) -> Array:
+        """Put the arm at rest, in static balance, its springs slack.
+
+        Args:
+            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by default the settings' start pose.
+
+        Returns:
+            The joint angles [rad], shape (J,).
+
+        Raises:
+            SettingsError: no such pose, or not J finite angles.
+        """
+        settings = self.identified.settings
+        start = settings.start_pose if pose is None else pose
+        if isinstance(start, str):
+            self._pose = settings.arm.pose(start)
+        else:
+            self._pose = np.array(start, float)
+            if self._pose.shape != self._active.shape or not np.isfinite(self._pose).all():
+                raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", where=f"{start}")
+        locked = np.where(np.isin(settings.arm.joint_names, self._moving), 0.0, self._pose)
+        if self._locked_pose is None or not np.array_equal(locked, self._locked_pose):
+            self._lock(locked)
+        start_angle = self._pose[self._columns]
+        self.model.qpos_spring[:] = start_angle
+        with quiet_mujoco():
+            self._balance = self._arm.start(self._values, 0, start_angle)
+            if isinstance(self._arm, HydraulicArm):
+                self._actuator, state = self._actuators.start(self._candidate, start_angle, self._balance[None])
+                self._state = state.joints[0]
+                past = len(state.commands) - 1
+                self._commands = np.zeros((past + self._steps, len(self._columns)))
+                self._arm.attach(self._actuator, self._state, 0)
+                self._mass = self.data.M.copy()
+        self._taken = 0
+        return self.angle
+
+    def step(self, command: ArrayLike) -> Array:
+        """Hold a command for one period.
+
+        Args:
+            command: [%], shape (J,), cut to [-100, 100]; of joints that take none it must be 0.
+
+        Returns:
+            The joint angles [rad], shape (J,).
+
+        Raises:
+            ValueError: not J finite commands, or one for a joint that takes none.
+            RunError: the simulation diverged.
+        """
+        given = np.asarray(command, float)
+        if given.shape != self._active.shape or not np.isfinite(given).all():
+            raise ValueError(f"a command needs {len(self._active)} finite numbers [%], not {command}")
+        if given[self._idle].any():
+            raise ValueError(f"only joints {self.joints} take commands: name the others in joints=")
+        self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
+        with quiet_mujoco():
+            self._advance(self.data.ctrl)
+        self._taken += self._steps
+        if self._warnings.any() or not np.isfinite(self.data.qpos).all():
+            raise RunError(f"the simulation diverged before {self.time:.2f} s", where=self.identified.source)
+        return self.angle
+
+    def save(self, folder: str | Path) -> None:
+        """Write the plant to a folder that `load_plant` reads, and `export` it to `model/` there.
+
+        A payload is not saved.
+
+        Raises:
+            RunError: the folder cannot be written.
+        """
+        folder, settings = Path(folder), self.identified.settings
+        copy_model(load_model(settings.arm.model, settings.arm), folder / "model")
+        write_settings(folder, settings)
+        write_estimate(folder, self.identified.summarise())
+        self.export(folder / "model")
+
+    def export(self, folder: Path) -> None:
+        """Write the arm in its start pose for other programs; `README.txt` in the folder says what for.
+
+        Args:
+            folder: `model/` of a saved plant or a run folder, which holds `arm.xml`.
+
+        Raises:
+            RunError: the folder cannot be written.
+        """
+        model, candidate, arm = copy(self.model), self._candidate, self.identified.settings.arm
+        model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
+        spec = load_model(folder / "arm.xml", arm)  # with the meshes' names there
+        if candidate.actuators is None:
+            motors, actuators = np.array([self._gain, self._balance]), None
+        else:
+            motors, actuators = None, {"units": {name: q.unit for name, q in QUANTITIES.items()}}
+            for j in self.joints:
+                row = candidate.actuators[0, j - 1]
+                actuators[arm.joint_names[j - 1]] = {n: float(row[n] / q.factor) for n, q in QUANTITIES.items()}
+        joints = ", ".join(arm.joint_names[j - 1] for j in self.joints)
+        text = arm_mjcf(spec, self._fusion, model, motors, "meshes")
+        write_fitted(folder, text, self.timestep, joints, actuators)
+
+    def _advance(self, command: Array) -> None:
+        arm, steps = self._arm, self._steps
+        if isinstance(arm, HydraulicArm):
+            self._commands[:-steps] = self._commands[steps:]
+            self._commands[-steps:] = command
+            # of the step before: positions that are refreshed in between must not change a bit
+            np.copyto(self.data.M, self._mass)
+            arm.roll(self._commands, self._rolled, self._unseen, self._servo)
+            np.copyto(self._mass, self.data.M)
+        else:
+            self.data.qfrc_applied[:] = self._gain * command + self._balance
+            mujoco.mj_step(self.model, self.data, steps)
+
+    def _lock(self, pose: Array) -> None:
+        """Build the model with the locked joints in a pose [rad], shape (J,)."""
+        settings, candidate = self.identified.settings, self._candidate
+        locked = lock(self._spec, settings.arm, self._moving, pose)
+        locked.model.opt.timestep = self.timestep
+        self._fusion = Fusion(self._spec, settings.arm, self._moving, pose)
+        model = dressed_model(self._spec, self._fusion, locked)
+        self._armature = model.dof_armature.copy()
+        self._locked_pose, self._columns = pose, locked.columns
+        self._values = model_values(locked, candidate)
+        self._gain = candidate.gain[0, self._columns]
+        if candidate.actuators is None:
+            self._arm = SingleArm(model)
+        else:
+            nothing = np.array([], np.intp)
+            self._actuators = ArmActuators(settings.arm, locked, self._active, settings.hydraulics, nothing)
+            self._arm = HydraulicArm(model, self._actuators.columns, nothing, self._steps)
+        self.model, self.data = self._arm.model, self._arm.data
+        self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
+        # for compiled code: angles after the step; no observation, and no joint that follows a log
+        self._rolled, self._unseen = np.empty((1, len(self._columns))), np.empty((0, len(self._columns)), JOINT_STATE)
+        self._servo = np.empty((self._steps, 0))
+
+
+def load_plant(
+    source: str | Path,
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    joints: Sequence[int] | None = None,
+    period: float | None = None,
+    payload: float = 0.0,
+) -> Plant:
+    """Read a plant.
+
+    Args:
+        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a shipped
+            name such as "fit-hyd", whose parameters are then nominal: as the hydraulics and the arm's file have
+            them.
+        overrides: settings to replace, by dotted key.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
+        period: how long one command is held [s].
+        payload: mass in the gripper [kg].
+
+    Raises:
+        RunError: the folder holds no estimate.
+        SettingsError: what `Plant` refuses, a file that cannot be read, or nominal parameters of stage mech.
+    """
+    if Path(source).is_dir():
+        identified = load_identified(source, overrides=overrides)
+    else:
+        identified = load_identified(None, source, overrides, nominal=True)
+        if identified.settings.stage == "mech":
+            raise SettingsError("stage mech has no nominal gain", where=str(source), hint="name a run folder")
+    return Plant(identified, joints=joints, period=period, payload=payload)

@@ -1,0 +1,278 @@
+"""The plant is the simulation of a fit, one command at a time, bit for bit; and it can be saved and taken elsewhere."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from hydroid.arm.model import load_model
+from hydroid.errors import RunError, SettingsError
+from hydroid.identified import IdentifiedModel, identified
+from hydroid.jobs import load_settings, read_logs
+from hydroid.log import Log
+from hydroid.plant import Plant, load_plant
+from hydroid.problem.problem import make_simulation
+from hydroid.problem.stage import Stage
+from hydroid.settings.fit import FitSettings
+
+RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
+MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0, "M1": 4.0, "M2": 6.0, "M3": 20.0, "M4": 2.0, "M5": 3.0, "M6": 5.0}
+
+
+def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
+    settings = load_settings(f"fit-{stage}", {"start_pose": "study"} | changes)
+    values = {name: value for name, value in MECHANICAL.items() if name in settings.parameters}
+    if stage == "hyd":
+        true = {"A_A": 900, "A_B": 800, "I_max": 0.85, "I_min": 0.3, "A": 1.4, "C": 1.1}
+        values |= true | {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
+    return identified(settings, values, "test")
+
+
+def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Log:
+    """Steps and noise on some joints, from the settings' start pose."""
+    rng = np.random.default_rng(0)
+    period = settings.log.period_s
+    time = np.arange(round(seconds / period)) * period
+    command = np.zeros((len(time), 7))
+    for joint in joints:
+        levels = np.repeat(rng.uniform(-80, 80, 1 + len(time) // 60), 60)[: len(time)]
+        command[:, joint - 1] = levels + rng.normal(0, 2, len(time))
+    pose = settings.arm.pose(settings.start_pose)
+    return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
+
+
+def response(found: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
+    """The angles that the population simulation gives [rad], shape (T, K)."""
+    settings = found.settings
+    spec = load_model(settings.arm.model, settings.arm)
+    simulation = make_simulation(spec, log, [j - 1 for j in joints], settings)
+    return simulation.simulate(Stage(settings).candidates(found.theta[None])).angle[0]
+
+
+@pytest.mark.parametrize("joints", [[2], [2, 3, 5], [1, 2, 3, 4, 5, 6, 7]])
+@pytest.mark.parametrize(
+    ("stage", "changes"),
+    [
+        ("mech", {}),
+        ("mech", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 3}),
+        ("hyd", {"hydraulics.delay": 0.033}),
+        ("hyd", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 2}),
+    ],
+)
+def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints):
+    found = model(stage, **changes)
+    log = log_of(found.settings, joints)
+    expected = response(found, log, joints)
+    plant = Plant(found, joints=joints)
+    columns = [j - 1 for j in joints]
+    for _ in range(2):  # and again after a reset
+        angle = [plant.reset()] + [plant.step(command) for command in log.command[:-1]]
+        np.testing.assert_array_equal(np.array(angle)[:, columns], expected)
+    assert plant.time == pytest.approx(log.time[-1])
+    assert np.ptp(expected, axis=0).min() > np.deg2rad(0.2)
+    if changes.get("simulation.other_joints") != "passive":
+        still = np.delete(np.array(angle), columns, axis=1)
+        assert (still == np.delete(found.settings.arm.pose("study"), columns)).all()
+
+
+@pytest.mark.parametrize("stage", ["mech", "hyd"])
+def test_the_whole_rig_log_bit_for_bit(stage):
+    found = model(stage, **{"hydraulics.delay": 0.05} if stage == "hyd" else {})
+    (log,) = read_logs([RIG], found.settings, lambda finding: None)
+    expected = response(found, log, [2])[:, 0]
+    plant = Plant(found)
+    angle = [plant.reset(log.start)[1]] + [plant.step(command)[1] for command in log.command[:-1]]
+    np.testing.assert_array_equal(angle, expected)
+
+
+@pytest.mark.parametrize("stage", ["mech", "hyd"])
+def test_a_slower_control_period_holds_the_command(stage):
+    found = model(stage)
+    fast, slow = Plant(found), Plant(found, period=0.05)
+    command = np.zeros(7)
+    for k in range(40):
+        command[1] = 50 * np.sin(k / 5)
+        for _ in range(5):
+            held = fast.step(command)
+        np.testing.assert_array_equal(slow.step(command), held)
+    assert slow.time == pytest.approx(fast.time) == pytest.approx(2.0)
+
+
+def test_an_external_force_acts_as_in_plain_mujoco(tmp_path):
+    found = model()
+    plant = Plant(found)
+    plant.save(tmp_path)
+    arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
+    data = mujoco.MjData(arm)
+    mujoco.mj_resetDataKeyframe(arm, data, 0)
+    plant.data.xfrc_applied[-1, 2] = data.xfrc_applied[-1, 2] = -100.0  # [N]
+    for _ in range(200):
+        angle = plant.step(np.zeros(7))[1]
+        mujoco.mj_step(arm, data)
+        assert angle == pytest.approx(data.qpos[0], abs=1e-9)
+    assert found.settings.arm.pose("study")[1] - angle > np.deg2rad(1)
+    plant.data.xfrc_applied[:] = 0.0
+    assert plant.reset()[1] == found.settings.arm.pose("study")[1]
+
+
+def test_an_external_force_is_held_by_the_pressures():
+    found = model("hyd", **{"hydraulics.leakage": 0.0})
+    plant = Plant(found)
+    cylinder = found.settings.arm.joints[1].actuator
+    area = np.array([900e-6, -800e-6])
+
+    def torque() -> float:
+        return float(plant.pressure[1] @ area * cylinder.moment_arm(plant.angle)[1])
+
+    before = torque()
+    lever = plant.data.xipos[-1, 0] - plant.data.xanchor[0, 0]
+    plant.data.xfrc_applied[-1, 2] = -400.0  # [N] on the last body, which is the upper arm and all it carries
+    for _ in range(300):
+        plant.step(np.zeros(7))
+    assert torque() - before == pytest.approx(400.0 * lever, rel=0.02)
+
+
+def test_looking_at_positions_between_steps_changes_no_bit():
+    plant = Plant(model("hyd"), joints=[2, 3])
+    command = np.array([0, 60.0, -50.0, 0, 0, 0, 0])
+    expected = [plant.step(command) for _ in range(150)]
+    plant.reset()
+    for angle in expected:
+        mujoco.mj_kinematics(plant.model, plant.data)
+        mujoco.mj_crb(plant.model, plant.data)
+        np.testing.assert_array_equal(plant.step(command), angle)
+
+
+def test_pressures_are_those_of_the_simulation():
+    found = model("hyd")
+    log = log_of(found.settings, [2], 1.0)
+    settings = found.settings
+    spec = load_model(settings.arm.model, settings.arm)
+    simulation = make_simulation(spec, log, [1], settings, [1])
+    expected = simulation.simulate(Stage(settings).candidates(found.theta[None])).pressure
+    assert expected is not None
+    plant = Plant(found)
+    pressure = [plant.pressure]
+    for command in log.command[:-1]:
+        plant.step(command)
+        pressure.append(plant.pressure)
+    np.testing.assert_array_equal(np.array(pressure)[:, 1], expected[0, :, 0])
+    assert np.isnan(np.delete(pressure[-1], 1, axis=0)).all()
+    assert np.isnan(Plant(model()).pressure).all()
+
+
+def test_resets_to_other_poses_are_plants_made_there():
+    found = model("hyd")
+    plant = Plant(found)
+    command = [0, 40.0, 0, 0, 0, 0, 0]
+    for pose in ("rig", found.settings.arm.pose("home"), "study"):
+        np.testing.assert_array_equal(plant.reset(pose)[0], plant.angle[0])
+        other = Plant(found)
+        other.reset(pose)
+        for _ in range(30):
+            np.testing.assert_array_equal(plant.step(command), other.step(command))
+
+
+@pytest.mark.parametrize("stage", ["mech", "hyd"])
+def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
+    plant = Plant(model(stage))
+    plant.save(tmp_path / "saved")
+    (tmp_path / "saved").rename(tmp_path / "moved")
+    again = load_plant(tmp_path / "moved")
+    for _ in range(50):
+        command = [0, 70.0, 0, 0, 0, 0, 0]
+        np.testing.assert_array_equal(again.step(command), plant.step(command))
+    arm = plant.identified.settings.arm
+    assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == {
+        part.mesh for part in (*arm.parts, arm.base)
+    }
+
+
+@pytest.mark.parametrize("joints", [[2], [2, 5]])
+def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_path):
+    """Stage 1 on the demo's log: from the XML, with the commands as controls and nothing else."""
+    found = model()
+    (log,) = read_logs([RIG], found.settings, lambda finding: None)
+    log.command[:, 4] = 0.3 * log.command[:, 1] if 5 in joints else 0.0
+    expected = response(found, log, joints)
+    plant = Plant(found, joints=joints)
+    plant.reset(log.start)
+    plant.save(tmp_path)
+    arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
+    data = mujoco.MjData(arm)
+    mujoco.mj_resetDataKeyframe(arm, data, arm.key("start").id)
+    angle = [data.qpos.copy()]
+    for command in log.command[:-1]:
+        data.ctrl[:] = command[[j - 1 for j in joints]]
+        mujoco.mj_step(arm, data)
+        angle.append(data.qpos.copy())
+    assert np.ptp(expected, axis=0).min() > np.deg2rad(1)
+    np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-6)
+    assert arm.nmesh == plant.model.nmesh > 0
+
+
+def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_path):
+    plant = Plant(model("hyd"))
+    plant.save(tmp_path)
+    names = {path.name for path in (tmp_path / "model").iterdir()}
+    assert names == {"arm.xml", "meshes", "mechanics.xml", "actuators.yaml", "README.txt"}
+    assert "MuJoCo alone cannot step this arm" in (tmp_path / "model" / "README.txt").read_text()
+    bare = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "mechanics.xml"))
+    assert bare.nu == 0
+    np.testing.assert_allclose(bare.body_mass, plant.model.body_mass)
+    assert bare.dof_damping[0] == MECHANICAL["D"]
+    assert "area_a: 900.0" in (tmp_path / "model" / "actuators.yaml").read_text().replace("900.0000000000001", "900.0")
+
+
+def test_a_shipped_config_of_stage_2_is_a_plant_at_nominal_values():
+    plant = load_plant("article-hyd", overrides={"start_pose": "study"})
+    start = plant.angle[1]
+    for _ in range(100):
+        plant.step([0, 60.0, 0, 0, 0, 0, 0])
+    assert plant.angle[1] - start > np.deg2rad(3)
+    with pytest.raises(SettingsError, match="no nominal gain"):
+        load_plant("fit-mech")
+
+
+@pytest.mark.parametrize("stage", ["mech", "hyd"])
+def test_a_plant_that_diverges_says_when(stage, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plant = Plant(model(stage))
+    plant.step(np.zeros(7))
+    plant.data.qvel[:] = np.nan
+    with pytest.raises(RunError, match=r"diverged before 0\.02 s"):
+        plant.step(np.zeros(7))
+    plant.reset()
+    assert np.isfinite(plant.step(np.zeros(7))).all()
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()
+
+
+@pytest.mark.parametrize("command", [[0, 1], 5.0, [0, np.nan, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 0]])
+def test_wrong_commands_are_refused(command):
+    with pytest.raises(ValueError, match="command"):
+        Plant(model()).step(command)
+
+
+def test_wrong_joints_periods_poses_and_curves_are_refused():
+    with pytest.raises(SettingsError, match="joints 1 to 7"):
+        Plant(model(), joints=[2, 8])
+    with pytest.raises(SettingsError, match=r"multiple of 0\.01 s"):
+        Plant(model(), period=0.015)
+    with pytest.raises(SettingsError, match="7 finite angles"):
+        Plant(model()).reset([0.0, 0.1])
+    with pytest.raises(SettingsError, match="no pose 'nowhere'"):
+        Plant(model()).reset("nowhere")
+    with pytest.raises(SettingsError, match="force-stroke curve"):
+        load_plant("fit-hyd", overrides={"parameters.F1.fixed": 500})
+
+
+def test_a_payload_pulls_the_arm_down():
+    found = model("hyd")
+    empty, loaded = Plant(found), Plant(found, payload=20.0)
+    command = [0, 60.0, 0, 0, 0, 0, 0]
+    for _ in range(60):
+        empty.step(command)
+        loaded.step(command)
+    assert loaded.angle[1] < empty.angle[1]

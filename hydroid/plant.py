@@ -85,7 +85,9 @@ class Plant:
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
-            raise SettingsError(f"must be a multiple of {self.timestep:g} s", where=f"period {self.period:g} s")
+            raise SettingsError(
+                f"must be a multiple of {self.timestep:g} s", where=f"period {self.period:g} s"
+            )
         self._spec = load_model(arm.model, arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
@@ -127,7 +129,9 @@ class Plant:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
         pressure = np.full((len(self._pose), 2), np.nan)
         if isinstance(self._arm, HydraulicArm):
-            seen = self._actuator.observe(ActuatorState(self._state[None], self._commands), self.data.qpos[None])
+            seen = self._actuator.observe(
+                ActuatorState(self._state[None], self._commands), self.data.qpos[None]
+            )
             pressure[self._active] = seen.pressure[0, self._active[self._columns]]
         return pressure
 
@@ -159,7 +163,9 @@ class Plant:
         with quiet_mujoco():
             self._balance = self._arm.start(self._values, 0, start_angle)
             if isinstance(self._arm, HydraulicArm):
-                self._actuator, state = self._actuators.start(self._candidate, start_angle, self._balance[None])
+                self._actuator, state = self._actuators.start(
+                    self._candidate, start_angle, self._balance[None]
+                )
                 self._state = state.joints[0]
                 past = len(state.commands) - 1
                 self._commands = np.zeros((past + self._steps, len(self._columns)))
@@ -226,7 +232,9 @@ class Plant:
             motors, actuators = None, {"units": {name: q.unit for name, q in QUANTITIES.items()}}
             for j in self.joints:
                 row = candidate.actuators[0, j - 1]
-                actuators[arm.joint_names[j - 1]] = {n: float(row[n] / q.factor) for n, q in QUANTITIES.items()}
+                actuators[arm.joint_names[j - 1]] = {
+                    n: float(row[n] / q.factor) for n, q in QUANTITIES.items()
+                }
         joints = ", ".join(arm.joint_names[j - 1] for j in self.joints)
         text = arm_mjcf(spec, self._fusion, model, motors, "meshes")
         write_fitted(folder, text, self.timestep, joints, actuators)
@@ -264,7 +272,10 @@ class Plant:
         self.model, self.data = self._arm.model, self._arm.data
         self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
         # for compiled code: angles after the step; no observation, and no joint that follows a log
-        self._rolled, self._unseen = np.empty((1, len(self._columns))), np.empty((0, len(self._columns)), JOINT_STATE)
+        self._rolled, self._unseen = (
+            np.empty((1, len(self._columns))),
+            np.empty((0, len(self._columns)), JOINT_STATE),
+        )
         self._servo = np.empty((self._steps, 0))
 
 

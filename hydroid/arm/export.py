@@ -69,7 +69,9 @@ def copy_model(spec: mujoco.MjSpec, folder: Path) -> None:
     write_atomic(folder / "arm.xml", spec.to_xml())
 
 
-def write_fitted(folder: Path, mjcf: str, timestep: float, joints: str, actuators: dict[str, Any] | None) -> None:
+def write_fitted(
+    folder: Path, mjcf: str, timestep: float, joints: str, actuators: dict[str, Any] | None
+) -> None:
     """Write the fitted arm beside `arm.xml`, and a README that says what it is good for.
 
     Args:

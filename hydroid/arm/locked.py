@@ -20,9 +20,18 @@ from hydroid.settings.arm import Arm
 
 Array = NDArray[np.float64]
 
-_OPTIONS = "timestep gravity integrator solver iterations tolerance jacobian enableflags".split()
-_JOINT_FIELDS = "range limited margin solref solimp stiffness stiffnesspoly".split()
-_DOF_FIELDS = "damping dampingpoly armature frictionloss solref solimp".split()
+_OPTIONS = [
+    "timestep",
+    "gravity",
+    "integrator",
+    "solver",
+    "iterations",
+    "tolerance",
+    "jacobian",
+    "enableflags",
+]
+_JOINT_FIELDS = ["range", "limited", "margin", "solref", "solimp", "stiffness", "stiffnesspoly"]
+_DOF_FIELDS = ["damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp"]
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,39 @@ _WEIGHED = (
     "fusestatic", "inertiagrouprange", "alignfree",
 )  # fmt: skip
 _OF_A_LINK = ("body", "inertial", "joint", "freejoint")
-_COPIED = [f"body_{name}" for name in "pos quat ipos iquat mass inertia simple sameframe".split()]
-_COPIED += [f"jnt_{name}" for name in "pos axis range limited margin solref solimp stiffness stiffnesspoly".split()]
-_COPIED += [f"dof_{name}" for name in "damping dampingpoly armature frictionloss solref solimp simplenum".split()]
+_COPIED = [
+    f"body_{name}" for name in ["pos", "quat", "ipos", "iquat", "mass", "inertia", "simple", "sameframe"]
+]
+_COPIED += [
+    f"jnt_{name}"
+    for name in [
+        "pos",
+        "axis",
+        "range",
+        "limited",
+        "margin",
+        "solref",
+        "solimp",
+        "stiffness",
+        "stiffnesspoly",
+    ]
+]
+_COPIED += [
+    f"dof_{name}"
+    for name in ["damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp", "simplenum"]
+]
 _COPIED += ["qpos0", "qpos_spring"]
-_OPTIONS = "timestep gravity integrator solver iterations tolerance jacobian enableflags disableflags".split()
+_OPTIONS = [
+    "timestep",
+    "gravity",
+    "integrator",
+    "solver",
+    "iterations",
+    "tolerance",
+    "jacobian",
+    "enableflags",
+    "disableflags",
+]
 
 
 def dressed_model(spec: mujoco.MjSpec, fusion: Fusion, locked: LockedArm) -> mujoco.MjModel:

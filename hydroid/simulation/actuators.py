@@ -53,9 +53,7 @@ class ArmActuators:
         assert candidates.actuators is not None
         chosen: Records = candidates.actuators[:, self.joints]  # pyright: ignore[reportAssignmentType]
         damping = candidates.damping[:, self.joints]
-        actuator = Actuator(
-            chosen, self._linkages, damping, self._period, self._settings, self._entries
-        )
+        actuator = Actuator(chosen, self._linkages, damping, self._period, self._settings, self._entries)
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return actuator, actuator.start(angle, balance[:, self.columns])
 

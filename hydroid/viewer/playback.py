@@ -50,7 +50,9 @@ class Playback:
         """Two columns of text beside the picture: what moves; its command, its angle, and the log's."""
         plant = self.plant
         names, command, angle = plant.names, plant.command, np.degrees(plant.angle)
-        lines = [f"{command[j - 1]:4.0f} %  {angle[j - 1]:7.2f} deg{self._logged(j - 1)}" for j in plant.joints]
+        lines = [
+            f"{command[j - 1]:4.0f} %  {angle[j - 1]:7.2f} deg{self._logged(j - 1)}" for j in plant.joints
+        ]
         first = ["time", *(names[j - 1] for j in plant.joints)]
         return "\n".join(first), "\n".join([f"{plant.time:.1f} s", *lines])
 

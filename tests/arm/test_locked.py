@@ -89,7 +89,9 @@ def test_with_all_joints_moving_the_bodies_are_the_links():
     locked = lock(SPEC, ARM, ARM.joint_names, np.zeros(J))
     inertials = locked.inertials(NOMINAL[None])
     np.testing.assert_allclose(inertials["body_mass"][0, 1:6], NOMINAL[:5])
-    assert inertials["body_mass"][0, 6] == pytest.approx(NOMINAL[5] + NOMINAL[7])  # the fixed jaw is part of link 6
+    assert inertials["body_mass"][0, 6] == pytest.approx(
+        NOMINAL[5] + NOMINAL[7]
+    )  # the fixed jaw is part of link 6
     assert inertials["body_mass"][0].sum() == pytest.approx(45.0)
     np.testing.assert_allclose(inertials["body_ipos"][0, 1:6], FULL.body_ipos[LINKS[:5]], atol=1e-12)
     np.testing.assert_allclose(

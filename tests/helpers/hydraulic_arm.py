@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from hydroid.arm.quiet import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.records import Records, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.arm.quiet import quiet_mujoco
 
 DAMPING, STIFFNESS, PERIOD = 231.8, 53.4, 0.01
 TEN = (

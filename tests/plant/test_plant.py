@@ -17,7 +17,17 @@ from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
-MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0, "M1": 4.0, "M2": 6.0, "M3": 20.0, "M4": 2.0, "M5": 3.0, "M6": 5.0}
+MECHANICAL = {
+    "K": 0.21,
+    "D": 250.0,
+    "S": 40.0,
+    "M1": 4.0,
+    "M2": 6.0,
+    "M3": 20.0,
+    "M4": 2.0,
+    "M5": 3.0,
+    "M6": 5.0,
+}
 
 
 def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
@@ -222,7 +232,9 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     assert bare.nu == 0
     np.testing.assert_allclose(bare.body_mass, plant.model.body_mass)
     assert bare.dof_damping[0] == MECHANICAL["D"]
-    assert "area_a: 900.0" in (tmp_path / "model" / "actuators.yaml").read_text().replace("900.0000000000001", "900.0")
+    assert "area_a: 900.0" in (tmp_path / "model" / "actuators.yaml").read_text().replace(
+        "900.0000000000001", "900.0"
+    )
 
 
 def test_a_shipped_config_of_stage_2_is_a_plant_at_nominal_values():

@@ -200,7 +200,9 @@ def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
     program = "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     said = [
-        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True).stderr
+        subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True
+        ).stderr
         for _ in range(2)
     ]
     assert said[0].count("compiling the actuator's kernels") == 1

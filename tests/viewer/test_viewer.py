@@ -1,46 +1,45 @@
-"""The arm in motion: what is shown is what the simulation does, at the pace of the clock."""
+"""The arm in motion: what is shown is the plant, at the pace of the clock."""
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import step_log
 
-from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
-from hydroid.log import Log
-from hydroid.problem.problem import make_simulation
+from hydroid.identified import IdentifiedModel, load_identified
+from hydroid.log import Log, write_log
+from hydroid.plant import Plant
 from hydroid.settings.arm import Arm
-from hydroid.viewer.choice import Chosen, choose
-from hydroid.viewer.player import Player
+from hydroid.viewer.playback import Playback
+from hydroid.viewer.show import animate
 from hydroid.viewer.window import LATE, play
 
 SHOULDER = 1
 
 
 @pytest.fixture(scope="module")
-def chosen() -> Chosen:
-    """The article's damper and spring; without one, oil and arm would ring on."""
-    return choose("fit-hyd", None, {"parameters.D.fixed": 231.8, "parameters.S.fixed": 53.4})
+def nominal() -> IdentifiedModel:
+    """With the article's damper and spring; without one, oil and arm would ring on."""
+    return load_identified(None, "article-hyd", {"start_pose": "study"}, nominal=True)
 
 
-def player(arm: Arm, chosen: Chosen, log: Log, outputs: list[int], *, live: bool) -> Player:
-    spec = load_model(arm.model, arm)
-    return Player(
-        spec, arm, make_simulation(spec, log, outputs, chosen.settings), chosen.candidate, log, live=live
-    )
+@pytest.fixture(scope="module")
+def plants(nominal: IdentifiedModel) -> dict[str, Plant]:
+    return {"log": Plant(nominal), "sliders": Plant(nominal, joints=range(1, 8))}
 
 
 @pytest.fixture
-def slide(arm: Arm, chosen: Chosen, study_log: Log) -> Player:
+def slide(plants: dict[str, Plant]) -> Playback:
     """All joints on sliders, from the study pose."""
-    return player(arm, chosen, study_log, list(range(7)), live=True)
+    return Playback(plants["sliders"])
 
 
 class FakeViewer:
     """A window that stays open for some pictures; `at` does what a hand does before the k-th."""
 
-    def __init__(self, player: Player, pictures: int, at=lambda k, data: None) -> None:
-        self.player, self.left, self.at = player, pictures, at
+    def __init__(self, playback: Playback, pictures: int, at=lambda k, data: None) -> None:
+        self.playback, self.left, self.at = playback, pictures, at
         self.times: list[float] = []
         self.texts: list[tuple] = []
 
@@ -52,8 +51,8 @@ class FakeViewer:
         self.texts.append(texts)
 
     def sync(self) -> None:
-        self.times.append(self.player.data.time)
-        self.at(len(self.times), self.player.data)
+        self.times.append(self.playback.plant.time)
+        self.at(len(self.times), self.playback.plant.data)
 
 
 class FakeClock:
@@ -70,40 +69,47 @@ class FakeClock:
         self.now += seconds
 
 
-def test_a_log_is_played_as_it_is_simulated(arm: Arm, chosen: Chosen, study_log: Log):
-    simulation = make_simulation(load_model(arm.model, arm), study_log, [SHOULDER], chosen.settings)
-    expected = simulation.simulate(chosen.candidate).angle[0, :, 0]
-    shown = player(arm, chosen, study_log, [SHOULDER], live=False)
+def test_a_log_is_played_as_the_plant_steps(nominal: IdentifiedModel, plants, study_log: Log):
+    plant = Plant(nominal)
+    expected = [plant.reset(study_log.start)] + [plant.step(u) for u in study_log.command[:-1]]
+    shown = Playback(plants["log"], study_log)
     for moment in (0.013, 0.5, 0.5, 1.23, 99.0):  # whatever the pace
         shown.advance(moment)
-        sample = round(shown.time / study_log.period)
+        sample = round(shown.plant.time / study_log.period)
         assert sample == min(int(moment / study_log.period), len(expected) - 1)
-        assert shown.data.qpos[SHOULDER] == expected[sample]
-    still = np.delete(shown.data.qpos, SHOULDER)
-    assert (still == np.delete(study_log.angle[0], SHOULDER)).all()
-    assert np.ptp(expected) > 0.05  # it does move
+        np.testing.assert_array_equal(shown.plant.angle, expected[sample])
+    assert np.ptp(np.array(expected)[:, SHOULDER]) > 0.05  # it does move
 
 
-def test_sliders_move_their_joint_and_zero_stops_it(slide: Player):
-    start = slide.data.qpos.copy()
-    slide.data.ctrl[SHOULDER] = 60.0
+def test_what_is_drawn_stands_where_the_angles_say(slide: Playback, arm: Arm):
+    slide.plant.data.ctrl[SHOULDER] = 100.0
     slide.advance(1.0)
-    moved = slide.data.qpos - start
+    plant = slide.plant
+    axis = plant.data.xmat[plant.model.body("link2").id].reshape(3, 3)[:, 0]
+    assert np.arcsin(axis[2]) == pytest.approx(plant.angle[SHOULDER], abs=1e-12)
+
+
+def test_sliders_move_their_joint_and_zero_stops_it(slide: Playback):
+    plant = slide.plant
+    start = plant.angle
+    plant.data.ctrl[SHOULDER] = 60.0
+    slide.advance(1.0)
+    moved = plant.angle - start
     assert moved[SHOULDER] > np.radians(5)
     assert np.abs(np.delete(moved, SHOULDER)).max() < 0.1 * moved[SHOULDER]
-    slide.data.ctrl[SHOULDER] = 0.0
+    plant.data.ctrl[SHOULDER] = 0.0
     slide.advance(2.0)
-    stopped = slide.data.qpos[SHOULDER]
+    stopped = plant.angle[SHOULDER]
     slide.advance(3.0)
-    assert slide.data.qpos[SHOULDER] == pytest.approx(stopped, abs=np.radians(0.1))
+    assert plant.angle[SHOULDER] == pytest.approx(stopped, abs=np.radians(0.1))
 
 
-def test_sliders_reach_from_minus_to_plus_100_percent(slide: Player):
-    assert slide.model.actuator_ctrllimited.all()
-    assert (slide.model.actuator_ctrlrange == [-100.0, 100.0]).all()
+def test_sliders_reach_from_minus_to_plus_100_percent(slide: Playback):
+    assert slide.plant.model.actuator_ctrllimited.all()
+    assert (slide.plant.model.actuator_ctrlrange == [-100.0, 100.0]).all()
 
 
-def test_the_picture_keeps_pace_with_the_clock(slide: Player):
+def test_the_picture_keeps_pace_with_the_clock(slide: Playback):
     clock = FakeClock()
     viewer = FakeViewer(slide, 30)
     play(slide, viewer, clock, clock.sleep)
@@ -113,53 +119,58 @@ def test_the_picture_keeps_pace_with_the_clock(slide: Player):
     assert np.all(np.diff(viewer.times) < 0.021)
     (_, _, names, values) = viewer.texts[-1]
     assert names.splitlines()[:3] == ["time", "azimuth", "shoulder"]
-    assert values.splitlines()[0] == f"{slide.time:.1f} s"
+    assert values.splitlines()[0] == f"{slide.plant.time:.1f} s"
 
 
-def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Player):
+def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Playback):
     clock = FakeClock(cost=0.5)
     viewer = FakeViewer(slide, 5)
     play(slide, viewer, clock, clock.sleep)
     assert np.diff(viewer.times) == pytest.approx(LATE, abs=0.011)
 
 
-def test_the_viewers_reset_starts_again(slide: Player):
+def test_the_viewers_reset_starts_again(slide: Playback):
     def reset(k, data):
         if k == 10:
             data.time = 0.0
             data.ctrl[:] = 0.0
 
-    slide.data.ctrl[SHOULDER] = 60.0
-    start = slide.data.qpos.copy()
+    start = slide.plant.angle
+    slide.plant.data.ctrl[SHOULDER] = 60.0
     clock = FakeClock()
     viewer = FakeViewer(slide, 12, reset)
     play(slide, viewer, clock, clock.sleep)
     assert viewer.times[9] > 0.1 > viewer.times[11]
-    assert np.abs(slide.data.qpos - start).max() < 1e-3
+    assert np.abs(slide.plant.angle - start).max() < 1e-3
 
 
-def test_a_player_that_diverges_says_when(slide: Player):
-    slide._run.position[0, 0] = np.nan
-    with pytest.raises(RunError, match=r"diverged before 0\.02 s"):
+def test_a_playback_that_diverges_says_when(slide: Playback):
+    slide.plant.data.qpos[0] = np.nan
+    with pytest.raises(RunError, match=r"diverged before 0\.01 s"):
         slide.advance(0.02)
 
 
-def test_values_are_taken_and_what_is_not_named_is_nominal(tmp_path: Path, arm: Arm):
-    file = tmp_path / "p.yaml"
-    file.write_text("A_A: 900\nM3: 20\n")
-    found = choose(None, file)
-    nominal = choose(None, None).candidate
-    assert found.candidate.actuators.area_a[0] == pytest.approx([8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4])
-    assert (found.candidate.actuators.area_b == nominal.actuators.area_b).all()
-    assert found.candidate.arm.mass[0] == pytest.approx(np.where(np.arange(8) == 2, 20.0, arm.masses))
-    assert (nominal.arm.mass[0] == arm.masses).all()
-    assert "A_B" in found.nominal
-    assert "A_A" not in found.nominal
-    assert choose(None, None, {"parameters.A_A.fixed": 700}).candidate.actuators.area_a[0, 1] == 7e-4
+def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, tmp_path, arm: Arm):
+    """Rendered without a display, where this machine can."""
+    Image = pytest.importorskip("PIL.Image")
+    log = step_log(arm.pose("study"), [80.0], dwell=0.61)
+    write_log(tmp_path / "log.csv", log, nominal.settings.log)
+    try:
+        animate(nominal, tmp_path / "log.csv", None, tmp_path / "arm.gif", print)
+    except RunError as error:
+        assert "no picture can be rendered" in str(error)
+        pytest.skip(str(error))
+    with Image.open(tmp_path / "arm.gif") as gif:
+        assert gif.n_frames == 7
+        first = np.asarray(gif.convert("RGB"), float)
+        gif.seek(6)
+        last = np.asarray(gif.convert("RGB"), float)
+    assert np.abs(first - last).max() > 50  # the arm has moved
+    assert np.unique(first.reshape(-1, 3), axis=0).shape[0] > 20  # and it is a picture, not one colour
 
 
-def test_a_name_that_does_not_exist_is_refused(tmp_path: Path):
-    file = tmp_path / "p.yaml"
-    file.write_text("AA: 900\n")
-    with pytest.raises(SettingsError, match="unknown parameter 'AA'"):
-        choose(None, file)
+def test_a_log_without_commands_is_refused(nominal: IdentifiedModel, tmp_path, arm: Arm):
+    log = step_log(arm.pose("study"), [0.0])
+    write_log(tmp_path / "log.csv", replace(log, source="still"), nominal.settings.log)
+    with pytest.raises(SettingsError, match="commands nothing"):
+        animate(nominal, tmp_path / "log.csv", None, tmp_path / "arm.gif", print)

@@ -95,8 +95,9 @@ class Plant:
         self._locked_pose: Array | None = None
         if self._candidate.actuators is not None:
             if not has_force_curve(self._candidate.actuators)[0]:
-                what = "no solenoid has this force-stroke curve: it needs F1 > F2 and F1/F2 < (x2/x1)²"
-                raise SettingsError(what, where=identified.source)
+                hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
+                what = "no force-stroke curve runs through its two points"
+                raise SettingsError(what, where=identified.source, hint=hint)
             compile_rollout()
         self.reset()
 

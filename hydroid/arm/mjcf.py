@@ -98,10 +98,13 @@ def arm_mjcf(
     compiler = _section(root, "compiler")
     for name in _WEIGHED:
         compiler.attrib.pop(name, None)
-    home = Path(spec.modelfiledir).resolve()
     compiler.set("inertiafromgeom", "false")
-    compiler.set("meshdir", meshes or str(home / spec.meshdir))
-    compiler.set("texturedir", str(home / spec.texturedir))
+    if meshes is None:
+        home = Path(spec.modelfiledir).resolve()
+        compiler.set("meshdir", str(home / spec.meshdir))
+        compiler.set("texturedir", str(home / spec.texturedir))
+    else:
+        compiler.set("meshdir", meshes)
     option = _section(root, "option")
     option.set("timestep", repr(float(model.opt.timestep)))
     _section(option, "flag").set("contact", "disable")

@@ -218,7 +218,7 @@ def test_shared_and_own_parameters_of_joints():
     }
     settings = load_settings("article-mech", own)
     stage = Stage(settings)
-    values = stage.candidates(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None]).arm
+    values = stage.candidates(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None])
     np.testing.assert_array_equal(values.gain[0], [0, 0.2, 0.7, 0, 0, 0, 0])
     assert values.mass[0].sum() == pytest.approx(45.0)
 

@@ -1,4 +1,4 @@
-"""Where the shipped models, meshes and configs lie: in the wheel, or at the top of a checkout."""
+"""The folder of the shipped models, meshes and configs: in the wheel, or at the top of a checkout."""
 
 from pathlib import Path
 
@@ -15,11 +15,11 @@ def assets() -> Path:
 
 
 def find_config(name: str | Path, beside: Path | None = None) -> Path:
-    """Return the config file that `name` means.
+    """Find a config file.
 
     Args:
         name: a path, or the name of a shipped config with or without `.yaml`.
-        beside: a folder in which a relative path is looked up first.
+        beside: folder in which a relative path is looked up first.
 
     Raises:
         SettingsError: no such file, with the names of the shipped configs.

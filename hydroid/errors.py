@@ -1,15 +1,15 @@
-"""What the user can mend: each error says what is wrong, where, and what is allowed or to be done.
+"""Errors that a user can correct: each says what is wrong, where, and what is allowed or what to do.
 
-Every class here ends a command with one line and exit status 2. Anything else that escapes is a
-defect of hydroid and keeps its traceback.
+The command line shows them as one line and ends with exit status 2. Any other exception is a defect of
+hydroid and keeps its traceback.
 """
 
 LONGEST = 1500
-"""characters of a message"""
+"""largest length of a message, in characters"""
 
 
 class HydroidError(Exception):
-    """A fault the user can mend.
+    """An error that the user can correct.
 
     Args:
         what: what is wrong, a clause without a full stop.
@@ -28,7 +28,7 @@ class HydroidError(Exception):
 
 
 def _one_line(text: str) -> str:
-    """What a file holds stands in messages: escape what a terminal would obey, and cut what nobody reads."""
+    """Escape control characters, which may come from a file, and shorten the text."""
     plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} ... {plain[-LONGEST // 2 :]}"
 
@@ -42,7 +42,7 @@ class LogError(HydroidError):
 
 
 class SettingsError(HydroidError):
-    """A YAML file or a --set that asks for something that does not exist or is not allowed."""
+    """A setting that does not exist or is not allowed, in a YAML file or an override."""
 
 
 class MeshError(HydroidError):

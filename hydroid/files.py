@@ -1,4 +1,4 @@
-"""Files appear whole or not at all."""
+"""Writing files so that they appear completely or not at all."""
 
 import logging
 import os
@@ -12,7 +12,7 @@ from pathlib import Path
 from hydroid.errors import RunError
 
 PART = ".part"
-"""ending of a file that is being written"""
+"""suffix of a file that is being written"""
 
 _STOPS = tuple(getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGUSR1") if hasattr(signal, n))
 
@@ -20,16 +20,16 @@ _log = logging.getLogger(__name__)
 
 
 def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
-    """Write a file so that a reader, or a crash, sees the old content or the new, never a part.
+    """Write a file so that readers see either the old content or the new, also after a crash.
 
-    The content is on the disk before the name is: after a power cut the name may stand for the old content,
-    but not for a part of the new. A killed process may leave a hidden file that ends in PART behind.
+    The content reaches the disk before the file gets its name, so a power cut leaves the old file or the new
+    one. A killed process may leave a hidden file with the suffix PART.
 
     Args:
         path: the file.
-        content: of it; text is written as UTF-8.
-        keep: a name in the same folder under which the old content, if any, is kept. A crash between the two
-            renamings leaves it there and nothing at `path`.
+        content: its content; text is written as UTF-8.
+        keep: path in the same folder to which the old file, if any, is moved first. After a crash between the
+            two renamings only this file exists.
 
     Raises:
         RunError: the folder cannot be written, or the disk is full.
@@ -40,11 +40,11 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
 
 @contextmanager
 def undisturbed() -> Generator[None]:
-    """Hold Ctrl-C and a cluster's notices back for as long as a file is written.
+    """Delay Ctrl-C and the signals of a cluster until a file is written.
 
-    A KeyboardInterrupt may come between any two bytecodes; zipfile, for one, makes a ValueError of it.
+    A KeyboardInterrupt may come between any two bytecodes, and some libraries turn it into another error.
     """
-    if threading.current_thread() is not threading.main_thread():  # only that one is interrupted
+    if threading.current_thread() is not threading.main_thread():  # signals only interrupt the main thread
         yield
         return
     held: list[int] = []
@@ -82,14 +82,14 @@ def _write(path: Path, data: bytes, keep: Path | None) -> None:
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove what killed processes have left of files that they were writing; nobody else may write there."""
+    """Remove unfinished files that killed processes left; no other process may write to the folder."""
     for part in folder.rglob(f".*{PART}"):
         _log.info("removed %s, left by a process that was killed while it wrote", part.name)
         part.unlink(missing_ok=True)
 
 
 def is_file(path: Path) -> bool:
-    """Return whether there is such a file; a name that no file can have is none."""
+    """Return whether the file exists; False for a name that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -97,7 +97,7 @@ def is_file(path: Path) -> bool:
 
 
 def _umask() -> int:
-    """The process's mask; it can only be read by setting it."""
+    """The process's umask, which can only be read by setting it."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

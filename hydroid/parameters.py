@@ -1,7 +1,7 @@
 """Parameters: names, units and bounds, and the way between a vector and its names.
 
 The search works in the unit box of the *free* parameters; everything else works with the full
-vector theta, in the units of the table, one column a parameter, fixed ones included.
+vector theta: one column per parameter, fixed ones included, in the units of the table.
 """
 
 from collections.abc import Mapping
@@ -15,12 +15,12 @@ from hydroid.errors import SettingsError
 Array = NDArray[np.float64]
 
 LARGEST = 1e100
-"""more than any quantity can be, and squares of it are still finite"""
+"""larger than any quantity; its square is still finite"""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: its article symbol, unit, bounds, and its value where it is held fixed."""
+    """One physical parameter: its symbol, unit and bounds, and its value if it is fixed."""
 
     name: str
     unit: str
@@ -42,7 +42,7 @@ class ParameterSet:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which parameters the search may move, shape (P,)."""
+        """Which parameters are not fixed, shape (P,)."""
         return np.array([p.fixed is None for p in self.parameters], dtype=bool)
 
     @property
@@ -56,10 +56,10 @@ class ParameterSet:
         return np.array([p.upper for p in self.parameters])
 
     def from_unit(self, unit: Array) -> Array:
-        """Map points of the unit box, shape (n, free), to theta, shape (n, P): the space of (15), (16)."""
+        """Map points of the unit box, shape (n, free), to theta, shape (n, P), equations (15) and (16)."""
         theta = np.tile([p.fixed if p.fixed is not None else 0.0 for p in self.parameters], (len(unit), 1))
         low, high = self.lower[self.free], self.upper[self.free]
-        # the second clause returns the bounds themselves at 0 and 1, where low + (high - low) may not
+        # low + (high - low) may differ from high in the last digit
         theta[:, self.free] = np.where(unit >= 1.0, high, low + unit * (high - low))
         return theta
 
@@ -72,7 +72,7 @@ class ParameterSet:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
 
         Raises:
-            SettingsError: a name that does not exist, is missing, or has no finite number, or a negative one.
+            SettingsError: an unknown or a missing name, or a value that is not a number from 0.
         """
         unknown = [name for name in values if name not in self.names]
         if unknown:
@@ -86,14 +86,14 @@ class ParameterSet:
 
 
 def relative_error(estimate: Array, truth: Array) -> Array:
-    """Absolute difference to the true value over the true value, as in the article's tables 1 and 6."""
+    """Return |estimate - truth| / |truth|, as in the article's tables 1 and 6."""
     return np.abs(estimate - truth) / np.abs(truth)
 
 
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
         raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)
-    # no quantity can be negative; infinity and nan compare as too large
+    # no quantity can be negative; the comparison is False for NaN
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < LARGEST:
         raise SettingsError(
             f"parameter {parameter.name!r} is {value!r}",

@@ -1,4 +1,4 @@
-"""What can be wrong with a record: each function looks for one kind of fault, says where and what to do."""
+"""Checks of a recording: each function looks for one kind of fault and says where it is and what to do."""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,23 +9,23 @@ from hydroid.log.log import Floats
 from hydroid.log.signals import Recording, Signal
 from hydroid.settings.log import LogSettings
 
-GAP = 1.5  # a step this many sample periods long lacks a sample
-JITTER = 0.25  # of the sample period: steps that vary more are mentioned
-SLOWEST = 10  # file's period over the wanted one: above, a held command says nothing about the motion
+GAP = 1.5  # in sample periods: a longer step is a gap
+JITTER = 0.25  # in sample periods: a larger variation of the steps is a warning
+SLOWEST = 10  # largest ratio of the file's period to log.period_s: held commands would not explain the motion
 ROUNDING = 1e-6  # [%], of a scaled command
 
 
 def check_recording(
-    record: Recording, settings: LogSettings, outputs: Sequence[int], *, repaired: bool = False
+    recording: Recording, settings: LogSettings, outputs: Sequence[int], *, repaired: bool = False
 ) -> list[Finding]:
     """Return every fault of the recording, in the order in which a user should mend them."""
     return [
-        *_ragged(record),
-        *_holes(record, repaired),
-        *_time(record, settings),
-        *_outside(record),
-        *_jumps(record),
-        *_constant(record, outputs),
+        *_ragged(recording),
+        *_holes(recording, repaired),
+        *_time(recording, settings),
+        *_outside(recording),
+        *_jumps(recording),
+        *_constant(recording, outputs),
     ]
 
 
@@ -35,56 +35,56 @@ def sample_period(time: Floats) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
 
 
-def _ragged(record: Recording) -> Iterator[Finding]:
-    rows = np.flatnonzero(record.ragged)
+def _ragged(recording: Recording) -> Iterator[Finding]:
+    rows = np.flatnonzero(recording.ragged)
     if len(rows):
-        what = f"the row does not have {len(record.file.names)} cells like the header"
-        yield record.finding("error", what, "correct or delete the line, or use --repair", rows)
+        what = f"the row should have {len(recording.file.names)} cells, as the header has"
+        yield recording.finding("error", what, "correct or delete the line, or use --repair", rows)
 
 
-def _holes(record: Recording, repaired: bool) -> Iterator[Finding]:
-    for column, signal in enumerate(record.signals):
-        rows = np.flatnonzero(np.isnan(record.values[:, column]) & ~record.ragged)
+def _holes(recording: Recording, repaired: bool) -> Iterator[Finding]:
+    for column, signal in enumerate(recording.signals):
+        rows = np.flatnonzero(np.isnan(recording.values[:, column]) & ~recording.ragged)
         if not len(rows):
             continue
-        text = record.text(rows[0], column)
+        text = recording.text(rows[0], column)
         what = f"{text[:30]!r} is not a number" if text else "the cell is empty"
         hint = "correct the cell, or use --repair, which fills gaps up to log.repair_s [s]"
         if repaired:
             hint = "correct the cell: --repair fills only gaps between samples, up to log.repair_s [s]"
         if signal.kind == "time":
             hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
-        yield record.finding("error", what, hint, rows, signal)
+        yield recording.finding("error", what, hint, rows, signal)
 
 
-def _time(record: Recording, settings: LogSettings) -> Iterator[Finding]:
-    signal, rows = record.signals[0], np.flatnonzero(~np.isnan(record.time))
-    time, steps = record.time[rows], np.diff(record.time[rows])
+def _time(recording: Recording, settings: LogSettings) -> Iterator[Finding]:
+    signal, rows = recording.signals[0], np.flatnonzero(~np.isnan(recording.time))
+    time, steps = recording.time[rows], np.diff(recording.time[rows])
     back = rows[1:][steps <= 0]
     if len(back):
         at = np.flatnonzero(steps <= 0)[0]
         what = f"time does not increase: {time[at + 1]:.12g} s follows {time[at]:.12g} s"
         hint = "delete or sort the lines, or log the time with more digits"
-        yield record.finding("error", what, hint, back, signal)
+        yield recording.finding("error", what, hint, back, signal)
         return
     duration = time[-1] - time[0] if len(time) else 0.0
     if len(time) < 2 or duration < settings.shortest_s:
         what = f"holds {len(time)} samples over {duration:.6g} s, fewer than {settings.shortest_s:g} s"
         hint = "give a longer log, set log.time.unit if it is wrong, or lower log.shortest_s"
-        yield record.finding("error", what, hint)
+        yield recording.finding("error", what, hint)
         return
     period = sample_period(time)
     if period > SLOWEST * settings.period_s:
         what = f"has a sample every {period:.6g} s, at most {SLOWEST * settings.period_s:g} s can be used"
-        yield record.finding("error", what, "log faster, or set log.time.unit if it is wrong", (), signal)
-    yield from _steps(record, steps, rows, period, settings.repair_s)
+        yield recording.finding("error", what, "log faster, or set log.time.unit if it is wrong", (), signal)
+    yield from _steps(recording, steps, rows, period, settings.repair_s)
 
 
 def _steps(
-    record: Recording, steps: Floats, rows: np.ndarray, period: float, longest: float
+    recording: Recording, steps: Floats, rows: np.ndarray, period: float, longest: float
 ) -> Iterator[Finding]:
-    """Gaps, and steps that vary; a row without a time counts as a sample here, and is reported for that."""
-    signal, per_row = record.signals[0], steps / np.diff(rows)
+    """Gaps, and steps that vary; a row without a time counts as a sample, since it is reported elsewhere."""
+    signal, per_row = recording.signals[0], steps / np.diff(rows)
     gaps = np.flatnonzero(steps > (np.diff(rows) - 1 + GAP) * period)
     if len(gaps):
         worst = steps[gaps].max()
@@ -92,20 +92,20 @@ def _steps(
         hint = (
             "fill it with --repair"
             if worst <= longest * (1 + 1e-9) + period
-            else (f"cut the log into two files there (--repair bridges up to log.repair_s: {longest:g})")
+            else f"cut the log into two files there (--repair fills gaps up to log.repair_s: {longest:g} s)"
         )
-        yield record.finding("error", what, hint, rows[1:][gaps], signal)
+        yield recording.finding("error", what, hint, rows[1:][gaps], signal)
         return
     uneven = np.flatnonzero(np.abs(per_row - period) > JITTER * period)
     if len(uneven):
         what = f"sample period varies from {per_row.min():.4g} to {per_row.max():.4g} s around {period:.4g} s"
-        yield record.finding(
+        yield recording.finding(
             "warning", what, "commands are held and angles interpolated", rows[1:][uneven], signal
         )
 
 
-def _outside(record: Recording) -> Iterator[Finding]:
-    for signal, values in zip(record.signals, record.values.T, strict=True):
+def _outside(recording: Recording) -> Iterator[Finding]:
+    for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rounding = ROUNDING if signal.kind == "command" else 0.0
         rows = np.flatnonzero((values < signal.low - rounding) | (values > signal.high + rounding))
         if not len(rows):
@@ -113,7 +113,7 @@ def _outside(record: Recording) -> Iterator[Finding]:
         to_unit, unit, hint = _presented(signal)
         value, low, high = (to_unit * x for x in (values[rows[0]], signal.low, signal.high))
         what = f"{signal} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
-        yield record.finding("error", what, hint, rows, signal)
+        yield recording.finding("error", what, hint, rows, signal)
 
 
 def _presented(signal: Signal) -> tuple[float, str, str]:
@@ -125,9 +125,9 @@ def _presented(signal: Signal) -> tuple[float, str, str]:
     return 180 / np.pi, "deg", hint
 
 
-def _jumps(record: Recording) -> Iterator[Finding]:
-    """A joint without a range is checked by its speed: no arm turns half a turn within one sample."""
-    for signal, values in zip(record.signals, record.values.T, strict=True):
+def _jumps(recording: Recording) -> Iterator[Finding]:
+    """Check a joint without a range by its speed: no arm turns by 180 deg within one sample."""
+    for signal, values in zip(recording.signals, recording.values.T, strict=True):
         if signal.kind != "angle" or np.isfinite(signal.high):
             continue
         rows = np.flatnonzero(~np.isnan(values))
@@ -136,14 +136,14 @@ def _jumps(record: Recording) -> Iterator[Finding]:
         if len(far):
             first = np.rad2deg(steps[np.abs(steps) > np.pi][0])
             what = f"{signal} jumps by {first:.6g} deg from one sample to the next"
-            yield record.finding(
+            yield recording.finding(
                 "error", what, "correct the cells, or log.angle's unit and scale", far, signal
             )
 
 
-def _constant(record: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
-    command, angle = record.motions(max((c.joint for c in record.signals), default=0))
-    names = {(c.kind, c.joint): c for c in reversed(record.signals)}
+def _constant(recording: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
+    command, angle = recording.motions(max((c.joint for c in recording.signals), default=0))
+    names = {(c.kind, c.joint): c for c in reversed(recording.signals)}
     joints = range(1, command.shape[1] + 1)
     driven = {j for j in joints if np.nan_to_num(command[:, j - 1]).any()}
     still = [j for j in joints if ("angle", j) in names and _is_constant(angle[:, j - 1])]
@@ -152,12 +152,12 @@ def _constant(record: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
         what = f"angle of {numbered(still)} never changes"
         what += " though it is driven" if len(still) == 1 and still[0] in driven else ""
         hint = "check the sensor and log.angle"
-        yield record.finding("warning", what, hint, (), names["angle", still[0]])
+        yield recording.finding("warning", what, hint, (), names["angle", still[0]])
     held = [j for j in joints if j in outputs and ("command", j) in names and _is_constant(command[:, j - 1])]
     if held:
         what = f"command of {numbered(held)}, whose angle is compared, is constant"
         hint = "such a log alone says little: fit it together with others"
-        yield record.finding("warning", what, hint, (), names["command", held[0]])
+        yield recording.finding("warning", what, hint, (), names["command", held[0]])
 
 
 def _is_constant(values: Floats) -> bool:

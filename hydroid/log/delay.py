@@ -130,7 +130,7 @@ def _smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats
     kernel = np.exp(-0.5 * (at / width) ** 2)
     kernel /= kernel.sum()
     kernel = -at / width**2 * kernel if derivative else kernel
-    return np.convolve(np.pad(signal, reach, "symmetric"), kernel, "valid")
+    return np.convolve(np.pad(signal, reach, "symmetric"), kernel, "valid").astype(np.float64)
 
 
 def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]) -> list[Finding]:

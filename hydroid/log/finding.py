@@ -42,7 +42,7 @@ class Finding:
 
 
 Warn = Callable[[Finding], None]
-"""takes what is odd about a log"""
+"""receives warnings and notes about a log"""
 
 
 def numbered(joints: Sequence[int]) -> str:

@@ -64,7 +64,7 @@ class Log:
         return float(self.time[-1])
 
     def first(self, seconds: float) -> "Log":
-        """Return the record from its start to `seconds` after its first command."""
+        """Return the recording from its start to `seconds` after its first command."""
         begins = int(np.argmax(np.any(self.command != 0, axis=1)))
         part = slice(begins + 1 + max(round(seconds / self.period), 1))
         return replace(

@@ -60,7 +60,7 @@ def check_log(
     angles_required: bool = True,
     repair: bool = False,
 ) -> tuple[Log | None, list[Finding]]:
-    """Find everything that is wrong with a log; arguments as of `read_log`.
+    """Find everything that is wrong with a log; the arguments are those of `read_log`.
 
     Returns:
         The log, None if any finding is an error; and all findings, errors first.
@@ -77,17 +77,17 @@ def check_log(
     signals = [signal for signal in wanted if signal.name in file.names]
     log = None
     if signals and signals[0].kind == "time":
-        record, notes = unwrap(read_recording(file, signals))
+        recording, notes = unwrap(read_recording(file, signals))
         if repair:
-            record, repairs = fill(record, settings.repair_s)
+            recording, repairs = fill(recording, settings.repair_s)
             notes += repairs
         findings += [
             *notes,
-            *check_recording(record, settings, outputs, repaired=repair),
-            *check_units(record),
+            *check_recording(recording, settings, outputs, repaired=repair),
+            *check_units(recording),
         ]
         if all(finding.level != "error" for finding in findings):
-            log, more = _to_log(record, settings, len(ranges))
+            log, more = _to_log(recording, settings, len(ranges))
             findings += more
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
@@ -105,21 +105,23 @@ def _mapping_faults(
     return faults
 
 
-def _to_log(record: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
-    command, angle = record.motions(joints)
-    pressure, period = record.pressures(joints), settings.period_s
+def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
+    command, angle = recording.motions(joints)
+    pressure, period = recording.pressures(joints), settings.period_s
     measured = angle if pressure is None else np.column_stack([angle, pressure.reshape(len(angle), -1)])
     time, command, measured = resample(
-        record.time, command.clip(-100, 100), measured, period, settings.delay_s
+        recording.time, command.clip(-100, 100), measured, period, settings.delay_s
     )
     if pressure is not None:
         pressure = measured[:, joints:].reshape(-1, joints, 2)
-    log = Log(record.file.source, time, command, measured[:, :joints], period, pressure)
+    log = Log(recording.file.source, time, command, measured[:, :joints], period, pressure)
     findings = list[Finding]()
-    if not is_on_grid(record.time, period):
-        what = f"resampled from {sample_period(record.time):.6g} s to {period:g} s"
-        findings.append(record.finding("note", what, "commands held, angles interpolated"))
+    if not is_on_grid(recording.time, period):
+        what = f"resampled from {sample_period(recording.time):.6g} s to {period:g} s"
+        findings.append(recording.finding("note", what, "commands held, angles interpolated"))
     if not log.driven.any():
-        findings.append(record.finding("warning", "no joint is driven", "check log.command"))
-    columns = {signal.joint: signal.name for signal in reversed(record.signals) if signal.kind == "command"}
+        findings.append(recording.finding("warning", "no joint is driven", "check log.command"))
+    columns = {
+        signal.joint: signal.name for signal in reversed(recording.signals) if signal.kind == "command"
+    }
     return log, findings + delay_findings(log, settings, columns.__getitem__)

@@ -15,7 +15,7 @@ _ROUNDING = 1e-6  # of a period
 def resample(
     time: Floats, command: Floats, angle: Floats, period: float, delay: float = 0.0
 ) -> tuple[Floats, Floats, Floats]:
-    """Bring a record to the grid k · period, from its first sample to its last.
+    """Bring a recording to the grid k · period, from its first sample to its last.
 
     Pressures are interpolated as angles are.
 

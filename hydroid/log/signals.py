@@ -1,4 +1,4 @@
-"""Which column of the file is which signal, and the record of them in SI units at the file's own rate."""
+"""The signals that a file's columns hold, and their values in SI units at the file's own rate."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from hydroid.log.finding import Finding
 from hydroid.log.log import Floats
 from hydroid.settings.log import LogSettings
 
-_LISTED = 40  # column names in a message
-_LACKING = 4  # of which the missing ones
-_PRESSURES = (-5e5, 2e8)  # [Pa]: a sensor may be off by its offset, and no hydraulic hose holds more
+_MAX_LISTED = 40  # column names in a message
+_MAX_MISSING = 4  # missing columns in a message
+_PRESSURES = (-5e5, 2e8)  # plausible pressures [Pa]: sensors have an offset, hoses burst
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Signal:
         name: in the header.
         kind: of signal.
         joint: number, from 1; 0 for the time.
-        low, high: what the value may be; a continuous joint has ∓inf.
+        low, high: limits of the value; ∓inf for a continuous joint.
         sign: +1, or −1 for the column of a command's negative direction.
         chamber: of a pressure, 0 for A and 1 for B.
     """
@@ -51,7 +51,7 @@ class Recording:
     """The used columns of one file, R rows of C signals, time first.
 
     Attributes:
-        table: the file.
+        file: the lines they come from.
         signals: C of them.
         values: [s, %, rad], shape (R, C), NaN where the file holds no number.
         lines: line of each row [1-based], shape (R,).
@@ -77,7 +77,7 @@ class Recording:
         rows: Sequence[int] | NDArray[np.int64] = (),
         signal: Signal | None = None,
     ) -> Finding:
-        """Make a finding at the first of `rows`; further ones are counted."""
+        """Make a finding at the first of `rows` that counts the others."""
         if len(rows) > 1:
             last = self.lines[rows[-1]]
             what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to line {last})"
@@ -138,19 +138,19 @@ def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
 
 
 def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
-    """Return what keeps the mapping from being used on this file: columns that lack or are ambiguous."""
+    """Return the columns that are missing or ambiguous."""
     findings: list[Finding] = []
     lacking = [signal for signal in wanted if signal.name not in file.names]
     if lacking:
         free = sorted(set(file.names).difference(signal.name for signal in wanted))
-        first = lacking[:_LACKING]
+        first = lacking[:_MAX_MISSING]
         names = ", ".join(f"{signal.name!r} ({signal}{_hint(signal.name, free)})" for signal in first)
-        names += f" and {len(lacking) - _LACKING} more" if len(lacking) > _LACKING else ""
+        names += f" and {len(lacking) - _MAX_MISSING} more" if len(lacking) > _MAX_MISSING else ""
         have = [name for name in file.names if name]
-        more = f" and {len(have) - _LISTED} more" if len(have) > _LISTED else ""
+        more = f" and {len(have) - _MAX_LISTED} more" if len(have) > _MAX_LISTED else ""
         hint = (
-            f"it has: {', '.join(have[:_LISTED])}{more}; set log.time, log.command, log.angle or log.joints, "
-            "where null says that a joint is not in the log"
+            f"it has: {', '.join(have[:_MAX_LISTED])}{more}; set log.time, log.command, log.angle or "
+            "log.joints, where null says that a joint is not in the log"
         )
         what = f"has no column {names}"
         findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
@@ -161,7 +161,7 @@ def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
     for name, count in Counter(signal.name for signal in wanted).items():
         if count > 1:
             users = " and ".join(str(signal) for signal in wanted if signal.name == name)
-            what, hint = f"one column cannot be {users}", "mend log.joints in the config"
+            what, hint = f"one column cannot be {users}", "correct log.joints in the config"
             findings.append(Finding("error", what, file.source, hint, file.header, name))
     return findings
 

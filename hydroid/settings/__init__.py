@@ -1,1 +1,1 @@
-"""Settings: one file a noun, all read through `load`."""
+"""Settings: one module per subject, all read through `load`."""

@@ -129,17 +129,17 @@ class Arm(Settings):
         for part in self.fixed:
             if part.carried_by not in moving:
                 raise ValueError(
-                    f"{part.name} is carried by {part.carried_by!r}, which is none of: {', '.join(moving)}"
+                    f"{part.name} is carried by {part.carried_by!r}, which is not one of: {', '.join(moving)}"
                 )
         if self.payload is not None and self.payload.carried_by not in moving:
-            raise ValueError(f"payload: {self.payload.carried_by!r} is none of: {', '.join(moving)}")
+            raise ValueError(f"payload: {self.payload.carried_by!r} is not one of: {', '.join(moving)}")
         for name, pose in self.poses.items():
             _check_pose(name, pose, self.joints)
         return self
 
     @property
     def parts(self) -> tuple[Link, ...]:
-        """All that has mass: the links in order, then the fixed parts."""
+        """Everything that has mass: the links in order, then the fixed parts."""
         return (*self.links, *self.fixed)
 
     @property
@@ -149,7 +149,7 @@ class Arm(Settings):
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of all that has mass, (L,)."""
+        """Names of everything that has mass, (L,)."""
         return tuple(part.name for part in self.parts)
 
     @property
@@ -188,7 +188,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
 
     Args:
         name: a path, or the name of a shipped config.
-        beside: a folder in which a relative path is looked up first.
+        beside: folder in which a relative path is looked up first.
 
     Raises:
         SettingsError: no such file, or a setting that is not allowed.
@@ -201,7 +201,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
 
 
 def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
-    """Refuse a triangle that folds flat within the joint's range, or a stroke that cannot span it."""
+    """Refuse a triangle that is flat within the joint's range, and a stroke too short for the range."""
     if joint.continuous:
         raise ValueError(f"joint {joint.name}: a continuous joint needs a rotary actuator")
     first, last = (angle + actuator.theta0 for angle in joint.range)

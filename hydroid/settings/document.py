@@ -1,7 +1,7 @@
-"""YAML text -> plain values: what a file of settings can hold, and no more.
+"""YAML text -> plain values: mappings, lists, text, numbers, true, false and null, and nothing else.
 
-Words are read as YAML 1.2 reads them. Version 1.1, PyYAML's own, takes 010 for 8, 1:30 for 90 and 1e3 for
-text; here they are 10, text and 1000. There are mappings, lists, text, numbers, true, false and null.
+Scalars are read as YAML 1.2 defines them. PyYAML's own rules, those of YAML 1.1, read 010 as 8, 1:30 as 90
+and 1e3 as text; here they are 10, text and 1000.
 """
 
 import re
@@ -11,16 +11,15 @@ import yaml
 
 from hydroid.errors import SettingsError
 
-MOST_NODES = (
-    20_000  # aliases counted as often as they are used, so that a few lines cannot stand for billions
-)
-DEEPEST = 40
+MAX_NODES = 20_000
+"""aliases count as often as they are used, so that a few lines cannot expand to billions of values"""
+MAX_DEPTH = 40
 _TAG = "tag:yaml.org,2002:"
 _TYPES = {_TAG + name for name in ("map", "seq", "str", "int", "float", "bool", "null")}
 
 
 class _Loader(yaml.SafeLoader):
-    """A safe loader without the special words of YAML 1.1: merge keys, dates, base 60, octal, yes and no."""
+    """A safe loader without the extras of YAML 1.1: merge keys, dates, base 60, octal numbers, yes and no."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  # PyYAML's own name and type
 
@@ -40,10 +39,10 @@ def read_document(text: str, source: str) -> tuple[Any, dict[tuple[str, ...], in
     """Read one YAML document.
 
     Returns:
-        Its value, and the line [1-based] on which each key or item stands, by its path.
+        Its value, and the line [1-based] of each key or item, by its path.
 
     Raises:
-        SettingsError: not YAML, a key that stands there twice or is no plain word, another type, or too much.
+        SettingsError: not YAML, a key that occurs twice or is not plain text, another type, or too much.
     """
     lines: dict[tuple[str, ...], int] = {}
     try:
@@ -59,12 +58,12 @@ def read_document(text: str, source: str) -> tuple[Any, dict[tuple[str, ...], in
         problem = getattr(error, "problem", None) or getattr(error, "reason", None)
         if not isinstance(error, yaml.YAMLError):
             deep = isinstance(error, RecursionError)
-            problem = "it is nested too deeply" if deep else "a value that its type cannot hold"
+            problem = "it is nested too deeply" if deep else "a value does not fit its type"
         raise SettingsError(f"is not YAML ({problem})", where=where) from None
 
 
 def read_value(text: str, source: str) -> Any:
-    """Read one value, such as that of a `--set`; raises as `read_document`."""
+    """Read one value, such as the one of an override; raises as `read_document`."""
     return read_document(text, source)[0]
 
 
@@ -73,23 +72,23 @@ def _collect_lines(
 ) -> None:
     line = node.start_mark.line + 1
     where = f"{source}, line {line}"
-    if len(lines) >= MOST_NODES:
-        raise SettingsError(f"holds more than {MOST_NODES} values", where=source)
-    if len(path) > DEEPEST:
-        raise SettingsError(f"is nested more than {DEEPEST} deep", where=where)
+    if len(lines) >= MAX_NODES:
+        raise SettingsError(f"holds more than {MAX_NODES} values", where=source)
+    if len(path) > MAX_DEPTH:
+        raise SettingsError(f"is nested more than {MAX_DEPTH} deep", where=where)
     if node.tag not in _TYPES:
         raise SettingsError(f"a value of type {node.tag.removeprefix(_TAG)!r} is not allowed", where=where)
     if isinstance(node, yaml.ScalarNode) and not _is_text(node.value):
-        raise SettingsError("a text holds characters that cannot be shown", where=where)
+        raise SettingsError("a text contains characters that cannot be printed", where=where)
     lines.setdefault(path, line)
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise SettingsError("a key must be a plain word", where=f"{source}, line {line}")
+                raise SettingsError("a key must be plain text or a number", where=f"{source}, line {line}")
             here = (*path, _spelt(key))
             if here in lines:
                 where = f"{source}, line {key.start_mark.line + 1}"
-                raise SettingsError(f"{'.'.join(here)} stands there twice", where=where)
+                raise SettingsError(f"{'.'.join(here)} occurs twice", where=where)
             lines[here] = key.start_mark.line + 1
             _collect_lines(value, here, lines, source)
     elif isinstance(node, yaml.SequenceNode):
@@ -102,5 +101,5 @@ def _is_text(value: str) -> bool:
 
 
 def _spelt(key: yaml.ScalarNode) -> str:
-    """The key in one spelling: 02 and 2 are the same joint."""
+    """The key in one spelling, since 02 and 2 are the same joint."""
     return str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value)

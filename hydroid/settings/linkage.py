@@ -46,8 +46,8 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
     return length - shortest, arm, (cosine - arm * arm) / length
 
 
-# catalogue strokes are round numbers: one a little short of the joint's range is an end stop, not a slip
 STROKE_TOLERANCE = 0.02
+"""part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
 
 
 class LinearActuator(Settings):

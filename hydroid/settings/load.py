@@ -1,4 +1,4 @@
-"""YAML -> checked settings: every refusal names the file, the line, the setting and what is allowed."""
+"""YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
 
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -42,13 +42,13 @@ MAX_BYTES = 2**18
 
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
-    """Read a mapping and the line on which each of its keys stands.
+    """Read a mapping and the lines of its keys.
 
     Returns:
         The mapping, and lines [1-based] by key path.
 
     Raises:
-        SettingsError: unreadable, not UTF-8, not YAML, not a mapping, or a key that stands there twice.
+        SettingsError: unreadable, not UTF-8, not YAML, not a mapping, or a key that occurs twice.
     """
     try:
         with path.open("rb") as file:
@@ -90,9 +90,9 @@ def validate(
     overridden: set[str] | None = None,
     folder: Path | None = None,
 ) -> S:
-    """Check a mapping against `kind`; report the first fault with its place.
+    """Check a mapping against `kind` and report the first fault with its place.
 
-    Files that the settings name are looked up in `folder` first.
+    Files that the settings name are first looked up in `folder`.
     """
     try:
         return kind.model_validate(values, context={"folder": folder})
@@ -133,7 +133,7 @@ def _set(values: dict[str, Any], key: str, value: Any) -> None:
     for folder in folders:
         inner = values.setdefault(folder, {})
         if not isinstance(inner, dict):
-            raise SettingsError(f"{folder} holds no settings below it", where=f"--set {key}")
+            raise SettingsError(f"{folder} has no settings below it", where=f"--set {key}")
         values = inner
     values[last] = value
 

@@ -64,7 +64,7 @@ def test_an_unknown_pose_is_answered_with_the_known_ones():
         (lambda v: v["joints"][1]["actuator"].update(towards=[0, 2, 0]), "along the joint's axis"),
         (lambda v: v["joints"][1].update(axis=[0, 0, 0]), "cannot be"),
         (lambda v: v["joints"][1]["actuator"].update(kind="hydraulic"), "kind"),
-        (lambda v: v["fixed"][0].update(carried_by="link9"), "'link9', which is none of"),
+        (lambda v: v["fixed"][0].update(carried_by="link9"), "'link9', which is not one of"),
         (lambda v: v["poses"].update(high=[0, 100, 0, 0, 0, 0, 0]), "shoulder at 100 deg is outside"),
         (lambda v: v["poses"].update(short=[0, 0]), "needs 7 angles"),
     ],

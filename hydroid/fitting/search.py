@@ -124,7 +124,7 @@ class Search:
         if state is not None:
             rng.bit_generator.state = state.rng
         before = None if state is None else state.population
-        chromosomes = self._algorithm.start(rng) if before is None else self._algorithm.ask(before, rng)
+        chromosomes = self._algorithm.ask(before, rng)
         result = self._memo.evaluate(self._problem.theta(self._algorithm.decode(chromosomes)))
         objectives = result.overall[:, None] if self.single else result.segments
         population = self._algorithm.tell(before, Population(chromosomes, objectives))

@@ -31,6 +31,8 @@ from hydroid.settings.simulation import ClusterSettings
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""
+PEM = ["tls_ca_file", *(f"tls_{r}_{k}" for r in ("scheduler", "worker", "client") for k in ("cert", "key"))]
+"""attributes of Dask's credentials"""
 CLOSED = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 """Dask's configuration for what is started here: its HTTP servers have no TLS, and serve nothing"""
 
@@ -139,6 +141,9 @@ def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
 
     folder = tempfile.mkdtemp(prefix=".hydroid-dask-", dir=Path.cwd())  # only this user can read it
     stack.callback(shutil.rmtree, folder, ignore_errors=True)
+    credentials, files = Security.temporary(), {name: f"{folder}/{name}.pem" for name in PEM}
+    for name, file in files.items():
+        Path(file).write_text(getattr(credentials, name))
     cluster: Any = SLURMCluster(
         cores=settings.cores,
         processes=settings.cores,
@@ -146,8 +151,7 @@ def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
         walltime=settings.walltime,
         queue=settings.queue,
         log_directory="runs/slurm",
-        security=Security.temporary(),
-        shared_temp_directory=folder,
+        security=Security(require_encryption=True, **files),
         scheduler_options={"dashboard": False, "dashboard_address": ":0"},
         worker_extra_args=["--no-dashboard"],
     )

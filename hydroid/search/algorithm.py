@@ -1,14 +1,16 @@
-"""The words that every search shares: a population, and `start`, `ask`, `tell`.
+"""What every search shares: a population, and `ask` and `tell`.
 
 Our algorithms hold settings only. The whole state of a run is its population, the state of its random
-generator and the number of the generation: store these three, and the run continues bit for bit. Those of
-other libraries (`library`) hold more, and are replayed.
+generator and the number of the generation: store these three, and the run continues bit for bit. Algorithms
+of other libraries (`library`) hold more, and are replayed.
 
-    genes = algorithm.start(rng)
-    population = algorithm.tell(None, Population(genes, objectives(algorithm.decode(genes))))
-    while not algorithm.reached(population):
-        genes = algorithm.ask(population, rng)
-        population = algorithm.tell(population, Population(genes, objectives(algorithm.decode(genes))))
+    population = None
+    for _ in range(1 + generations):
+        chromosomes = algorithm.ask(population, rng)
+        offspring = Population(chromosomes, objectives(algorithm.decode(chromosomes)))
+        population = algorithm.tell(population, offspring)
+        if algorithm.reached(population):
+            break
 """
 
 from dataclasses import dataclass
@@ -28,15 +30,15 @@ Bool = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Candidates and what they scored; nothing ever writes into its arrays.
+    """Candidates and their objectives; nothing ever writes into its arrays.
 
     Attributes:
         chromosomes: shape (n, length), see `coding`.
-        objectives: to be made small, shape (n, m). A candidate with an objective that is not finite is
+        objectives: to be minimised, shape (n, m). A candidate with an objective that is not finite is
             infeasible.
 
     Raises:
-        ValueError: the two do not belong together.
+        ValueError: the two do not have the same length.
     """
 
     chromosomes: Genes
@@ -73,7 +75,7 @@ class Algorithm(Protocol):
 
     @property
     def settings(self) -> PopulationSettings:
-        """Size and length."""
+        """Size of the population and number of generations."""
         ...
 
     @property
@@ -81,17 +83,8 @@ class Algorithm(Protocol):
         """Whether it minimises one objective, shape (n, 1), rather than several at once."""
         ...
 
-    @property
-    def population_size(self) -> int:
-        """Candidates of a population."""
-        ...
-
-    def start(self, rng: Generator) -> Genes:
-        """Chromosomes of the first population."""
-        ...
-
-    def ask(self, population: Population, rng: Generator) -> Genes:
-        """Chromosomes of the offspring to be evaluated next."""
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """Chromosomes to be evaluated next: the offspring of a population, or at the start the first one."""
         ...
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -103,5 +96,5 @@ class Algorithm(Protocol):
         ...
 
     def reached(self, population: Population) -> bool:
-        """Whether the search has what it was asked for and may stop early."""
+        """Whether the search may stop early: at its target, or converged."""
         ...

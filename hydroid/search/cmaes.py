@@ -11,6 +11,9 @@ from hydroid.settings.search import CmaesSettings
 
 Float = NDArray[np.float64]
 
+SIGMA = 0.3
+"""standard deviation of the first population around the middle of the unit box"""
+
 
 def cmaes(settings: CmaesSettings, parameters: int) -> LibraryAlgorithm:
     """CMA-ES on the unit box of so many parameters, from its middle.
@@ -39,7 +42,7 @@ class _Cmaes:
             "tolflatfitness": np.inf,
             "tolfun": 0.0,
         }
-        self._strategy = cma.CMAEvolutionStrategy(np.full(parameters, 0.5), settings.sigma, options)
+        self._strategy = cma.CMAEvolutionStrategy(np.full(parameters, 0.5), SIGMA, options)
         self._asked: list[Float] = []
 
     def ask(self) -> Float:

@@ -9,7 +9,7 @@ Both codings divide a parameter's range into the same 65,535 steps, ends include
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -23,45 +23,15 @@ BITS = 16
 STEPS = 2**BITS - 1
 
 
-class Coding(Protocol):
-    """The way between points of the unit box and chromosomes."""
-
-    @property
-    def parameters(self) -> int:
-        """Elements of a chromosome."""
-        ...
-
-    @property
-    def width(self) -> int:
-        """Genes of an element."""
-        ...
-
-    def random(self, n: int, rng: Generator) -> Genes:
-        """Chromosomes of uniformly distributed points, shape (n, parameters * width)."""
-        ...
-
-    def decode(self, chromosomes: Genes) -> Float:
-        """Points of the unit box, shape (n, parameters)."""
-        ...
-
-    def encode(self, points: Float) -> Genes:
-        """Chromosomes of the nearest points that the coding has."""
-        ...
-
-    def altered(self, chromosomes: Genes, rng: Generator) -> Genes:
-        """Chromosomes with every element mutated once."""
-        ...
-
-
 @dataclass(frozen=True)
 class GrayCoding:
-    """16 Gray-coded bits an element (MVBS)."""
+    """16 Gray-coded bits per element (MVBS)."""
 
     parameters: int
     width: int = BITS
 
     def random(self, n: int, rng: Generator) -> Genes:
-        """Uniform bits, hence uniform points."""
+        """Uniform bits, hence uniform points: shape (n, parameters * width)."""
         return rng.integers(0, 2, (n, self.parameters * BITS), dtype=np.uint8)
 
     def decode(self, chromosomes: Genes) -> Float:
@@ -86,13 +56,13 @@ class GrayCoding:
 
 @dataclass(frozen=True)
 class IntegerCoding:
-    """One integer from 0 to 65,535 an element."""
+    """One integer from 0 to 65,535 per element."""
 
     parameters: int
     width: int = 1
 
     def random(self, n: int, rng: Generator) -> Genes:
-        """Uniform integers."""
+        """Uniform integers, shape (n, parameters)."""
         return rng.integers(0, STEPS, (n, self.parameters), dtype=np.uint16, endpoint=True)
 
     def decode(self, chromosomes: Genes) -> Float:
@@ -108,9 +78,7 @@ class IntegerCoding:
         return self.random(len(chromosomes), rng)
 
 
-def make_coding(kind: Literal["binary", "integer"], parameters: int) -> Coding:
-    """The coding that a configuration names."""
-    return GrayCoding(parameters) if kind == "binary" else IntegerCoding(parameters)
+Coding = GrayCoding | IntegerCoding
 
 
 def _nearest(points: Float) -> NDArray[np.int64]:

@@ -1,8 +1,8 @@
-"""Algorithms of other libraries in the words of ours: `start`, `ask`, `tell`.
+"""Algorithms of other libraries behind our `ask` and `tell`.
 
-A library keeps a run's state in its own objects, which no file takes without pickle. But it does the same
-again from the same random numbers and the same objectives: a run is continued by replaying it from its
-start, on a fresh `LibraryAlgorithm`, with the objectives it was told then.
+A library keeps a run's state in its own objects, which cannot be stored without pickle. It is deterministic,
+however: a run is continued by replaying it from its start, on a fresh `LibraryAlgorithm`, with the same
+random numbers and the same objectives.
 """
 
 from collections.abc import Callable
@@ -57,23 +57,15 @@ class LibraryAlgorithm:
         self, settings: PopulationSettings, engine: Callable[[Generator], Engine], *, single: bool
     ) -> None:
         self.settings, self.single = settings, single
-        self._begin, self._engine = engine, None
+        self.begin, self._engine = engine, None
         self._asked = np.empty((0, 0))
         self._penalty = _Penalty()
 
-    @property
-    def population_size(self) -> int:
-        """Candidates of a population."""
-        return self.settings.population
-
-    def start(self, rng: Generator) -> Genes:
-        """Begin the run; return its first points, shape (n, p)."""
-        self._engine, self._penalty = self._begin(rng), _Penalty()
-        self._asked = self._engine.ask()
-        return self._asked
-
-    def ask(self, population: Population, rng: Generator) -> Genes:
-        """Points that the library wants next, shape (n, p); neither argument decides them."""
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """Points that the library wants next, shape (n, p); without a population, begin the run."""
+        if population is None:
+            self._engine, self._penalty = self.begin(rng), _Penalty()
+            self._asked = self._engine.ask()
         return self._asked
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -82,7 +74,7 @@ class LibraryAlgorithm:
         self._engine.tell(self._penalty.applied(offspring.objectives))
         self._asked = self._engine.ask()
         everyone = offspring if population is None else population.join(offspring)
-        return everyone.take(crowded_order(everyone.objectives)[: self.population_size])
+        return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
 
     def decode(self, chromosomes: Genes) -> Float:
         """The points themselves."""

@@ -7,8 +7,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from hydroid.search.algorithm import Population
-from hydroid.search.coding import Coding, Genes, make_coding
-from hydroid.search.operators import breed
+from hydroid.search.coding import Genes
+from hydroid.search.operators import GeneticAlgorithm
 from hydroid.search.pareto import crowding, ranks
 from hydroid.settings.search import Nsga2Settings
 
@@ -17,48 +17,27 @@ Int = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Nsga2:
+class Nsga2(GeneticAlgorithm):
     """Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
 
     Minimises m objectives at once: populations have objectives of shape (n, m).
     """
 
     settings: Nsga2Settings
-    parameters: int
+    single = False
 
-    @property
-    def single(self) -> bool:
-        """Several objectives."""
-        return False
-
-    @property
-    def population_size(self) -> int:
-        """Candidates of a population."""
-        return self.settings.population
-
-    @property
-    def coding(self) -> Coding:
-        """How candidates are written as chromosomes."""
-        return make_coding(self.settings.coding, self.parameters)
-
-    def start(self, rng: Generator) -> Genes:
-        """Uniform random chromosomes, shape (population_size, length)."""
-        return self.coding.random(self.population_size, rng)
-
-    def ask(self, population: Population, rng: Generator) -> Genes:
-        """Offspring of parents from the crowded tournament, shape (population_size, length)."""
-        count = self.population_size
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """Offspring of parents from the crowded tournament, shape (population, length)."""
+        count = self.settings.population
+        if population is None:
+            return self.coding.random(count, rng)
         parents = tournament(population.objectives, count + count % 2, rng)
-        return breed(population.chromosomes[parents], count, self.settings, self.coding, rng)
+        return self.breed(population.chromosomes[parents], count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """The best `population_size` of parents and children together, in crowded order."""
+        """The best of parents and children together, in crowded order."""
         everyone = offspring if population is None else population.join(offspring)
-        return everyone.take(crowded_order(everyone.objectives)[: self.population_size])
-
-    def decode(self, chromosomes: Genes) -> Float:
-        """Points of the unit box, shape (n, p)."""
-        return self.coding.decode(chromosomes)
+        return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
 
     def reached(self, population: Population) -> bool:
         """Never: a set of compromises has no one target."""

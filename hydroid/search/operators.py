@@ -1,13 +1,15 @@
-"""Operators of the genetic algorithms, article 4.1: roulette, crossover, mutation.
+"""Operators that the genetic algorithms share, article 4.1: roulette, crossover, mutation.
 
 All work on whole populations, leave their arguments alone, and draw from the generator passed in.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from hydroid.search.coding import Coding, Genes
+from hydroid.search.coding import Coding, Genes, GrayCoding, IntegerCoding
 from hydroid.settings.search import GeneticSettings
 
 Float = NDArray[np.float64]
@@ -99,17 +101,23 @@ def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> G
     return np.where(np.repeat(hit, coding.width, axis=1), coding.altered(chromosomes, rng), chromosomes)
 
 
-def breed(parents: Genes, count: int, settings: GeneticSettings, coding: Coding, rng: Generator) -> Genes:
-    """Cross, then mutate: the reproduction that both algorithms share.
+@dataclass(frozen=True)
+class GeneticAlgorithm:
+    """The part that both genetic algorithms share: coding and reproduction."""
 
-    Args:
-        parents: shape (even n >= count, length).
-        count: children wanted.
-        settings: rates and crossover type.
-        coding: what an element is.
-        rng: source of randomness.
+    settings: GeneticSettings
+    parameters: int
 
-    Returns:
-        Shape (count, length).
-    """
-    return mutate(crossover(parents, settings, rng)[:count], settings.mutation_rate, coding, rng)
+    @property
+    def coding(self) -> Coding:
+        """How candidates are written as chromosomes."""
+        return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
+
+    def decode(self, chromosomes: Genes) -> Float:
+        """Points of the unit box, shape (n, p)."""
+        return self.coding.decode(chromosomes)
+
+    def breed(self, parents: Genes, count: int, rng: Generator) -> Genes:
+        """Cross and mutate parents, shape (even n >= count, length); return `count` children."""
+        children = crossover(parents, self.settings, rng)[:count]
+        return mutate(children, self.settings.mutation_rate, self.coding, rng)

@@ -17,7 +17,7 @@ def feasible(objectives: Float) -> Bool:
 
 
 def dominates(values: Float) -> Bool:
-    """Whether candidate i (row) dominates candidate j (column): nowhere worse, somewhere better, shape (n, n)."""
+    """Whether candidate i (row) dominates j (column): nowhere worse, somewhere better; shape (n, n)."""
     n, m = values.shape
     no_worse = np.ones((n, n), dtype=bool)
     better = np.zeros((n, n), dtype=bool)

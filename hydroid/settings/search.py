@@ -71,17 +71,13 @@ class CmaesSettings(PopulationSettings):
     population: Annotated[int, Field(ge=6, le=100_000)] = 20
     generations: Annotated[int, Field(ge=0)] = 140
     """number of populations after the first one; fewer if the search converges earlier"""
-    sigma: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """standard deviation of the first population around the middle of the bounds, as a fraction of their
-    widths"""
 
 
 class PymooSettings(PopulationSettings):
     """An algorithm of the library pymoo."""
 
-    algorithm: str = "NSGA3"
-    """its name there; algorithms for several objectives (NSGA3, MOEAD, ...) take one per segment, the
-    others (DE, PSO, ...) the error over the whole log"""
+    algorithm: Literal["NSGA3", "MOEAD", "RVEA", "AGEMOEA", "SMSEMOA", "DE", "PSO"] = "NSGA3"
+    """its name there; DE and PSO minimise the error over the whole log, the others that of every segment"""
     population: Annotated[int, Field(ge=4, le=100_000)] = 40
     generations: Annotated[int, Field(ge=0)] = 70
 

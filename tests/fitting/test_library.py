@@ -108,8 +108,8 @@ def test_a_library_that_does_not_repeat_itself_is_found_out(tmp_path: Path):
     assert (folder.path / "checkpoint.npz").read_bytes() == before
 
 
-def test_an_algorithm_that_is_not_there_leaves_no_folder(tmp_path: Path):
-    study = Study(tmp_path, "NSGA3", **{"search.pymoo.algorithm": "NSGA9"})
-    with pytest.raises(SettingsError, match="did you mean NSGA3"):
+def test_an_algorithm_that_cannot_begin_leaves_no_folder(tmp_path: Path):
+    study = Study(tmp_path, "NSGA3", **{"objective.segments": {"equal": 1}})
+    with pytest.raises(SettingsError, match="minimises several objectives"):
         fit_logs(study.settings, [study.path], tmp_path / "out", Watcher(), lambda finding: None)
     assert not (tmp_path / "out").exists()

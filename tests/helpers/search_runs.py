@@ -17,7 +17,7 @@ def evaluate(algorithm, chromosomes, function):
 
 def advance(algorithm, function, population, rng, generations):
     if population is None:
-        population = algorithm.tell(None, evaluate(algorithm, algorithm.start(rng), function))
+        population = algorithm.tell(None, evaluate(algorithm, algorithm.ask(None, rng), function))
     for _ in range(generations):
         if algorithm.reached(population):
             break

@@ -4,23 +4,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hydroid.search.coding import GrayCoding, IntegerCoding, make_coding
+from hydroid.search.coding import GrayCoding, IntegerCoding
 
-KINDS = ["binary", "integer"]
+KINDS = [GrayCoding, IntegerCoding]
 STEP = 1 / 65535
 EVERY = np.arange(65536)[:, None] / 65535
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_value_goes_there_and_back(kind):
-    coding = make_coding(kind, 1)
+    coding = kind(1)
     assert (coding.decode(coding.encode(EVERY)) == EVERY).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(points=arrays(float, (4, 3), elements=st.floats(0, 1)))
 def test_encode_is_nearest_and_decode_its_inverse(kind, points):
-    coding = make_coding(kind, 3)
+    coding = kind(3)
     chromosomes = coding.encode(points)
     assert chromosomes.shape == (4, 3 * coding.width)
     assert np.abs(coding.decode(chromosomes) - points).max() <= STEP / 2 * (1 + 1e-9)
@@ -51,7 +51,7 @@ def test_elements_are_decoded_each_by_itself():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_points_are_uniform(kind):
-    coding = make_coding(kind, 2)
+    coding = kind(2)
     points = coding.decode(coding.random(20_000, np.random.default_rng(5)))
     counts = np.histogram(points, bins=50, range=(0, 1))[0]
     expected = points.size / 50

@@ -35,7 +35,7 @@ def test_utopia_leaves_out_an_objective_without_range():
 
 
 @given(seed=st.integers(0, 2**32))
-def test_a_member_that_is_best_everywhere_is_every_compromise(seed):
+def test_a_candidate_that_is_best_everywhere_is_every_compromise(seed):
     rng = np.random.default_rng(seed)
     points, objectives = rng.random((9, 4)), rng.random((9, 5)) + 1
     objectives[6] = rng.random(5)

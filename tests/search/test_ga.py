@@ -1,8 +1,6 @@
-import pickle
-
 import numpy as np
 import pytest
-from search_runs import advance, evaluate, same, through_files
+from search_runs import advance, evaluate, same
 
 from hydroid.errors import SettingsError
 from hydroid.search.algorithm import Population
@@ -69,10 +67,10 @@ def test_without_elitism_all_is_new():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_infeasible_members_have_no_children(bad):
+def test_infeasible_candidates_have_no_children(bad):
     ga = SimpleGa(GaSettings(crossover_rate=0, mutation_rate=0), 2)
     rng = np.random.default_rng(0)
-    chromosomes = ga.start(rng)
+    chromosomes = ga.ask(None, rng)
     objectives = sphere(ga.decode(chromosomes))
     objectives[::2] = bad
     children = ga.ask(Population(chromosomes, objectives), rng)
@@ -82,23 +80,11 @@ def test_infeasible_members_have_no_children(bad):
     assert np.isfinite(ga.tell(Population(chromosomes, objectives), offspring).objectives).all()
 
 
-def test_survives_a_population_without_a_feasible_member():
+def test_survives_a_population_without_a_feasible_candidate():
     ga = SimpleGa(GaSettings(), 3)
     population = advance(ga, lambda x: np.full((len(x), 1), np.nan), None, np.random.default_rng(0), 3)
     assert len(population) == 70
     assert not population.feasible.any()
-
-
-@pytest.mark.parametrize("coding", ["binary", "integer"])
-def test_a_resumed_run_is_the_same_bit_for_bit(tmp_path, coding):
-    ga = SimpleGa(GaSettings(coding=coding), 5)
-    whole = advance(ga, with_failures, None, np.random.default_rng(7), 12)
-    rng = np.random.default_rng(7)
-    half = advance(ga, with_failures, None, rng, 5)
-    half, rng = through_files(tmp_path, half, rng)
-    resumed = advance(pickle.loads(pickle.dumps(ga)), with_failures, half, rng, 7)
-    assert same(resumed, whole)
-    assert not same(advance(ga, with_failures, None, np.random.default_rng(8), 12), whole)
 
 
 def test_stops_at_the_target():
@@ -112,7 +98,7 @@ def test_stops_at_the_target():
 def test_more_than_one_objective_is_a_mistake():
     ga = SimpleGa(GaSettings(), 2)
     with pytest.raises(ValueError, match="one objective, not 2"):
-        ga.ask(Population(ga.start(np.random.default_rng(0)), np.ones((70, 2))), np.random.default_rng(0))
+        ga.ask(Population(ga.ask(None, np.random.default_rng(0)), np.ones((70, 2))), np.random.default_rng(0))
 
 
 def test_objectives_that_do_not_belong_to_the_chromosomes_are_a_mistake():

@@ -4,13 +4,13 @@ import time
 import numpy as np
 import pytest
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from search_runs import advance, evaluate, same, through_files
 
 from hydroid.search.algorithm import Population
 from hydroid.search.ga import SimpleGa
-from hydroid.search.hypervolume import hypervolume
 from hydroid.search.nsga2 import Nsga2, crowded_order, tournament
 from hydroid.search.pareto import crowding, ranks
 from hydroid.settings.search import GaSettings, Nsga2Settings
@@ -31,17 +31,15 @@ def with_failures(points):
     [("zdt1", {"n_var": 10}, [1.1, 1.1]), ("dtlz2", {"n_var": 7, "n_obj": 3}, [1.1, 1.1, 1.1])],
 )
 def test_reaches_what_pymoo_reaches_with_the_same_budget(name, size, reference):
-    problem = get_problem(name, **size)
-    p = problem.n_var
-    settings = Nsga2Settings(population=40, crossover_rate=0.9, mutation_rate=1 / p)
-    ours, theirs, start = [], [], []
+    problem, volume = get_problem(name, **size), HV(ref_point=np.array(reference))
+    settings = Nsga2Settings(population=40, crossover_rate=0.9, mutation_rate=1 / problem.n_var)
+    search, ours, theirs, start = Nsga2(settings, problem.n_var), [], [], []
     for seed in range(3):
-        population = advance(Nsga2(settings, p), problem.evaluate, None, np.random.default_rng(seed), 99)
-        ours.append(hypervolume(population.objectives, np.array(reference)))
-        front = minimize(problem, NSGA2(pop_size=40), ("n_gen", 100), seed=seed).F
-        theirs.append(hypervolume(front, np.array(reference)))
-        first = advance(Nsga2(settings, p), problem.evaluate, None, np.random.default_rng(seed), 0)
-        start.append(hypervolume(first.objectives, np.array(reference)))
+        rng = np.random.default_rng(seed)
+        first = advance(search, problem.evaluate, None, rng, 0)
+        start.append(volume(first.objectives))
+        ours.append(volume(advance(search, problem.evaluate, first, rng, 99).objectives))
+        theirs.append(volume(minimize(problem, NSGA2(pop_size=40), ("n_gen", 100), seed=seed).F))
     assert np.median(start) < 0.5 * np.median(theirs)  # otherwise the problem could not tell
     assert np.median(ours) > 0.93 * np.median(theirs)  # theirs crosses real numbers, ours strings of bits
 
@@ -72,22 +70,22 @@ def test_survivors_are_never_dominated_by_the_dropped():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_the_infeasible_neither_survive_nor_win_while_a_feasible_member_is_there(bad):
+def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_there(bad):
     search = Nsga2(Nsga2Settings(population=20), 2)
     rng = np.random.default_rng(0)
-    chromosomes = search.start(rng)
+    chromosomes = search.ask(None, rng)
     objectives = two_goals(search.decode(chromosomes))
     objectives[::2, 1] = bad
     population = Population(chromosomes, objectives)
     assert sorted(crowded_order(objectives)[:10]) == list(range(1, 20, 2))
-    good = evaluate(search, search.start(rng), two_goals)
+    good = evaluate(search, search.ask(None, rng), two_goals)
     assert search.tell(population, good).feasible.all()
     # one of two contestants is feasible in all but the pairs of two infeasible ones
     wins = np.concatenate([tournament(objectives, 20, rng) for _ in range(200)])
     assert (wins % 2 == 0).mean() == pytest.approx(0.25 * 9 / 9.5, abs=0.03)
 
 
-def test_a_tournament_gives_every_member_two_chances_and_the_better_wins():
+def test_a_tournament_gives_every_candidate_two_chances_and_the_better_wins():
     objectives = np.arange(10.0)[:, None]  # a strict order
     counts = np.bincount(tournament(objectives, 10, np.random.default_rng(0)), minlength=10)
     assert counts[0] == 2
@@ -95,13 +93,13 @@ def test_a_tournament_gives_every_member_two_chances_and_the_better_wins():
     assert counts.sum() == 10
 
 
-def test_the_member_with_the_least_room_wins_no_tournament_on_its_front():
+def test_the_candidate_with_the_least_room_wins_no_tournament_on_its_front():
     front = np.array([[0.0, 9], [1, 5], [2, 4], [9, 0]])  # room: inf, 7/9, 13/9, inf
     wins = np.concatenate([tournament(front, 4, np.random.default_rng(k)) for k in range(50)])
     assert set(wins) == {0, 2, 3}
 
 
-def test_roomier_members_win_among_equals():
+def test_roomier_candidates_win_among_equals():
     angle = np.concatenate((np.linspace(0, 0.2, 10), [0.8, np.pi / 2]))
     front = np.stack((np.cos(angle), np.sin(angle)), axis=1)
     order = crowded_order(front).tolist()
@@ -112,15 +110,21 @@ def test_roomier_members_win_among_equals():
 
 
 @pytest.mark.parametrize("coding", ["binary", "integer"])
-def test_a_resumed_run_is_the_same_bit_for_bit(tmp_path, coding):
-    search = Nsga2(Nsga2Settings(coding=coding, population=13), 5)
-    whole = advance(search, with_failures, None, np.random.default_rng(7), 12)
+@pytest.mark.parametrize("kind", [SimpleGa, Nsga2])
+def test_a_resumed_run_is_the_same_bit_for_bit(tmp_path, kind, coding):
+    settings = (GaSettings if kind is SimpleGa else Nsga2Settings)(coding=coding, population=13)
+    search = kind(settings, 5)
+
+    def function(points):
+        return with_failures(points)[:, -1 if search.single else 0 :]
+
+    whole = advance(search, function, None, np.random.default_rng(7), 12)
     rng = np.random.default_rng(7)
-    half = advance(search, with_failures, None, rng, 5)
-    half, rng = through_files(tmp_path, half, rng)
-    resumed = advance(pickle.loads(pickle.dumps(search)), with_failures, half, rng, 7)
+    half, rng = through_files(tmp_path, advance(search, function, None, rng, 5), rng)
+    resumed = advance(pickle.loads(pickle.dumps(search)), function, half, rng, 7)
     assert same(resumed, whole)
     assert len(whole) == 13
+    assert not same(advance(search, function, None, np.random.default_rng(8), 12), whole)
 
 
 def test_a_generation_costs_little():

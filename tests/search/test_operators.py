@@ -3,8 +3,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hydroid.search.coding import make_coding
-from hydroid.search.operators import breed, crossover, mutate, pointwise_swaps, roulette, uniform_swaps
+from hydroid.search.coding import GrayCoding, IntegerCoding
+from hydroid.search.operators import (
+    GeneticAlgorithm,
+    crossover,
+    mutate,
+    pointwise_swaps,
+    roulette,
+    uniform_swaps,
+)
 from hydroid.settings.search import GaSettings
 
 INF, NAN = np.inf, np.nan
@@ -15,7 +22,7 @@ def frequencies(objective, draws=50_000):
     return np.bincount(index, minlength=len(objective))
 
 
-def test_members_are_drawn_in_proportion_to_their_fitness():
+def test_candidates_are_drawn_in_proportion_to_their_fitness():
     objective = [1.0, 2.0, 4.0, 4.5, 5.0, INF]
     fitness = np.array([4.0, 3.0, 1.0, 0.5, 0.0, 0.0])
     counts = frequencies(objective)
@@ -74,12 +81,12 @@ def test_uniform_crossover_swaps_half():
     assert np.abs(share - 0.5).max() < 5 * np.sqrt(0.25 / 1000)
 
 
-@pytest.mark.parametrize("kind", ["binary", "integer"])
+@pytest.mark.parametrize("kind", [GrayCoding, IntegerCoding])
 @pytest.mark.parametrize("cross", ["pointwise", "uniform"])
 @given(rate=st.floats(0, 1), seed=st.integers(0, 2**32))
 def test_crossover_only_exchanges_the_genes_of_a_pair(kind, cross, rate, seed):
     rng = np.random.default_rng(seed)
-    parents = make_coding(kind, 4).random(10, rng)
+    parents = kind(4).random(10, rng)
     parents.flags.writeable = False
     children = crossover(parents, GaSettings(crossover=cross, crossover_rate=rate), rng)
     assert children.dtype == parents.dtype
@@ -88,7 +95,7 @@ def test_crossover_only_exchanges_the_genes_of_a_pair(kind, cross, rate, seed):
 
 
 def test_the_crossover_rate_is_the_share_of_pairs_that_cross():
-    coding = make_coding("integer", 200)
+    coding = IntegerCoding(200)
     rng = np.random.default_rng(0)
     parents = coding.random(4000, rng)
     children = crossover(parents, GaSettings(crossover="uniform", crossover_rate=0.8), rng)
@@ -98,9 +105,9 @@ def test_the_crossover_rate_is_the_share_of_pairs_that_cross():
     assert (crossover(parents, GaSettings(crossover_rate=0), rng) == parents).all()
 
 
-@pytest.mark.parametrize("kind", ["binary", "integer"])
+@pytest.mark.parametrize("kind", [GrayCoding, IntegerCoding])
 def test_the_mutation_rate_is_per_element(kind):
-    coding = make_coding(kind, 9)
+    coding = kind(9)
     rng = np.random.default_rng(0)
     parents = coding.random(5000, rng)
     parents.flags.writeable = False
@@ -114,7 +121,6 @@ def test_the_mutation_rate_is_per_element(kind):
 
 @pytest.mark.parametrize("count", [7, 8])
 def test_breeding_without_operators_is_cloning(count):
-    coding = make_coding("binary", 3)
-    parents = coding.random(8, np.random.default_rng(0))
-    settings = GaSettings(crossover_rate=0, mutation_rate=0)
-    assert (breed(parents, count, settings, coding, np.random.default_rng(0)) == parents[:count]).all()
+    algorithm = GeneticAlgorithm(GaSettings(crossover_rate=0, mutation_rate=0), 3)
+    parents = algorithm.coding.random(8, np.random.default_rng(0))
+    assert (algorithm.breed(parents, count, np.random.default_rng(0)) == parents[:count]).all()

@@ -29,7 +29,7 @@ from pathlib import Path
 from hydroid.cli import running  # noqa: F401  # what a run imports, once for all
 from hydroid.cli.app import main as hydroid
 from hydroid.fitting import search
-from hydroid.report import page, plots  # noqa: F401
+from hydroid.report import fit_report  # noqa: F401
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600

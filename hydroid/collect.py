@@ -12,9 +12,9 @@ from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, NamedEstimate, read_estimate
 from hydroid.parameters import ParameterSet
 from hydroid.problem.stage import Stage
-from hydroid.report.collected import RunResult, write_collected
+from hydroid.report.page import write_page
+from hydroid.report.spread import RunEstimate, RunResult, final_spread, spread_page
 from hydroid.report.table import Table
-from hydroid.report.tables import SeedResult
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
@@ -73,7 +73,9 @@ def collect(names: Sequence[str], out: Path, tell: Callable[[str], None]) -> Col
         if kept is not result:
             tell(f"left out: {result.path}: has seed {result.seed}, as {kept.path} has")
     results = tuple(once.values())
-    return Collected(write_collected(out, runs[0].parameters, results), results)
+    page = spread_page(runs[0].parameters, results)
+    write_page(page, out)
+    return Collected(final_spread(page), results)
 
 
 def _folders(names: Sequence[str]) -> list[Path]:
@@ -115,10 +117,10 @@ def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
     return RunResult(path, first, last, summary.final != names[0], without)
 
 
-def _estimate(found: NamedEstimate, seed: int, parameters: ParameterSet, source: str) -> SeedResult:
+def _estimate(found: NamedEstimate, seed: int, parameters: ParameterSet, source: str) -> RunEstimate:
     if found.rms_deg is None:
         raise RunError("is the estimate of a simulation that diverged", where=source)
-    return SeedResult(seed, parameters.vector(found.values, source), math.radians(found.rms_deg))
+    return RunEstimate(seed, parameters.vector(found.values, source), math.radians(found.rms_deg))
 
 
 def _refuse_others(runs: Sequence[_Run], tell: Callable[[str], None]) -> None:

@@ -6,7 +6,7 @@ The command line is a thin cover of these; a script or a notebook calls them dir
 import logging
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,13 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import read_values
 from hydroid.fitting.fit import Fit, Watcher, fit
 from hydroid.fitting.search import check_search
-from hydroid.fitting.validation import ErrorIndices, error_indices
+from hydroid.fitting.validation import error_indices
 from hydroid.identified import load_identified
 from hydroid.log import Finding, Log, Warn, check_log, read_log
-from hydroid.parameters import Array
 from hydroid.problem.problem import Problem, Spread
-from hydroid.report.write import write_report
+from hydroid.report.fit_report import fit_page
+from hydroid.report.page import write_page
+from hydroid.report.validation_report import Validation
 from hydroid.run.folder import RunFolder
 from hydroid.run.run_log import log_end, log_start
 from hydroid.settings.fit import FitSettings
@@ -132,7 +133,7 @@ def _fit(folder: RunFolder, problem: Problem, paths: Sequence[Path], watch: Watc
         folder.begin(problem.settings, paths)
     result = fit(problem, folder.save, watch, checkpoint, folder.journal())
     folder.write_estimate(problem, result)
-    write_report(folder, problem, result)
+    write_page(fit_page(folder.identity(), problem, result), folder.path)
     folder.status("done")
     return result
 
@@ -161,16 +162,6 @@ def mechanical_values(path: Path, settings: FitSettings) -> dict[str, Any]:
     if missing:
         raise SettingsError(f"has no value for {', '.join(missing)}", where=str(path))
     return {f"parameters.{name}.fixed": values[name] for name in wanted if name in values}
-
-
-@dataclass(frozen=True)
-class Validation:
-    """One fit's response to one log: outputs [rad], shape (T, K), and error indices by joint (1-based)."""
-
-    fit: str
-    log: Log
-    response: Array
-    indices: dict[int, ErrorIndices]
 
 
 def validate_fits(

@@ -16,7 +16,9 @@ from hydroid.log import Log, Warn, read_log, write_log
 from hydroid.parameters import Array
 from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
-from hydroid.report.actuator import actuator_card, write_actuator
+from hydroid.report.actuator_report import actuator_page
+from hydroid.report.joint_actuator import joint_actuator
+from hydroid.report.page import write_page
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import HydraulicSimulation, Response
 
@@ -171,4 +173,5 @@ def plot_actuator(identified: IdentifiedModel, joint: int, out: Path) -> list[Pa
         hint = "use --config fit-hyd"
         raise SettingsError("stage mech has no actuators", where=identified.source, hint=hint)
     candidate = Stage(settings).candidates(identified.theta[None])
-    return write_actuator(out, actuator_card(settings.arm, candidate, joint, identified.source))
+    actuator = joint_actuator(settings.arm, candidate, joint, identified.source)
+    return write_page(actuator_page(actuator), out)

@@ -12,9 +12,10 @@ from hydroid.identified import IdentifiedModel, load_identified
 from hydroid.jobs import read_logs
 from hydroid.log import Warn, write_log
 from hydroid.problem.problem import Problem
-from hydroid.report.studies import surface_table, write_design, write_sensitivity, write_surface
+from hydroid.report.page import write_page
+from hydroid.report.study_reports import design_page, sensitivity_page, surface_page
 from hydroid.report.table import Table
-from hydroid.report.told import Told, write_told
+from hydroid.report.uncertainty_report import UncertaintyStudy, uncertainty_page
 from hydroid.uncertainty.covariance import uncertainty
 from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.intervals import Profile, bootstrap, profile
@@ -41,7 +42,9 @@ def study_sensitivity(
         HydroidError: what the user can mend.
     """
     problem = _problem(subject, logs, warn)
-    return write_sensitivity(out, problem, subject.theta, sweep(problem, subject.theta, tell))
+    page = sensitivity_page(problem, subject.theta, sweep(problem, subject.theta, tell))
+    write_page(page, out)
+    return page.tables["sensitivity"]
 
 
 def study_surface(
@@ -76,7 +79,9 @@ def study_surface(
     problem = _problem(subject, logs, warn)
     how = subject.settings.objective
     found = [surface(problem, subject.theta, (a, b), points, around, tell) for a, b in pairs]
-    return surface_table(out, [write_surface(out, one, how) for one in found], how)
+    page = surface_page(found, how)
+    write_page(page, out)
+    return page.tables["surface"]
 
 
 def study_design(
@@ -102,7 +107,9 @@ def study_design(
     found = design(settings, subject.theta, read_logs(logs, settings, warn), seed, tell)
     write_log(out / "commands.csv", found.log, settings.log)
     write_log(out / "predicted.csv", found.predicted, settings.log)
-    return write_design(out, settings.arm, settings.design, found, subject.values)
+    page = design_page(settings.arm, settings.design, found, subject.values)
+    write_page(page, out)
+    return page.tables["design"]
 
 
 def study_identifiability(
@@ -114,7 +121,7 @@ def study_identifiability(
     seed: int,
     warn: Warn,
     tell: Tell,
-) -> Told:
+) -> UncertaintyStudy:
     """Write what logs determine at a parameter set, with profiles and a bootstrap where they are asked for.
 
     Args:
@@ -139,9 +146,10 @@ def study_identifiability(
         tell("profiles", done, len(profiled))
         profiles.append(profile(problem, found, name))
     drawn = bootstrap(problem, found, refits, seed, tell) if refits else None
-    told = Told(problem, subject.source, found, identifiability(problem, found), tuple(profiles), drawn)
-    write_told(out, told)
-    return told
+    directions = identifiability(problem, found)
+    study = UncertaintyStudy(problem, subject.source, found, directions, tuple(profiles), drawn)
+    write_page(uncertainty_page(study), out)
+    return study
 
 
 def _problem(subject: IdentifiedModel, logs: Sequence[Path], warn: Warn) -> Problem:

@@ -65,11 +65,11 @@ def identifiability(
     names = [name.strip() for name in profile.split(",") if name.strip()]
     with Line(quiet=quiet or json) as line:
         told = study_identifiability(subject, logs, out, names, bootstrap, seed, warn, line)
-    from hydroid.report.phrases import direction_phrase
-    from hydroid.report.told import interval_table
+    from hydroid.report.phrases import direction_phrases
+    from hydroid.report.uncertainty_report import interval_table
 
     table = interval_table(told)
-    phrases = [direction_phrase(d, told.problem) for d in told.identifiability.unidentifiable]
+    phrases = direction_phrases(told.problem, told.identifiability)
     if json:
         found = {
             "at": told.source,

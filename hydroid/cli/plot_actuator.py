@@ -16,11 +16,11 @@ def plot_actuator(
     setting: Set = None,
     quiet: Quiet = False,
 ) -> None:
-    """Draw an actuator's calibration, current, force, spool, opening, flow and torque (PNG and SVG)."""
+    """Draw an actuator's calibration, current, force, spool, opening, flow and torque, as a page and files."""
     from hydroid.identified import load_identified
     from hydroid.simulating import plot_actuator
 
     chosen = load_identified(params, config, overrides(setting), default="fit-hyd", nominal=True)
     files = plot_actuator(chosen, joint, out)
     if not quiet:
-        typer.echo(str(files[0]))
+        typer.echo(str(files[-1]))

@@ -15,9 +15,10 @@ from hydroid.jobs import fit_logs, load_settings, mechanical_values
 from hydroid.log import Warn
 from hydroid.parallel.cluster import open_workers
 from hydroid.problem.problem import Problem
-from hydroid.report import words
-from hydroid.report.tables import parameter_table
-from hydroid.report.write import write_runs
+from hydroid.report.fit_report import objective_table, parameter_table
+from hydroid.report.page import write_page
+from hydroid.report.phrases import fit_summary, fit_warnings
+from hydroid.report.spread import final_spread, run_result, spread_page
 from hydroid.run.folder import RunFolder
 from hydroid.run.summary import summarise
 from hydroid.settings.fit import FitSettings
@@ -45,7 +46,7 @@ def run_fits(
     if not logs:
         logs, settings = _continued(out, changes, resume, runs)
     out = out or Path("runs") / f"{logs[0].stem}-{settings.stage}-{settings.search.name}"
-    results: list[tuple[int, Problem, Fit]] = []
+    results: list[tuple[int, Path, Problem, Fit]] = []
     warn = _silent if verbose else warn  # the log has them
     with shown(verbose, quiet), open_workers(dask, settings.cluster, insecure=dask_insecure) as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):
@@ -55,17 +56,24 @@ def run_fits(
             options = {"resume": resume, "repair": repair}
             with Progress(seeded, f"seed {seed}" if runs > 1 else "", quiet=quiet or json) as progress:
                 problem, fit = fit_logs(seeded, logs, folder, progress, warn, **options, spread=workers)
-            results.append((seed, problem, fit))
+            results.append((seed, folder, problem, fit))
             warn = _silent  # the logs are the same for every seed
-    table = write_runs(out, results) if runs > 1 else parameter_table(*results[0][1:])
+    _, _, problem, fit = results[0]
+    tables = [objective_table(problem, fit), parameter_table(problem, fit)]
+    if runs > 1:
+        names = problem.parameters.names
+        page = spread_page(problem.parameters, [run_result(path, s, f, names) for s, path, _, f in results])
+        write_page(page, out)
+        tables = [final_spread(page)]
     if json:
-        found = [summarise(problem, fit).plain() for _, problem, fit in results]
+        found = [summarise(problem, fit).plain() for _, _, problem, fit in results]
         typer.echo(jsonlib.dumps({"out": str(out), "runs": found}))
     elif not quiet:
-        table.show()
-        if runs == 1:
-            typer.echo(words.summary(results[0][2]))
-        typer.echo(f"{out / ('tables' if runs > 1 else 'report.html')}")
+        for table in tables:
+            table.show()
+        for line in (fit_summary(fit), *fit_warnings(problem, fit)) if runs == 1 else ():
+            typer.echo(line)
+        typer.echo(str(out / ("runs.html" if runs > 1 else "report.html")))
 
 
 def with_mechanical(mech: Path | None, config: str, changes: dict[str, Any]) -> dict[str, Any]:

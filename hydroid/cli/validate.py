@@ -21,12 +21,15 @@ def validate(
 ) -> None:
     """Compare fits with logs they were not fitted on: error indices (article, table 9) and overlay plots."""
     from hydroid.jobs import validate_fits
-    from hydroid.report.write import write_validation
+    from hydroid.report.page import write_page
+    from hydroid.report.validation_report import validation_page
 
     results = validate_fits(fit, logs, warn, overrides(setting))
-    table = write_validation(out, results)
+    page = validation_page(results)
+    write_page(page, out)
+    table = page.tables["validation"]
     if json:
         typer.echo(jsonlib.dumps(table.records()))
     elif not quiet:
         table.show()
-        typer.echo(str(out))
+        typer.echo(str(out / "validation.html"))

@@ -1,48 +1,104 @@
-"""Sentences about what logs determine: flags, unidentifiable directions, lists of names."""
+"""Every sentence about a fit that depends on its numbers: labels, flags, directions, warnings."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from hydroid.fitting.fit import Fit
+from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.directions import Direction
-from hydroid.uncertainty.flags import Flag, ParameterStatus
+from hydroid.report.table import number, plain
+from hydroid.settings.problem import ObjectiveSettings, PriorSettings
+from hydroid.uncertainty.covariance import at_bounds
+from hydroid.uncertainty.directions import Direction, Identifiability
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, ParameterStatus
 from hydroid.uncertainty.patterns import CURRENTS, DirectionKind
 
+ALGORITHMS = {
+    "ga": "simple genetic algorithm",
+    "nsga2": "NSGA-II, a multi-objective genetic algorithm",
+    "cmaes": "CMA-ES, an evolution strategy",
+    "multistart": "bounded least squares from random starts",
+}
+STAGES = {
+    "mech": "1, the arm: a gain stands for the hydraulics",
+    "hyd": "2, the hydraulic actuator",
+}
+_NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
+_ESTIMATES = {
+    "average": "mean of the best candidate of each segment, as in the article",
+    "utopia": "candidate closest to the best of every segment at once",
+    "best": "candidate with the lowest error over the whole record",
+    "refined": "least squares from the best of the search's estimates",
+    "joint": "least squares over the parameters of both stages, from there",
+}
 _UNEQUAL = 0.1
 """relative changes that differ by more than this do not scale by one factor"""
 
 
+def estimate_label(fit: Fit, name: str) -> str:
+    """Name an estimate; the search's own is marked as such."""
+    return f"search ({name})" if name == fit.searched.name else name
+
+
+def estimate_meanings(fit: Fit) -> str:
+    """Say what the names of a fit's estimates mean."""
+    meanings = (f"{estimate_label(fit, name)}: {_ESTIMATES.get(name, name)}" for name in fit.estimates)
+    return f"{'; '.join(meanings)}."
+
+
+def norm_label(objective: ObjectiveSettings) -> str:
+    """Name the objective, with its unit."""
+    label = _NORMS[objective.norm]
+    return f"relative {label} [-]" if objective.relative else f"{label} [deg]"
+
+
+def in_reader_units(objective: ObjectiveSettings, values: Array) -> Array:
+    """Return objectives in deg, or as they are where relative."""
+    return values if objective.relative else np.degrees(values)
+
+
 def status_phrase(status: ParameterStatus) -> str:
-    """What is to be known about an estimate; empty where nothing is."""
-    said: list[str] = []
+    """Say what is to be known about an estimate; empty where nothing is."""
+    parts: list[str] = []
     if status.diverges and status.flag is not Flag.FIXED:
-        said.append("effect unknown, the changed arm diverges")
+        parts.append("effect unknown, the changed arm diverges")
     elif status.flag is not Flag.IDENTIFIABLE:
-        said.append(status.flag.value)
+        parts.append(status.flag.value)
     if status.derivative_doubt is not None:
-        said.append(f"derivative only to {100 * status.derivative_doubt:.0f} %")
+        parts.append(f"derivative only to {100 * status.derivative_doubt:.0f} %")
     if status.at_bound is not None:
-        said.append(f"at {status.at_bound} bound")
-    return ", ".join(said)
+        parts.append(f"at {status.at_bound} bound")
+    return ", ".join(parts)
 
 
-def direction_phrase(direction: Direction, problem: Problem) -> str:
-    """An unidentifiable direction, and to how many per cent it is known."""
-    name, count = _direction_name(direction, problem), ""
-    if len(direction.changes) > 1:
-        count = f", {len(direction.changes)} directions"
+def runs_phrase(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
+    """Say what is to be known about a parameter over several runs, values of shape (N,); may be empty."""
+    if not parameter.lower < parameter.upper or (parameter.fixed is not None and not np.ptp(values)):
+        return Flag.FIXED.value
+    if parameter.name in without_effect:
+        return Flag.NO_EFFECT.value
+    counts = ((side, int(np.sum(at))) for side, at in at_bounds(parameter, values))
+    return ", ".join(f"at {side} bound in {n} of {len(values)} runs" for side, n in counts if n)
+
+
+def direction_phrases(problem: Problem, result: Identifiability) -> tuple[str, ...]:
+    """Name each direction that is not identifiable, or only weakly, and how well it is known."""
+    return tuple(_direction_phrase(problem, one) for one in result.unidentifiable)
+
+
+def _direction_phrase(problem: Problem, direction: Direction) -> str:
+    name = _direction_name(problem, direction)
+    count = f", {len(direction.changes)} directions" if len(direction.changes) > 1 else ""
     if direction.flag is Flag.UNIDENTIFIABLE:
         return f"{name}: {Flag.UNIDENTIFIABLE.value} (±∞{count})"
     percent = 100 * direction.relative_sd
-    return (
-        f"{name}: only to ±{percent:.2g} %{count}"
-        if percent < 10
-        else f"{name}: only to ±{percent:.0f} %{count}"
-    )
+    digits = f"{percent:.2g}" if percent < 10 else f"{percent:.0f}"
+    return f"{name}: known only to ±{digits} %{count}"
 
 
-def _direction_name(direction: Direction, problem: Problem) -> str:
+def _direction_name(problem: Problem, direction: Direction) -> str:
     names, changes = list(direction.parameters), list(direction.parameters.values())
     numbers = direction.numbers
     match direction.kind:
@@ -51,32 +107,27 @@ def _direction_name(direction: Direction, problem: Problem) -> str:
         case DirectionKind.SINGLE:
             return f"{names[0]} by itself"
         case DirectionKind.COMMON_SCALE:
-            unequal = " (these to make up for what is fixed, unequally)" if np.ptp(changes) > _UNEQUAL else ""
-            return f"{listed(names)} scale together{unequal}"
+            unequal = np.ptp(changes) > _UNEQUAL
+            note = " (the masses unequally, to make up for what is fixed)" if unequal else ""
+            return f"{listed(names)} scale together{note}"
         case DirectionKind.SOLENOID:
             values = f"δ = {numbers['delta']:.3g} mm and k·i0² = {numbers['k_i0']:.3g} N·mm²"
-            return f"{listed(names)} act through two combinations only: {values}"
+            return f"{listed(names)} act through two combinations only, {values}"
         case DirectionKind.CURRENT_SCALE:
             settings = problem.settings.parameters
             currents = [n for n in names if settings[n].quantity in CURRENTS]
             coil = [n for n in names if n not in currents]
-            values = (
-                f"δ = {numbers['delta']:.3g} mm, k·I_max² = {numbers['k_imax']:.3g} and "
-                f"k·I_min² = {numbers['k_imin']:.3g} N·mm²"
-            )
-            return (
-                f"a common scale of {' and '.join(currents)} trades with {listed(coil)}, at the same {values}"
-            )
+            held = ("δ", "delta", "mm"), ("k·I_max²", "k_imax", "N·mm²"), ("k·I_min²", "k_imin", "N·mm²")
+            values = listed([f"{symbol} = {numbers[key]:.3g} {unit}" for symbol, key, unit in held])
+            return f"a common scale of {listed(currents)} trades with {listed(coil)}, at the same {values}"
         case DirectionKind.COMBINATION:
-            first, *others = (
-                f"{change:+.2g} % {name}".replace("-", "−")
-                for name, change in zip(names, changes, strict=True)
-            )
+            pairs = zip(names, changes, strict=True)
+            first, *others = (f"{change:+.2g} % {name}".replace("-", "−") for name, change in pairs)
             return f"{first} with {', '.join(others)}"
 
 
 def outputs_phrase(problem: Problem) -> str:
-    """What is compared."""
+    """Name what is compared."""
     joints = [str(joint) for joint in dict.fromkeys(c.joint for c in problem.channels)]
     which = (
         f"the angle of joint {joints[0]}" if len(joints) == 1 else f"the angles of joints {listed(joints)}"
@@ -86,6 +137,88 @@ def outputs_phrase(problem: Problem) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them."""
+    """Join names as in a sentence."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def prior_phrase(prior: PriorSettings) -> str:
+    """Write a prior as an equation."""
+    if prior.ratio is not None:
+        what = " / ".join(prior.ratio)
+    else:
+        terms = (n if f == 1 else f"{number(f)} {n}" for n, f in prior.factors.items())
+        what = " + ".join(terms).replace("+ -", "- ")
+    spread = ", exact" if prior.sd is None else f" ± {number(prior.sd)} (standard deviation)"
+    return f"{what} = {number(prior.value)}{spread}"
+
+
+def fit_summary(fit: Fit) -> str:
+    """Say in a sentence how well the final estimate predicts the fitted logs, and whether it converged."""
+    error = f"predicts the fitted logs with an rms error of {number(math.degrees(fit.best.rms))} deg"
+    if fit.refinement is None:
+        return f"The search's estimate {error}; it was not refined."
+    ending = "converged" if fit.refinement.ending.converged else "did not converge"
+    return f"The {fit.final} estimate {error}; its refinement {ending}."
+
+
+def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
+    """Say what a reader must know before using the estimate, the most important first."""
+    said: list[str] = []
+    if fit.refinement is None:
+        said.append("The estimate is the search's own, without a refinement: it need not be an optimum.")
+    elif not fit.refinement.ending.converged:
+        said.append(
+            f"The refinement did not converge: {fit.refinement.ending.value}. The estimate need not be an "
+            "optimum. Allow more iterations (refinement.iterations)."
+        )
+    for side in ("lower", "upper"):
+        at_bound = [
+            f"{p.name} ({plain(p.lower if side == 'lower' else p.upper)} {p.unit})"
+            for p, status in zip(problem.parameters.parameters, fit.uncertainty.status, strict=True)
+            if status.at_bound == side and status.flag is not Flag.NO_EFFECT
+        ]
+        if at_bound:
+            said.append(
+                f"At the {side} bound: {listed(at_bound)}. The fit would go beyond it, so the bound is too "
+                "narrow or the model lacks something. Such an estimate has no interval."
+            )
+    said += [
+        f"The estimate {name} diverged when it was simulated and was not used."
+        for name, estimate in fit.estimates.items()
+        if not math.isfinite(estimate.rms)
+    ]
+    if fit.refinement is not None and fit.best.overall > fit.searched.overall:
+        norm = _NORMS[problem.settings.objective.norm]
+        said.append(
+            f"The refinement lowered the rms error but raised the {norm}, which the search minimised."
+        )
+    return tuple(said)
+
+
+def rank_phrase(result: Identifiability) -> str:
+    """Say in a sentence how much the logs determine."""
+    plural = "" if result.rank == 1 else "s"
+    return (
+        f"These logs determine {result.rank} independent combination{plural} of the {len(result.names)} free "
+        f"parameters to {100 * WEAK_ABOVE:.0f} % or better."
+    )
+
+
+def parameter_advice(problem: Problem, fit: Fit) -> tuple[str, ...]:
+    """Say which parameters have no effect or are not identifiable, and what to do about it."""
+    by_flag = {
+        flag: [
+            name
+            for name, status in zip(problem.parameters.names, fit.uncertainty.status, strict=True)
+            if status.flag is flag
+        ]
+        for flag in (Flag.NO_EFFECT, Flag.UNIDENTIFIABLE, Flag.WEAK)
+    }
+    advice = {
+        Flag.NO_EFFECT: "Any value within the bounds fits as well. Fix it, or measure a joint that it moves.",
+        Flag.UNIDENTIFIABLE: "A small output error does not confirm such a value. Fix what is known from "
+        "elsewhere or give it as a prior, compare more joints, or add logs in other poses.",
+        Flag.WEAK: "A prior, more joints or logs in other poses help.",
+    }
+    return tuple(f"{listed(by_flag[f])}: {f.value}. {advice[f]}" for f in by_flag if by_flag[f])

@@ -1,38 +1,46 @@
-"""A table and its four faces: CSV for scripts, Markdown, LaTeX, and the terminal."""
+"""A table for readers (terminal, Markdown, LaTeX, page) and for scripts (CSV, JSON)."""
 
 import csv
 import io
 import math
-from collections.abc import Callable
+import os
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import rich.table
 
+Cell = str | int | float | None
+"""Text, a count, a measured number, or nothing."""
+
+_UNLIMITED = 1000
+
 
 class Given(float):
-    """A number that the user has given, such as a bound: shown as given, not rounded to four digits."""
-
-
-Cell = str | int | float | None
-"""Text, count, measured number, or nothing."""
-
-
-_NO_LIMIT = 1000
+    """A number from the user, such as a bound: it is shown as given, not rounded to four digits."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table; each row has a cell for each column of the header."""
+    """A table; each row has one cell per column of the header.
+
+    Attributes:
+        title: above the table.
+        header: names of the columns.
+        rows: the cells.
+        note: below the table.
+        optional: columns that a narrow terminal leaves out, the least important first.
+    """
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    optional: tuple[str, ...] = ()
 
     def csv(self) -> str:
-        """Header and rows, numbers to their last bit; title and note are for readers and left out."""
+        """Return header and rows with every bit of the numbers, without title and note."""
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(self.header)
@@ -40,65 +48,48 @@ class Table:
         return buffer.getvalue()
 
     def markdown(self) -> str:
-        """Title, pipe table, note; numbers right-aligned."""
-        ruler = ["---:" if right else "---" for right in self.numeric]
-        lines = [[_markdown(name) for name in self.header], ruler]
+        """Return title, pipe table and note; numbers are right-aligned."""
+        lines = [map(_markdown, self.header), ("---:" if right else "---" for right in self.numeric)]
         lines += [[_markdown(shown(cell)) for cell in row] for row in self.rows]
         body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
         note = f"\n\n{_markdown(self.note)}" if self.note else ""
         return f"**{_markdown(self.title)}**\n\n{body}{note}\n"
 
     def latex(self) -> str:
-        """A `table` environment that needs no package."""
+        """Return a `table` environment that needs no package."""
         columns = "".join("r" if right else "l" for right in self.numeric)
-        rows = [" & ".join(_latex(shown(cell)) for cell in row) + r" \\" for row in self.rows]
-        note = [r"\par\smallskip\footnotesize " + _latex(self.note)] if self.note else []
-        head = " & ".join(map(_latex, self.header)) + r" \\"
+        head, *rows = (
+            " & ".join(_latex(shown(cell)) for cell in row) + r" \\" for row in (self.header, *self.rows)
+        )
         lines = [
-            r"\begin{table}",
-            r"\centering",
-            rf"\caption{{{_latex(self.title)}}}",
-            rf"\begin{{tabular}}{{{columns}}}",
-            *(r"\hline", head, r"\hline", *rows, r"\hline"),
+            *(r"\begin{table}", r"\centering", rf"\caption{{{_latex(self.title)}}}"),
+            *(rf"\begin{{tabular}}{{{columns}}}", r"\hline", head, r"\hline", *rows, r"\hline"),
             r"\end{tabular}",
-            *note,
+            *([r"\par\smallskip\footnotesize " + _latex(self.note)] if self.note else []),
             r"\end{table}",
         ]
         return "\n".join(lines) + "\n"
 
-    def rich_table(self, narrow: bool = False) -> "rich.table.Table":
-        """The table for a terminal; a narrow one has less space between columns and headers word by word."""
-        from rich import box
-        from rich.table import Table as RichTable
-        from rich.text import Text
-
-        # Text, not str: rich would read [deg] as markup
-        caption = Text(self.note) if self.note else None
-        table = RichTable(title=Text(self.title), caption=caption, box=box.SIMPLE_HEAD)
-        table.padding, table.pad_edge, table.show_edge = (0, 0 if narrow else 1, 0, 0), False, False
-        table.title_justify = table.caption_justify = "left"
-        for name, right in zip(self.header, self.numeric, strict=True):
-            header = Text(name.replace(" ", "\n") if right and narrow else name)
-            # where room is short rich takes it from columns that may wrap: never from numbers
-            table.add_column(header, justify="right" if right else "left", overflow="fold", no_wrap=right)
-        for row in self.rows:
-            table.add_row(*(Text(shown(cell)) for cell in row))
-        return table
-
     def show(self) -> None:
-        """Print the table: as wide as the terminal where it fits, and on lines of any length elsewhere."""
+        """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
+
+        Columns of text wrap at words. Where that does not suffice, `optional` columns are left out and named
+        below the table.
+        """
         from rich.console import Console
 
         console = Console()
-        width = console.width if console.is_terminal else _NO_LIMIT
-        narrow = width < sum(self._widths(len)) + 2 * len(self.header)
-        if narrow:
-            width = max(width, sum(self._widths(_longest_word)) + len(self.header))
+        limited = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
+        width = console.width if limited else _UNLIMITED
+        left_out = 0
+        while left_out < len(self.optional) and self._least_width(left_out) > width:
+            left_out += 1
         # width and height, or rich may take 80 columns for granted
-        Console(width=width, height=1).print(self.rich_table(narrow))
+        console = Console(width=max(width, self._least_width(left_out)), height=1)
+        console.print(self._rich(left_out, console.width))
 
     def records(self) -> list[dict[str, str | int | float | None]]:
-        """Rows by column name for JSON, which has no NaN or infinity: these become None."""
+        """Return rows by column name for JSON, which has no NaN or infinity: these become None."""
         return [
             {
                 name: None if isinstance(c, float) and not math.isfinite(c) else c
@@ -107,7 +98,7 @@ class Table:
             for row in self.rows
         ]
 
-    @property
+    @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
         columns = zip(*self.rows, strict=True) if self.rows else ((None,) for _ in self.header)
@@ -116,16 +107,43 @@ class Table:
             for column in columns
         )
 
-    def _widths(self, measure: Callable[[str], int]) -> list[int]:
-        """Width of each column where `measure` says what a header, or a cell of words, needs."""
-        return [
-            max([measure(name), *((len if right else measure)(shown(row[i])) for row in self.rows)])
-            for i, (name, right) in enumerate(zip(self.header, self.numeric, strict=True))
-        ]
+    def _rich(self, left_out: int, width: int) -> "rich.table.Table":
+        """Return the table for a terminal without the first columns of `optional`."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
 
+        missing = self.optional[:left_out]
+        note = f"{self.note} Left out for width: {', '.join(missing)}." if missing else self.note
+        # Text, not str: rich would read [deg] as markup
+        table = RichTable(title=Text(self.title), caption=Text(note) if note else None, box=box.SIMPLE_HEAD)
+        table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
+        table.title_justify = table.caption_justify = "left"
+        kept = [i for i, name in enumerate(self.header) if name not in missing]
+        tight = sum(self._width(i, wrap=False) for i in kept) + 2 * len(kept) > width
+        for i in kept:
+            name, right = self.header[i], self.numeric[i]
+            header = Text(name.replace(" ", "\n") if right and tight else name)
+            # rich wraps words where room is short, but never numbers
+            least = self._width(i, wrap=True)
+            table.add_column(
+                header, justify="right" if right else "left", no_wrap=right, min_width=least, overflow="fold"
+            )
+        for row in self.rows:
+            table.add_row(*(Text(shown(row[i])) for i in kept))
+        return table
 
-def _longest_word(text: str) -> int:
-    return max(map(len, text.split()), default=0)
+    def _least_width(self, left_out: int) -> int:
+        """Return the width at which all words and numbers are whole, without the first optional columns."""
+        kept = [i for i, name in enumerate(self.header) if name not in self.optional[:left_out]]
+        return sum(self._width(i, wrap=True) + 2 for i in kept)
+
+    def _width(self, i: int, *, wrap: bool) -> int:
+        """Return the width of a column, with text and header on one line or wrapped at words."""
+        words = (self.header[i], *(shown(row[i]) for row in self.rows if not self.numeric[i]))
+        numbers = (shown(row[i]) for row in self.rows if self.numeric[i])
+        texts = [word for text in words for word in text.split()] if wrap else words
+        return max(map(len, (*texts, *numbers)), default=0)
 
 
 def shown(cell: Cell) -> str:
@@ -144,13 +162,13 @@ def exact(cell: Cell) -> str:
     return repr(float(cell)) if isinstance(cell, float) else str(cell)
 
 
-def known(value: float) -> float | None:
-    """A number, or nothing where it is NaN; one without limit stays."""
+def unless_nan(value: float) -> float | None:
+    """Return the number, or an empty cell for NaN; an infinite number stays."""
     return None if math.isnan(value) else float(value)
 
 
 def number(value: float) -> str:
-    """Four significant digits, no exponent between 0.0001 and ten million; a dash where it is not finite."""
+    """Write four significant digits, without exponent from 0.0001 to ten million; a dash if not finite."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
@@ -161,7 +179,7 @@ def number(value: float) -> str:
 
 
 def plain(value: float) -> str:
-    """Six significant digits, without zeros that say nothing."""
+    """Write at most six significant digits, without trailing zeros."""
     if not math.isfinite(value):
         return "–"
     text = f"{value:.6g}"
@@ -171,30 +189,18 @@ def plain(value: float) -> str:
 _MARKDOWN = {ord(c): f"\\{c}" for c in r"\`*_<>|&$~"} | {ord(c): " " for c in "\r\n"}
 _LATEX = str.maketrans(
     {c: f"\\{c}" for c in "&%$#_{}"}
-    | {
-        "\\": r"\textbackslash{}",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
-        "<": r"\textless{}",
-        ">": r"\textgreater{}",
-        "|": r"\textbar{}",
-        "·": r"\(\cdot\)",
-        "²": r"\(^2\)",
-        "×": r"\(\times\)",
-        "–": "--",
-        "\n": " ",
-        "\r": " ",
-    }
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
+    | {"·": r"\(\cdot\)", "²": r"\(^2\)", "×": r"\(\times\)", "–": "--", "\n": " ", "\r": " "}
 )
 
 
 def _markdown(text: str) -> str:
-    # ]( is what makes a link of a bracket
+    # ]( and ][ make a link of a bracket
     return text.translate(_MARKDOWN).replace("](", r"\](").replace("][", r"\][")
 
 
 def _latex(text: str) -> str:
     safe = text.translate(_LATEX)
-    return (
-        f"{{{safe[0]}}}{safe[1:]}" if safe.startswith(("[", "*")) else safe
-    )  # else an option of the \\ before it
+    # [ or * after a line break \\ would be its option
+    return f"{{{safe[0]}}}{safe[1:]}" if safe.startswith(("[", "*")) else safe

@@ -21,7 +21,7 @@ class Surface:
 
     parameters: the two. values: of each on the grid, shapes (n,) and (m,). error: the settings' norm [rad, or
     relative], shape (n, m); inf where infeasible. estimate: the two parameters' values where the others are
-    held. estimate_error: the error there.
+    held, a point of the grid unless outside it. estimate_error: the error there.
     """
 
     parameters: tuple[Parameter, Parameter]
@@ -76,18 +76,21 @@ def surface(
     first, second = (known.index(name) for name in names)
     chosen = problem.parameters.parameters[first], problem.parameters.parameters[second]
     values = axis(chosen[0], theta[first], points, around), axis(chosen[1], theta[second], points, around)
-    grid = np.tile(theta, (points * points + 1, 1))
+    shape = len(values[0]), len(values[1])
+    grid = np.tile(theta, (shape[0] * shape[1] + 1, 1))
     grid[:-1, first], grid[:-1, second] = (a.ravel() for a in np.meshgrid(*values, indexing="ij"))
     error = np.empty(len(grid))
     for start in range(0, len(grid), BATCH):
         error[start : start + BATCH] = problem.evaluate(grid[start : start + BATCH]).overall
         tell(f"{names[0]}, {names[1]}: points", min(start + BATCH, len(grid)), len(grid))
     estimate = float(theta[first]), float(theta[second])
-    return Surface(chosen, values, error[:-1].reshape(points, points), estimate, float(error[-1]))
+    return Surface(chosen, values, error[:-1].reshape(shape), estimate, float(error[-1]))
 
 
 def axis(parameter: Parameter, value: float, points: int, around: float | None) -> Array:
-    """Values of one parameter on the grid, shape (points,): in equal steps, or ratios over wide bounds.
+    """Values of one parameter on the grid: `points` in equal steps, or ratios over wide bounds, and the estimate.
+
+    The estimate is added where it lies within the grid and is none of its points.
 
     Raises:
         SettingsError: neither bounds nor a distance that leads anywhere.
@@ -103,6 +106,7 @@ def axis(parameter: Parameter, value: float, points: int, around: float | None) 
         raise SettingsError(
             f"{parameter.name} has no range from {low:g} to {high:g}", where="--over", hint=hint
         )
-    if around is None and low > 0 and high > WIDE * low:
-        return np.geomspace(low, high, points)
-    return np.linspace(low, high, points)
+    wide = around is None and low > 0 and high > WIDE * low
+    grid = np.geomspace(low, high, points) if wide else np.linspace(low, high, points)
+    known = not low <= value <= high or np.isclose(grid, value, rtol=1e-12, atol=0.0).any()
+    return grid if known else np.union1d(grid, value)

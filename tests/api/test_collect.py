@@ -17,7 +17,8 @@ from hydroid.collect import collect
 from hydroid.errors import RunError
 from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
-from hydroid.report.write import write_runs
+from hydroid.report.page import write_page
+from hydroid.report.spread import final_spread, run_result, spread_page
 from hydroid.simulating import simulate_log
 
 SMALL = {
@@ -48,7 +49,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory):
     write_log(folder / "log.csv", log, settings.log)
     results = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jobs, "write_report", lambda *_: [])  # figures take longer than all else here
+        patch.setattr(jobs, "write_page", lambda *_: [])  # figures take longer than all else here
         for seed in SEEDS:
             seeded = load_settings("article-mech", SMALL | {"search.seed": seed})
             path = folder / f"seed-{seed}"
@@ -82,15 +83,18 @@ def collected(*names: object) -> tuple[list[int], list[str]]:
 
 def test_collected_runs_make_the_tables_of_runs_made_together(fitted, runs, tmp_path: Path):
     found = collect([str(path) for path in runs], tmp_path / "out", pytest.fail)
-    together = write_runs(tmp_path / "together", fitted[1])
+    names = fitted[1][0][1].parameters.names
+    fits = [run_result(Path(f"seed-{seed}"), seed, fit, names) for seed, _, fit in fitted[1]]
+    page = spread_page(fitted[1][0][1].parameters, fits)
+    write_page(page, tmp_path / "together")
+    together = final_spread(page)
     assert found.table.header == together.header
     for ours, theirs in zip(found.table.rows, together.rows, strict=True):
         assert [c for c in ours if isinstance(c, str)] == [c for c in theirs if isinstance(c, str)]
         numbers = [[c for c in row if isinstance(c, float)] for row in (ours, theirs)]
         np.testing.assert_allclose(*numbers, rtol=1e-12)  # deg and back
-    names = [{p.relative_to(d) for p in d.rglob("*.*")} for d in (tmp_path / "out", tmp_path / "together")]
-    assert names[0] - names[1] == {Path(f"tables/runs.{ending}") for ending in ("csv", "md", "tex")}
-    assert names[1] <= names[0]
+    files = [{p.relative_to(d) for p in d.rglob("*.*")} for d in (tmp_path / "out", tmp_path / "together")]
+    assert files[0] == files[1]
 
 
 def test_the_best_run_is_the_first_of_the_table_of_runs(fitted, runs):

@@ -13,8 +13,9 @@ from hydroid.experiment.trial import Bench, violation
 from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
-from hydroid.report.plots.surface import contours
-from hydroid.report.studies import design_table, write_sensitivity
+from hydroid.report.page import write_page
+from hydroid.report.plots.contours import contours
+from hydroid.report.study_reports import design_table, sensitivity_page
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
@@ -94,7 +95,9 @@ def test_sensitivity_is_written_in_the_readers_units(study_log: Log, tmp_path: P
     log = simulate_log(settings, study_log, TRUTH, "truth")
     problem = Problem(settings, [log])
     found = sweep(problem, THETA, quiet)
-    table = write_sensitivity(tmp_path, problem, THETA, found)
+    page = sensitivity_page(problem, THETA, found)
+    write_page(page, tmp_path)
+    table = page.tables["sensitivity"]
     data = np.genfromtxt(tmp_path / "sensitivity_steps_q2.csv", delimiter=",", names=True)
     assert data["K_deg_per_pct"] == pytest.approx(np.degrees(found.slopes[0][0]))
     assert data["q2_deg"] == pytest.approx(np.degrees(problem.channels[0].measured))

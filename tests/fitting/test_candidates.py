@@ -8,8 +8,8 @@ from hydroid.errors import HydroidError
 from hydroid.fitting.fit import fit
 from hydroid.jobs import load_settings
 from hydroid.problem.problem import Evaluation, Memo, Problem
-from hydroid.report.tables import objective_table, parameter_table
-from hydroid.report.words import cautions
+from hydroid.report.fit_report import fit_page, objective_table, parameter_table
+from hydroid.report.phrases import fit_warnings
 from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -64,9 +64,8 @@ def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refi
     diverged = int(problem.bad(theta).sum())
     assert 0 < diverged < len(theta)
     assert result.history[-1, 3] == diverged == np.sum(~np.isfinite(values[:, -1]))
-    assert f"{diverged} of {len(theta)} simulated parameter sets diverged" in " ".join(
-        cautions(problem, result)
-    )
+    facts = [fact for section in fit_page({}, problem, result).sections for fact in section.facts]
+    assert f"{diverged} of {len(theta)} simulated candidates" in dict(facts)["diverged"]
     assert all(e.usable and np.isfinite(e.overall) for e in result.estimates.values())
     assert not problem.bad(np.array([e.theta for e in result.estimates.values()])).any()
     front, evaluation = result.front
@@ -85,7 +84,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
     assert "estimate average diverged" in caplog.text
-    assert "The estimate average diverged" in " ".join(cautions(problem, result))
+    assert "The estimate average diverged" in " ".join(fit_warnings(problem, result))
     assert "search (utopia)" in parameter_table(problem, result).markdown()
     assert "average" in objective_table(problem, result).markdown()
 

@@ -1,19 +1,20 @@
 """How figures look, and how they become the same bytes every time.
 
-Figures are made through matplotlib's objects, without pyplot and its global list of figures. Colours are
-those of Okabe and Ito, told apart by colour-blind readers, and each comes with a marker or line of its own.
+Figures are made from matplotlib's objects, without pyplot and its global state. Margins are given in inches:
+matplotlib's automatic layouts measure every text several times and took half of a report's time. Colours are
+those of Okabe and Ito, which colour-blind readers tell apart; each comes with its own marker or line.
 """
 
 import io
 import math
 import warnings
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from functools import wraps
-from typing import Any, ParamSpec
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, YAxis
 from matplotlib.figure import Figure
@@ -31,7 +32,11 @@ OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 OTHER_LOOKS: tuple[tuple[str, str], ...] = tuple(zip(OTHERS, ("s", "^", "v", "P"), strict=True))
 GREY = "#8C8C8C"
 PALE = "#D9D9D9"
+MAX_BINS = 1000
+"""parts of a curve of which the lowest and the highest sample are drawn: one per pixel of the PNG"""
 
+_LEGEND_ROW = 0.2  # [in]
+_LETTER = 0.085  # [in] of a letter at 10 pt, on average
 _STYLE: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same glyphs on every machine
     "font.size": 10.0,
@@ -57,72 +62,97 @@ _STYLE: dict[str, Any] = {
     "path.simplify_threshold": 0.2,
 }
 
-P = ParamSpec("P")
-
 
 @contextmanager
-def _style() -> Generator[None]:
-    """Matplotlib's defaults and this style; what was set before comes back afterwards."""
-    with mpl.rc_context():
+def style() -> Generator[None]:
+    """Draw in this style, whatever matplotlib's settings are; they come back afterwards."""
+    with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE.items())  # pyright: ignore[reportArgumentType, reportCallIssue]  # names are typed as literals
+        # a log's name may hold letters that the font lacks: a box is drawn instead
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
         yield
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in this style, whatever matplotlib's settings on this machine are."""
-
-    @wraps(draw)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with _style():
-            return draw(*args, **kwargs)
-
-    return drawn
+def rendered(drawing: Figure) -> tuple[bytes, bytes]:
+    """Return a figure as PNG of 150 dpi and as SVG that needs no font; within `style`."""
+    png, svg = io.BytesIO(), io.BytesIO()
+    drawing.savefig(png, format="png", dpi=150, metadata={"Software": None}, pil_kwargs={"compress_level": 1})
+    drawing.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+    return png.getvalue(), svg.getvalue()
 
 
-def figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure [in]."""
-    return Figure(figsize=(width, height), layout="constrained")
+def figure(height: float, width: float = WIDTH, **margins: float) -> Figure:
+    """Return an empty figure of a size [in], its margins as in `set_margins`."""
+    drawing = Figure(figsize=(width, height))
+    set_margins(drawing, **({"left": 0.75, "right": 0.15, "top": 0.35, "bottom": 0.55} | margins))
+    return drawing
 
 
-def png(drawing: Figure) -> bytes:
-    """Render at 150 dpi."""
-    return _rendered(drawing, format="png", dpi=150, metadata={"Software": None})
+def set_margins(drawing: Figure, **margins: float) -> None:
+    """Set the room [in] beside all axes of a figure: left, right, top, bottom."""
+    width, height = drawing.get_size_inches()
+    share = {side: room / (width if side in ("left", "right") else height) for side, room in margins.items()}
+    drawing.subplots_adjust(**{s: 1 - v if s in ("right", "top") else v for s, v in share.items()})
 
 
-def svg(drawing: Figure) -> bytes:
-    """Render as SVG that needs no font."""
-    return _rendered(drawing, format="svg", metadata={"Date": None, "Creator": None})
+def room_for(names: Sequence[str], size: float = 10.0) -> float:
+    """Return the width [in] of the longest of some labels, about."""
+    return _LETTER * size / 10 * max(map(len, names), default=0) + 0.1
 
 
-def _rendered(drawing: Figure, **how: Any) -> bytes:
-    buffer = io.BytesIO()
-    with _style(), warnings.catch_warnings():
-        # the name of a log may hold letters that the font lacks: a box is drawn instead
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        drawing.savefig(buffer, **how)
-    return buffer.getvalue()
+def legend_below(drawing: Figure, handles: Sequence[Artist], columns: int = 3, axis: float = 0.55) -> None:
+    """Put a legend under all axes of a figure and make room for it.
+
+    Args:
+        drawing: the figure.
+        handles: artists with their labels.
+        columns: at most, fewer where labels are long.
+        axis: room between the axes and the legend [in], for ticks and a label.
+    """
+    if not handles:
+        return
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    fitting = max(1, min(columns, len(handles), int(15 * drawing.get_figwidth() / (8 + longest))))
+    rows = math.ceil(len(handles) / fitting)
+    set_margins(drawing, bottom=axis + _LEGEND_ROW * rows + 0.05)
+    drawing.legend(
+        handles=list(handles), loc="lower center", ncols=fitting, bbox_to_anchor=(0.5, 0.0), borderaxespad=0.1
+    )
+
+
+def labelled(axes: Axes) -> list[Artist]:
+    """Return the artists of an axes that have a label, for a legend."""
+    return list(axes.get_legend_handles_labels()[0])
 
 
 def estimate_looks(fit: Fit) -> dict[str, tuple[str, str]]:
-    """Colour and marker of each estimate, the most important first."""
+    """Return colour and marker of each estimate, the most important first."""
     main = {fit.final: (REFINED, "D")} | {fit.searched.name: (SEARCH, "o")}
     others = [name for name in fit.estimates if name not in main]
     return main | dict(zip(others, OTHER_LOOKS, strict=False))
 
 
-def legend_below(drawing: Figure, source: Axes, columns: int = 3) -> None:
-    """Put the legend of one of its axes under the whole figure."""
-    handles, labels = source.get_legend_handles_labels()
-    if handles:
-        # the longest labels need the width of a whole row
-        fitting = max(1, min(columns, int(95 / (8 + max(map(len, labels))))))
-        drawing.legend(handles, labels, loc="outside lower center", ncols=min(fitting, len(labels)))
-
-
 def finite(values: Array) -> Array:
-    """Return values with NaN for inf: what a line leaves out."""
+    """Return values with NaN for infinite ones, which a line leaves out."""
     return np.where(np.isfinite(values), values, np.nan)
+
+
+def decimated(time: Array, values: Array) -> tuple[Array, Array]:
+    """Return a curve of shape (T,) by the lowest and the highest sample of each of MAX_BINS parts.
+
+    It is drawn as the whole curve would be; a short curve stays as it is.
+    """
+    size = -(-len(values) // MAX_BINS)
+    if size <= 2:
+        return time, values
+    ends = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    low, high = (
+        np.argmin(np.where(np.isfinite(part), part, np.inf), axis=1) + size * np.arange(len(ends))
+        for part in (ends, -ends)
+    )
+    keep = np.unique(np.minimum(np.concatenate([[0], low, high, [len(values) - 1]]), len(values) - 1))
+    return time[keep], values[keep]
 
 
 def value_axis(axis: Axis, values: Array) -> None:
@@ -142,9 +172,4 @@ def value_axis(axis: Axis, values: Array) -> None:
 
 def tick(value: float, _: int | None) -> str:
     """Write a number at an axis."""
-    return plain(value)
-
-
-def every(count: int, most: int) -> int:
-    """Step that leaves at most `most` of `count` labels."""
-    return max(1, math.ceil(count / most))
+    return plain(float(f"{value:.4g}"))

@@ -1,4 +1,4 @@
-"""The curves of one actuator, from the command to the joint: what its parameters mean at rest."""
+"""The curves of one actuator at rest, from the command to the joint."""
 
 from typing import Any
 
@@ -10,13 +10,13 @@ from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.solenoid import coil_force, resting_stroke
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
-from hydroid.report.actuator import ActuatorCard
-from hydroid.report.plots.style import GREY, MEASURED, REFINED, SEARCH, figure, styled
+from hydroid.report.joint_actuator import JointActuator
+from hydroid.report.plots import style
 from hydroid.settings.linkage import LinearActuator
 
-SIDE_A: dict[str, Any] = {"color": SEARCH}
-SIDE_B: dict[str, Any] = {"color": REFINED, "linestyle": (0, (5, 2))}
-_SHADES = ("#56B4E9", "#009E73", "#E69F00", "#CC79A7")
+SIDE_A: dict[str, Any] = {"color": style.SEARCH}
+SIDE_B: dict[str, Any] = {"color": style.REFINED, "linestyle": (0, (5, 2))}
+_SHADES = (style.OTHERS[3], style.OTHERS[0], style.OTHERS[2], style.OTHERS[1])
 _LITRES = 6e4
 """L/min in a m³/s"""
 _COMMAND = np.linspace(-100.0, 100.0, 2001)
@@ -25,40 +25,39 @@ _DROPS = (10.0, 50.0, 100.0)
 _OPENINGS = (0.25, 0.5, 0.75, 1.0)
 
 
-@styled
-def overview(card: ActuatorCard) -> Figure:
-    """All panels of an actuator on one page."""
-    drawing = figure(11.0, 7.6)
-    drawing.suptitle(card.title, x=0.02, ha="left", fontsize=12, fontweight="bold")
-    for axes, panel in zip(drawing.subplots(4, 2).flat, PANELS.values(), strict=True):
-        panel(axes, card)
+def overview(actuator: JointActuator) -> Figure:
+    """Draw all panels of an actuator on one page."""
+    drawing = style.figure(11.0, 7.6, left=0.65, top=0.75, bottom=0.5)
+    drawing.suptitle(actuator.title, x=0.02, y=0.985, ha="left", va="top", fontsize=12, fontweight="bold")
+    panels = drawing.subplots(4, 2, gridspec_kw={"hspace": 0.45, "wspace": 0.25})
+    for axes, panel in zip(panels.flat, PANELS.values(), strict=True):
+        panel(axes, actuator)
     return drawing
 
 
-@styled
-def single(card: ActuatorCard, name: str) -> Figure:
-    """One panel, by its name in `PANELS`."""
-    drawing = figure(3.8)
+def single(actuator: JointActuator, name: str) -> Figure:
+    """Draw one panel, by its name in `PANELS`."""
+    drawing = style.figure(3.8)
     axes = drawing.subplots()
-    PANELS[name](axes, card)
-    axes.set_title(f"{card.title}: {axes.get_title(loc='left').lower()}")
+    PANELS[name](axes, actuator)
+    axes.set_title(f"{actuator.title}: {axes.get_title(loc='left').lower()}")
     return drawing
 
 
-def _calibration(axes: Axes, card: ActuatorCard) -> None:
-    a, b = _voltages(card.parameters, _COMMAND)
+def _calibration(axes: Axes, actuator: JointActuator) -> None:
+    a, b = _voltages(actuator.parameters, _COMMAND)
     _sides(axes, _COMMAND, a, b)
     _name(axes, "Calibration, (2) and (3)", "command [%]", "voltage [V]")
 
 
-def _current(axes: Axes, card: ActuatorCard) -> None:
-    _sides(axes, _COMMAND, *_currents(card.parameters, _COMMAND))
-    axes.set_ylim(0, 1.1 * float(card.parameters.current_max))
+def _current(axes: Axes, actuator: JointActuator) -> None:
+    _sides(axes, _COMMAND, *_currents(actuator.parameters, _COMMAND))
+    axes.set_ylim(0, 1.1 * float(actuator.parameters.current_max))
     _name(axes, "Coil current, (4)", "command [%]", "current [A]")
 
 
-def _force(axes: Axes, card: ActuatorCard) -> None:
-    p = card.parameters
+def _force(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
     coil, gap = float(p.coil), float(p.gap)
     stroke = np.linspace(0.0, 1.08 * p.stroke_2, 400)
     currents = {float(i) for i in (p.current_min, 0.5 * (p.current_min + p.current_max), p.current_max)}
@@ -67,36 +66,36 @@ def _force(axes: Axes, card: ActuatorCard) -> None:
         axes.plot(1e3 * stroke, coil_force(drive, stroke, gap), color=shade, label=f"{current:.3g} A")
         rest = resting_stroke(drive, gap, p.plunger_stiffness)
         axes.plot(1e3 * rest, p.plunger_stiffness * rest, "o", color=shade, markeredgecolor="white", zorder=4)
-    axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=MEASURED, linewidth=1.0, label="spring")
+    axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=style.MEASURED, linewidth=1.0, label="spring")
     points = 1e3 * np.array([p.stroke_1, p.stroke_2]), np.array([p.force_1, p.force_2])
-    axes.plot(*points, "D", color=REFINED, markeredgecolor="white", label="F1, F2 (rated)")
-    axes.plot([], [], "o", color=GREY, label="at rest")
+    axes.plot(*points, "D", color=style.REFINED, markeredgecolor="white", label="F1, F2 (rated)")
+    axes.plot([], [], "o", color=style.GREY, label="at rest")
     steepest = float(coil_force(coil * max(currents) ** 2, 0.0, gap))
     axes.set_ylim(0, min(1.6 * float(p.force_1), 1.1 * steepest))
     _name(axes, "Solenoid force, (5)", "stroke [mm]", "force [N]", "upper right")
 
 
-def _spool(axes: Axes, card: ActuatorCard) -> None:
-    p = card.parameters
+def _spool(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
     axes.plot(_COMMAND, 1e3 * _displacement(p, _COMMAND), **SIDE_A)
     for edge, label in ((0.0, "opens"), (p.slot_width, "fully open")):
         for sign, overlap in ((1.0, p.overlap_a), (-1.0, p.overlap_b)):
             at = 1e3 * sign * (overlap + edge)
             dashes, once = ":" if edge else "--", label if sign > 0 else None
-            axes.axhline(float(at), color=GREY, linestyle=dashes, linewidth=1.0, label=once)
+            axes.axhline(float(at), color=style.GREY, linestyle=dashes, linewidth=1.0, label=once)
     axes.set_ylim(*(1.2 * limit for limit in axes.get_ylim()))
     _name(axes, "Spool at rest, (6)", "command [%]", "displacement [mm]", "upper left", 2)
 
 
-def _opening(axes: Axes, card: ActuatorCard) -> None:
-    at = _spool_range(card.parameters)
-    area = 1e6 * opening(at, card.parameters)
+def _opening(axes: Axes, actuator: JointActuator) -> None:
+    at = _spool_range(actuator.parameters)
+    area = 1e6 * opening(at, actuator.parameters)
     _sides(axes, 1e3 * at, np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan))
     _name(axes, "Valve opening", "spool displacement [mm]", "opening [mm²]")
 
 
-def _flow(axes: Axes, card: ActuatorCard) -> None:
-    p = card.parameters
+def _flow(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
     at = _spool_range(p)
     for shade, drop in zip(_SHADES, _DROPS, strict=False):
         axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, opening(at, p)), color=shade, label=f"{drop:g} bar")
@@ -104,33 +103,27 @@ def _flow(axes: Axes, card: ActuatorCard) -> None:
     _name(axes, "Flow from the pump, (7)", "spool displacement [mm]", "flow [L/min]", "upper center", 3)
 
 
-def _pressure_flow(axes: Axes, card: ActuatorCard) -> None:
-    p = card.parameters
+def _pressure_flow(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
     pressure = np.linspace(p.tank_pressure, p.supply_pressure, 400)
     for shade, share in zip(_SHADES, _OPENINGS, strict=True):
         flow = _pump_flow(p, p.supply_pressure - pressure, share * p.opening_a)
         axes.plot(1e-5 * pressure, flow, color=shade, label=f"{100 * share:g} % open")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    _name(
-        axes,
-        "Flow from the pump into A, (7)",
-        "pressure in chamber A [bar]",
-        "flow [L/min]",
-        "upper right",
-        2,
-    )
+    across = "pressure in chamber A [bar]"
+    _name(axes, "Flow from the pump into A, (7)", across, "flow [L/min]", "upper right", 2)
 
 
-def _torque(axes: Axes, card: ActuatorCard) -> None:
-    p = card.parameters
-    angle = np.linspace(*card.range, 400)
+def _torque(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    angle = np.linspace(*actuator.range, 400)
     # a rotary actuator's areas are its displacement
-    linear = isinstance(card.linkage, LinearActuator)
-    arm = card.linkage.moment_arm(np.radians(angle)) if linear else np.ones_like(angle)
+    linear = isinstance(actuator.linkage, LinearActuator)
+    arm = actuator.linkage.moment_arm(np.radians(angle)) if linear else np.ones_like(angle)
     most, least = p.supply_pressure, p.tank_pressure
     axes.plot(angle, arm * (p.area_a * most - p.area_b * least), label="A at supply", **SIDE_A)
     axes.plot(angle, arm * (p.area_a * least - p.area_b * most), label="B at supply", **SIDE_B)
-    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     lever = f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm" if linear else ""
     _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
 

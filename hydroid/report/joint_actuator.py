@@ -1,13 +1,11 @@
-"""One actuator of a parameter set, ready to be drawn, and its figures as files."""
+"""One joint's actuator, taken out of a candidate with hydraulics."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hydroid.errors import SettingsError
-from hydroid.files import write_atomic
 from hydroid.hydraulics.records import coefficients, linkages
 from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.settings.arm import Arm
@@ -16,7 +14,7 @@ from hydroid.simulation import Candidates
 
 
 @dataclass(frozen=True)
-class ActuatorCard:
+class JointActuator:
     """One joint's actuator: its COEFFICIENTS as one record, its linkage, the joint's range [deg]."""
 
     title: str
@@ -25,8 +23,8 @@ class ActuatorCard:
     range: tuple[float, float]
 
 
-def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> ActuatorCard:
-    """Take one actuator, joint 1-based, out of a parameter set with hydraulics.
+def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> JointActuator:
+    """Return one joint's actuator, joint 1-based, of a candidate with hydraulics.
 
     Raises:
         SettingsError: no such joint, or no force-stroke curve runs through its two points.
@@ -41,25 +39,7 @@ def actuator_card(arm: Arm, candidate: Candidates, joint: int, source: str) -> A
             f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
             f"and {p.force_2:g} N at {1e3 * p.stroke_2:g} mm",
             where=source,
-            hint="it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
+            hint="it needs F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
         )
     settings = arm.joints[joint - 1]
-    return ActuatorCard(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)
-
-
-def write_actuator(out: Path, card: ActuatorCard) -> list[Path]:
-    """Write all curves as one figure and each as its own, PNG and SVG; return the files.
-
-    Raises:
-        RunError: the folder cannot be written.
-    """
-    from hydroid.report.plots import png, svg
-    from hydroid.report.plots.actuator import PANELS, overview, single
-
-    figures = {"actuator": overview(card)} | {name: single(card, name) for name in PANELS}
-    written: list[Path] = []
-    for name, figure in figures.items():
-        for ending, content in (("png", png(figure)), ("svg", svg(figure))):
-            written.append(out / f"{name}.{ending}")
-            write_atomic(written[-1], content)
-    return written
+    return JointActuator(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)

@@ -1,0 +1,135 @@
+"""Several runs with different seeds, of one command or collected from folders: their spread as a page."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+
+from hydroid.fitting.fit import Fit
+from hydroid.parameters import Array, ParameterSet
+from hydroid.report.page import Page, Plot, Section
+from hydroid.report.phrases import listed, runs_phrase
+from hydroid.report.plots import estimates as plots
+from hydroid.report.table import Cell, Table
+
+
+@dataclass(frozen=True, eq=False)
+class RunEstimate:
+    """One estimate of one run: the run's seed, theta of shape (P,), rms output error [rad]."""
+
+    seed: int
+    theta: Array
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """What one run found.
+
+    path: the run's folder. searched: the search's estimate. best: the final one. refined: whether these two
+    differ. without_effect: parameters without effect on the outputs.
+    """
+
+    path: Path
+    searched: RunEstimate
+    best: RunEstimate
+    refined: bool
+    without_effect: frozenset[str]
+
+    @property
+    def seed(self) -> int:
+        """Of the search."""
+        return self.best.seed
+
+    @property
+    def rms_deg(self) -> float:
+        """Rms output error of the final estimate [deg]."""
+        return degrees(self.best.rms)
+
+
+def run_result(path: Path, seed: int, fit: Fit, names: Sequence[str]) -> RunResult:
+    """Return what a fit in a folder found."""
+    searched, best = (RunEstimate(seed, e.theta, e.rms) for e in (fit.searched, fit.best))
+    none = frozenset(name for name, idle in zip(names, fit.without_effect, strict=True) if idle)
+    return RunResult(path, searched, best, fit.refinement is not None, none)
+
+
+def spread_page(parameters: ParameterSet, runs: Sequence[RunResult]) -> Page:
+    """Return the page of several runs, at least one, that differ in their seeds only.
+
+    Its tables are `runs` (run by run), `runs_search` and, where runs were refined, `runs_refined`.
+    """
+    common = frozenset[str].intersection(*(run.without_effect for run in runs))
+    idle = [name for name in parameters.names if name in common]
+    estimates = {"search": [run.searched for run in runs]}
+    if any(run.refined for run in runs):
+        estimates["refined"] = [run.best for run in runs]
+    tables = {f"runs_{name}": spread_table(parameters, each, idle, name) for name, each in estimates.items()}
+
+    columns = {
+        name: (np.array([run.theta for run in each]), np.array([run.rms for run in each]))
+        for name, each in estimates.items()
+    }
+    draw = partial(plots.spread, parameters, columns, idle)
+    caption = (
+        "One dot per run within each parameter's bounds, a line at the median. Below: the output errors."
+    )
+    listing = {"runs": runs_table(parameters, runs)}
+    best = min(runs, key=lambda run: (run.best.rms, run.seed))
+    note = f" {listed(idle)} had no effect in any run." if idle else ""
+    return Page(
+        "runs",
+        f"{len(runs)} runs with different seeds",
+        f"The smallest output error is {best.rms_deg:.4g} deg rms, of seed {best.seed}.{note}",
+        (
+            Section("Spread of the estimates", tables=tables, plots=(Plot("runs", caption, draw),)),
+            Section("Run by run", tables=listing),
+        ),
+    )
+
+
+def final_spread(page: Page) -> Table:
+    """Return the table of the runs' final estimates."""
+    return page.tables.get("runs_refined") or page.tables["runs_search"]
+
+
+def spread_table(
+    parameters: ParameterSet, runs: Sequence[RunEstimate], without_effect: Collection[str], name: str
+) -> Table:
+    """Return median and spread over runs of each parameter and of the output error.
+
+    Args:
+        parameters: the parameters.
+        runs: one estimate per run.
+        without_effect: parameters without effect in any run.
+        name: of the estimate: search or refined.
+    """
+    theta = np.array([run.theta for run in runs])
+    rows: list[tuple[Cell, ...]] = [
+        (p.name, p.unit, *_quartiles(values), runs_phrase(p, values, without_effect))
+        for p, values in zip(parameters.parameters, theta.T, strict=True)
+    ]
+    rows.append(("rms output error", "deg", *_quartiles(np.degrees([run.rms for run in runs])), ""))
+    header = ("name", "unit", "median", "lowest", "lower quartile", "upper quartile", "highest", "flag")
+    seeds = ", ".join(str(run.seed) for run in runs)
+    note, optional = f"Seeds: {seeds}.", ("lower quartile", "upper quartile")
+    return Table(f"{len(runs)} runs, {name}", header, tuple(rows), note, optional)
+
+
+def runs_table(parameters: ParameterSet, runs: Sequence[RunResult]) -> Table:
+    """Return one row per run, the smallest output error first."""
+    values = tuple(f"{p.name} [{p.unit}]" for p in parameters.parameters)
+    rows = tuple(
+        (str(run.path), run.seed, run.rms_deg, *map(float, run.best.theta))
+        for run in sorted(runs, key=lambda run: (run.best.rms, run.seed))
+    )
+    header = ("run", "seed", "rms output error [deg]", *values)
+    return Table("Runs, smallest error first", header, rows, optional=values[::-1])
+
+
+def _quartiles(values: Array) -> tuple[float, ...]:
+    low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1])
+    return float(median), float(low), float(q1), float(q3), float(high)

@@ -65,7 +65,7 @@ def identifiability(
     names = [name.strip() for name in profile.split(",") if name.strip()]
     with Line(quiet=quiet or json) as line:
         told = study_identifiability(subject, logs, out, names, bootstrap, seed, warn, line)
-    from hydroid.report.phrases import direction_phrases
+    from hydroid.report.phrases import direction_phrases, profile_warnings
     from hydroid.report.uncertainty_report import interval_table
 
     table = interval_table(told)
@@ -82,4 +82,6 @@ def identifiability(
         table.show()
         for phrase in phrases:
             typer.echo(f"- {phrase}")
+        for warning in profile_warnings(told.profiles):
+            typer.echo(warning)
         typer.echo(str(out / "identifiability.html"))

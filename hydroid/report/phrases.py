@@ -13,6 +13,7 @@ from hydroid.settings.problem import ObjectiveSettings, PriorSettings
 from hydroid.uncertainty.covariance import at_bounds
 from hydroid.uncertainty.directions import Direction, Identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, ParameterStatus
+from hydroid.uncertainty.intervals import Profile
 from hydroid.uncertainty.patterns import CURRENTS, DirectionKind
 
 ALGORITHMS = {
@@ -194,6 +195,17 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
             f"The refinement lowered the rms error but raised the {norm}, which the search minimised."
         )
     return tuple(said)
+
+
+def profile_warnings(profiles: Sequence[Profile]) -> tuple[str, ...]:
+    """Say which profiles fit better than the estimate somewhere."""
+    names = [profile.name for profile in profiles if profile.better_optimum]
+    if not names:
+        return ()
+    return (
+        f"The profile of {listed(names)} found a better fit than the estimate, which is no optimum: fit "
+        "again from there, with more iterations or another seed.",
+    )
 
 
 def rank_phrase(result: Identifiability) -> str:

@@ -9,7 +9,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.names import log_names
 from hydroid.report.page import Page, Plot, Section
-from hydroid.report.phrases import direction_phrases, rank_phrase, status_phrase
+from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
 from hydroid.report.plots import uncertainty as plots
 from hydroid.report.table import Cell, Table, unless_nan
 from hydroid.uncertainty.covariance import Uncertainty
@@ -63,7 +63,8 @@ def uncertainty_page(study: UncertaintyStudy) -> Page:
     intervals = Section("Intervals", tables={"intervals": interval_table(study)}, plots=drawn)
     determined = determined_section(study.problem, study.uncertainty, study.identifiability)
     lead = rank_phrase(study.identifiability)
-    return Page("identifiability", "What the logs determine", lead, (intervals, determined))
+    warnings = profile_warnings(study.profiles)
+    return Page("identifiability", "What the logs determine", lead, (intervals, determined), warnings)
 
 
 def determined_section(problem: Problem, uncertainty: Uncertainty, result: Identifiability) -> Section:

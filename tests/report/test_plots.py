@@ -345,7 +345,7 @@ def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_e
     values = centre + deviation * np.linspace(-40, 40, 13)
     deviance = ((values - centre) / deviation) ** 2
     half = deviation * np.sqrt(THRESHOLD)
-    profile = Profile("K", values, deviance, (centre - half, centre + half))
+    profile = Profile("K", values, deviance, (centre - half, centre + half), uncertainty.theta)
     figure = profiles([profile], uncertainty, problem.parameters.names)
     check(figure)
     (axes,) = figure.axes

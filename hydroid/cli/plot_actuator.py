@@ -16,7 +16,7 @@ def plot_actuator(
     setting: Set = None,
     quiet: Quiet = False,
 ) -> None:
-    """Draw an actuator's calibration, current, force, spool, opening, flow and torque; write page and files."""
+    """Draw an actuator's calibration, current, force, spool, opening, flow and torque; a page and files."""
     from hydroid.identified import load_identified
     from hydroid.simulating import plot_actuator
 

@@ -1,239 +1,365 @@
-"""Refinement: bounded least squares from a search's estimate, on `mujoco.minimize.least_squares`.
+"""Bounded least squares on the unit box: Levenberg-Marquardt with an explicit state.
 
-MuJoCo's Gauss-Newton / Levenberg-Marquardt works on the box of the parameters. Simulated residuals need
-some things more, which are here:
+    state = start(point, row)
+    while state.ending is None:
+        state = step(state, residuals, settings)
 
-- Where derivatives fail on both sides of a point (see `derivatives`), the refinement ends.
-- A parameter without effect stays where it is. Its column of the Jacobian is zero or rounding noise, and
-  noise scaled to unit length would send it to a bound. It gets a pseudo-measurement of its present value
-  instead: a residual that is always zero, with derivative one. The rest of the problem does not change.
-- The residual is scaled up. MuJoCo's solver of the box-bounded step takes any gradient below 1e-16 for
-  none, whatever its unit; in directions that the data hardly determine it is smaller long before they are
-  found.
-- Steps that cannot help are not simulated: after a failed step MuJoCo tries shorter ones, down to nothing.
-- Where no step helps, derivatives are taken again over wider differences, and then over narrow ones. A joint
-  that meets its stop makes small jumps in the response, and narrow differences see nothing but the jumps.
-- The best point evaluated is returned, whatever ended the refinement, and with it the reason by name.
-- Nothing is printed.
+A state is a frozen record of numbers and arrays; `step` is a pure function of it. So a state is also the
+checkpoint: a run that continues from a stored state ends with the same bits.
+
+One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and ends
+where the linear model promises no gain. *With one* it tries a step s that minimises |r + J s|² + λ |D s|² inside
+the box, D the lengths of J's columns, with Nielsen's rule for the damping λ. What differs from a textbook:
+
+- A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
+  long as the updated one lowers the logarithm of the cost by as much per simulation as the Jacobian before did.
+- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual along
+  the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved valleys of
+  problems whose parameters compensate each other.
+- A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `_derivatives`.
+- Where no step helps, the Jacobian is taken over wider differences: a joint that meets its stop makes small
+  jumps in the response, and narrow differences see nothing but the jumps.
+- A candidate whose simulation fails is a step that does not help.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
-from mujoco import minimize
 from numpy.typing import NDArray
 
-from hydroid.search.derivatives import derivatives
+from hydroid.search.box import box_least_squares
 from hydroid.settings.search import RefinementSettings
 
 Float = NDArray[np.float64]
+Residuals = Callable[[Float], Float]
+"""points of the unit box (n, p) -> residuals (n, R); a row that is not finite is a failed candidate"""
 
-LARGE = 2.0**40
-"""Norm to which the residual is scaled at the start."""
-NEGLIGIBLE = 1e-15
-"""Share of the cost that is no more than the cost's own rounding: a smaller gain could not be seen."""
-
-
-WIDTHS = (2.0**6, 2.0**12, 1.0)
-"""Widths of the differences, in units of `derivatives.STEP`, that follow where narrow ones lead nowhere."""
-SOLVED = 1e-20
-"""Share of the first cost at which nothing is left to explain."""
+WIDTHS = (2.0**-26, 2.0**-20, 2.0**-14)
+"""finite differences in the unit box: the root of the rounding unit, and wider where that leads nowhere"""
+WIDER = 2.0**10
+"""how much wider the step is that tells a weak effect from rounding noise"""
+SUSPECT = 1e-3
+"""a column this much shorter than the longest one may be noise, and is taken twice"""
+DAMPING = 1e-3
+"""λ at the start, and after the differences became wider"""
+UNDAMPED = 1e-14
+"""λ of the step that tells what a Jacobian promises at most"""
+PROBE = 0.1
+"""part of a step after which the curvature along it is measured"""
+CURVED = 2.0
+"""a correction this many times longer than the step itself is not believed"""
+TRUSTED = 0.3
+"""part of the promised gain that a step must bring for its Jacobian to be updated"""
+SHORTEST = 1e-14
+"""relative length below which a step is none"""
+EXACT = 1e-24
+"""part of the first cost at which nothing is left to explain"""
+SLOW_STEPS = 2
+"""steps in a row from new Jacobians that may gain less than the tolerance"""
 
 
 class Ending(Enum):
-    """Why a refinement ended."""
+    """Why least squares ended."""
 
-    STEP = "the steps became shorter than the tolerance"
-    GRADIENT = "no direction inside the bounds improves the fit"
+    GAIN = "no step promises a gain above the tolerance"
+    SLOW = "the last steps gained less than the tolerance"
+    EXACT = "the residual is zero up to rounding"
     NO_IMPROVEMENT = "no step improves the fit any further"
-    ITERATIONS = "the iterations ran out before it converged"
-    START_FAILED = "the start itself could not be simulated"
+    ITERATIONS = "the iteration limit was reached before convergence"
+    START_FAILED = "the start could not be simulated"
     JACOBIAN_FAILED = "simulations failed on both sides of the best point"
 
     @property
     def converged(self) -> bool:
-        """Whether a local optimum was reached, as far as rounding lets it be seen."""
-        return self in (Ending.STEP, Ending.GRADIENT, Ending.NO_IMPROVEMENT)
+        """Whether a local optimum was reached, as far as tolerance and rounding show it."""
+        return self in (Ending.GAIN, Ending.SLOW, Ending.EXACT, Ending.NO_IMPROVEMENT)
 
 
 @dataclass(frozen=True, eq=False)
-class Refinement:
-    """What a refinement found.
+class State:
+    """Where least squares stands: everything that the next step depends on.
 
     Attributes:
-        point: best point of the unit box, shape (p,).
-        cost_before: half the sum of the squared residuals at the start; inf if it failed.
-        cost_after: the same at `point`, never more than before.
-        evaluations: candidates simulated.
-        iterations: steps accepted.
-        ending: why it ended.
+        point: best point so far, shape (p,), within [0, 1].
+        residual: there, shape (R,).
+        jacobian: shape (R, p), or (0, p) where it is to be taken.
+        fresh: whether the Jacobian is one of finite differences, not an updated one.
+        damping: λ. growth: factor of λ after the next step that fails.
+        width: index into WIDTHS.
+        slow: steps in a row from new Jacobians with gains below the tolerance.
+        cycle_cost, cycle_evaluations: cost and evaluations when the Jacobian was last to be taken.
+        cost_before: half the sum of the squared residuals at the start. cost: at `point`.
+        evaluations: candidates simulated. iterations: steps that helped.
+        ending: why it ended; None while it has not.
     """
 
     point: Float
+    residual: Float
+    jacobian: Float
+    fresh: bool
+    damping: float
+    growth: float
+    width: int
+    slow: int
+    cycle_cost: float
+    cycle_evaluations: int
     cost_before: float
-    cost_after: float
+    cost: float
     evaluations: int
     iterations: int
-    ending: Ending
+    ending: Ending | None
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the state as arrays by name, to be stored."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {n: np.asarray(v) for n, v in (values | {"ending": getattr(self.ending, "name", "")}).items()}
+
+    @staticmethod
+    def from_arrays(arrays: dict[str, NDArray[Any]]) -> "State":
+        """Return the state that `arrays` stored."""
+        values = {f.name: arrays[f.name] if arrays[f.name].ndim else arrays[f.name].item() for f in fields(State)}
+        return State(**values | {"ending": Ending[values["ending"]] if values["ending"] else None})
 
 
-def least_squares(
-    start: Float, residuals: Callable[[Float], Float], settings: RefinementSettings
-) -> Refinement:
-    """Improve a point of the unit box by bounded least squares.
-
-    Args:
-        start: shape (p,), within [0, 1].
-        residuals: points (n, p) -> residuals (n, R); a row that is not finite is a failed candidate.
-        settings: when to end.
+def least_squares(start_at: Float, residuals: Residuals, settings: RefinementSettings) -> State:
+    """Minimise the sum of squared residuals from a point of the unit box, shape (p,).
 
     Returns:
-        The best point evaluated, at least as good as the start.
+        The last state. Its point is the best one evaluated, and its ending says whether that is an optimum.
     """
-    course = _Course(residuals, start, settings.step_tolerance)
-    ending, iterations = _descend(course, settings)
-    for width in WIDTHS:
-        left = settings.iterations - iterations
-        if ending is not Ending.NO_IMPROVEMENT or left < 1 or course.cost < SOLVED * course.cost_before:
-            break
-        course.look_again(width)
-        ending, more = _descend(course, settings.model_copy(update={"iterations": left}))
-        iterations += more
-    return Refinement(
-        point=course.point,
-        cost_before=course.cost_before,
-        cost_after=course.cost,
-        evaluations=course.evaluations,
-        iterations=iterations,
-        ending=ending,
+    state = start(start_at, residuals(start_at[None])[0])
+    while state.ending is None:
+        state = step(state, residuals, settings)
+    return state
+
+
+def start(point: Float, residual: Float) -> State:
+    """Return the state at a point, shape (p,), whose residual was simulated, shape (R,)."""
+    cost = _costs(residual[None])[0]
+    return State(
+        point=point,
+        residual=residual,
+        jacobian=np.empty((0, point.size)),
+        fresh=False,
+        damping=DAMPING,
+        growth=2.0,
+        width=0,
+        slow=0,
+        cycle_cost=cost,
+        cycle_evaluations=1,
+        cost_before=cost,
+        cost=cost,
+        evaluations=1,
+        iterations=0,
+        ending=None if np.isfinite(cost) else Ending.START_FAILED,
     )
 
 
-def _descend(course: "_Course", settings: RefinementSettings) -> tuple[Ending, int]:
-    """MuJoCo's least squares from the course's best point; why it ended, and the steps accepted."""
-    start, jacobians = course.point, course.jacobians
-    try:
-        _, trace = minimize.least_squares(
-            start,
-            course.residual,
-            bounds=(np.zeros_like(start), np.ones_like(start)),
-            jacobian=course.jacobian,
-            x_scale="jac",
-            xtol=settings.step_tolerance,
-            gtol=0.0,  # NEGLIGIBLE, which has no unit, takes its place
-            max_iter=settings.iterations,
-            verbose=minimize.Verbosity.SILENT,
-        )
-    except _StopError as stop:
-        return stop.ending, max(course.jacobians - jacobians - 1, 0)
-    return course.ending([log.candidate[:, 0] for log in trace], settings), len(trace) - 1
+def step(state: State, residuals: Residuals, settings: RefinementSettings) -> State:
+    """Return the state after taking a Jacobian, or after trying a step. A state that has ended stays."""
+    if state.ending is not None:
+        return state
+    count = _Counter(residuals)
+    after = _differentiate(state, count, settings) if not len(state.jacobian) else _advance(state, count, settings)
+    return replace(after, evaluations=state.evaluations + count.evaluations)
 
 
-class _StopError(Exception):
-    """The way out of MuJoCo's loop."""
+def _differentiate(state: State, residuals: Residuals, settings: RefinementSettings) -> State:
+    """Take the Jacobian; end where it promises no gain."""
+    columns = _derivatives(residuals, state.point, state.residual, WIDTHS[state.width])
+    if not np.isfinite(columns).all():
+        return replace(state, ending=Ending.JACOBIAN_FAILED)
+    after = replace(
+        state,
+        jacobian=columns.T,
+        fresh=True,
+        cycle_cost=state.cost,
+        cycle_evaluations=state.evaluations,
+    )
+    model = _Model(after)
+    if model.gain(model.step(UNDAMPED)) <= settings.gain_tolerance * state.cost:
+        return replace(after, ending=Ending.GAIN)
+    return after
 
-    def __init__(self, ending: Ending) -> None:
-        self.ending = ending
-        super().__init__(ending.value)
+
+def _advance(state: State, residuals: "_Counter", settings: RefinementSettings) -> State:
+    """Try a step, or two; take the better one if it helps."""
+    model = _Model(state)
+    steps = [model.step(state.damping)]
+    promised = model.gain(steps[0])
+    if state.fresh and np.linalg.norm(steps[0]) > SHORTEST:
+        steps += _corrected(model, steps[0], state.damping, residuals)
+    points = np.array([model.reach(s) for s in steps])
+    if np.linalg.norm(points[0] - state.point) <= SHORTEST * np.linalg.norm(state.point):
+        return _no_step(state)
+    rows = residuals(points)
+    costs = _costs(rows)
+    best = int(np.argmin(costs))
+    if not costs[best] < state.cost:
+        return _damped(state, model, settings)
+    return _accepted(state, points[best], rows[best], promised, residuals.evaluations, settings)
 
 
-class _Course:
-    """The course of one refinement: what MuJoCo asks for, counted, and the best point so far.
+def _accepted(
+    state: State, point: Float, row: Float, promised: float, simulated: int, settings: RefinementSettings
+) -> State:
+    """Move to a better point; update the Jacobian if that is cheaper than a new one."""
+    cost = _costs(row[None])[0]
+    gain = state.cost - cost
+    ratio = gain / promised if promised > 0 else 0.0
+    after = replace(
+        state,
+        point=point,
+        residual=row,
+        jacobian=np.empty((0, point.size)),
+        fresh=False,
+        damping=max(state.damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), UNDAMPED),
+        growth=2.0,
+        slow=state.slow + 1 if gain < settings.gain_tolerance * state.cost else 0,
+        cost=cost,
+        iterations=state.iterations + 1,
+    )
+    if cost <= EXACT * state.cost_before:
+        return replace(after, ending=Ending.EXACT)
+    if after.slow >= SLOW_STEPS:
+        return replace(after, ending=Ending.SLOW)
+    if after.iterations >= settings.iterations:
+        return replace(after, ending=Ending.ITERATIONS)
+    if state.fresh:
+        pays = ratio > TRUSTED
+    else:
+        spent = state.evaluations + simulated - state.cycle_evaluations
+        pays = np.log(state.cost / cost) / simulated >= np.log(state.cycle_cost / cost) / spent
+    return replace(after, jacobian=_updated(state, point, row)) if pays else after
 
-    MuJoCo works with columns: points (p, 1), residuals (R + p, 1). The last p residuals are the
-    pseudo-measurements, always zero; the others are scaled, see LARGE.
-    """
 
-    def __init__(self, residuals: Callable[[Float], Float], start: Float, tolerance: float) -> None:
-        self._residuals = residuals
-        self._tolerance = tolerance
-        self.point = start
-        self.cost = self.cost_before = np.inf
-        self.evaluations = 0
-        self.jacobians = 0
-        self._scale = 0.0  # a power of two, so that scaling rounds nothing; 0 before the start is known
-        self._linear: _Linear | None = None  # the model at the present point
-        self._tried = False  # a step since the last Jacobian
-        self._width = 1.0
-        self._best_row: Float | None = None  # residual at the best point
+def _updated(state: State, point: Float, row: Float) -> Float:
+    """Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step."""
+    move = point - state.point
+    scaled = np.sum(state.jacobian**2, axis=0) * move
+    return state.jacobian + np.outer((row - state.residual - state.jacobian @ move) / (scaled @ move), scaled)
 
-    def look_again(self, width: float) -> None:
-        """Begin again from the best point, with differences of another width."""
-        self._width, self._linear, self._tried = width, None, False
 
-    def residual(self, x: Float) -> Float:
-        """Scaled residual at the start or at a trial step; inf throughout where it failed."""
-        point = np.clip(x[:, 0], 0.0, 1.0)  # MuJoCo's steps overshoot the bounds by a rounding
-        if self._linear is not None:
-            self._worth_trying(point, self._linear)
-        self._tried = self._linear is not None
-        again = self._linear is None  # at the start, which a further look knows already
-        row = self._best_row if again and self._best_row is not None else self._simulate(point)
-        return np.concatenate((self._scale * row, np.zeros(point.size)))[:, None]
+def _damped(state: State, model: "_Model", settings: RefinementSettings) -> State:
+    """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
+    if not state.fresh:
+        return replace(state, jacobian=np.empty((0, state.point.size)))
+    after = replace(state, damping=state.damping * 2 * state.growth, growth=2 * state.growth)
+    if model.gain(model.step(after.damping)) < settings.gain_tolerance * state.cost:
+        return _no_step(state)
+    return after
 
-    def jacobian(self, x: Float, r: Float) -> Float:
-        """Derivatives by finite differences, shape (R + p, p), with the pseudo-measurements' below."""
-        self.jacobians += 1
-        self._tried = False
-        point, row = np.clip(x[:, 0], 0.0, 1.0), r[: -x.size, 0] / self._scale
-        columns, effective = derivatives(self._evaluate, point, row, self._width)
-        if not np.isfinite(columns).all():
-            raise _StopError(Ending.JACOBIAN_FAILED)
-        columns[~effective] = 0.0
-        self._linear = _Linear(point, row, columns)
-        pseudo = np.diag((~effective).astype(float))
-        return np.concatenate((self._scale * columns.T, pseudo))
 
-    def ending(self, points: list[Float], settings: RefinementSettings) -> Ending:
-        """The reason for which MuJoCo ended by itself, which it only prints."""
-        if not self._tried:
-            return Ending.GRADIENT
-        if len(points) > 1 and self._short(points[-1], points[-2]):
-            return Ending.STEP
-        return Ending.ITERATIONS if len(points) > settings.iterations else Ending.NO_IMPROVEMENT
+def _no_step(state: State) -> State:
+    """Where no step is left: take the Jacobian anew, over wider differences if it is new; or end."""
+    again = replace(state, jacobian=np.empty((0, state.point.size)), damping=DAMPING, growth=2.0)
+    if not state.fresh:
+        return again
+    if state.width + 1 < len(WIDTHS):
+        return replace(again, width=state.width + 1)
+    return replace(state, ending=Ending.NO_IMPROVEMENT)
 
-    def _worth_trying(self, point: Float, linear: "_Linear") -> None:
-        """End where the step, or what it can be expected to gain, is nothing."""
-        if self._short(point, linear.point):
-            raise _StopError(Ending.STEP)
-        if abs(linear.gain(point)) < NEGLIGIBLE:
-            raise _StopError(Ending.NO_IMPROVEMENT)
 
-    def _short(self, point: Float, origin: Float) -> bool:
-        length = np.linalg.norm(point - origin)
-        return bool(length < self._tolerance * (self._tolerance + np.linalg.norm(origin)))
+class _Model:
+    """The linear model of the residual around a state, in the coordinates of the parameters with effect."""
 
-    def _simulate(self, point: Float) -> Float:
-        """Residual at a point, remembered if it is the best; inf throughout where it failed."""
-        row = self._evaluate(point[None])[0]
-        with np.errstate(over="ignore", invalid="ignore"):
-            cost = 0.5 * float(row @ row)
-        if not np.isfinite(self.cost_before):
-            self.cost_before = cost if np.isfinite(cost) else np.inf
-            if not np.isfinite(cost):
-                raise _StopError(Ending.START_FAILED)
-            self._scale = LARGE / 2.0 ** np.frexp(np.sqrt(cost))[1]
-        if cost < self.cost:
-            self.cost, self.point, self._best_row = cost, point, row
-        return row if np.isfinite(cost) else np.full(row.size, np.inf)
+    def __init__(self, state: State) -> None:
+        self._point, self.residual, self.jacobian = state.point, state.residual, state.jacobian
+        length = np.linalg.norm(state.jacobian, axis=0)
+        self._moving = np.flatnonzero(length > 0)
+        self._scale = length[self._moving]
+        self._triangle, self._right = self.reduced(state.residual)
 
-    def _evaluate(self, points: Float) -> Float:
+    def reduced(self, row: Float) -> tuple[Float, Float]:
+        """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
+        p = len(self._moving)
+        both = np.linalg.qr(np.column_stack([self.jacobian[:, self._moving], row]), mode="r")
+        return both[:p, :p], both[:p, p]
+
+    def step(self, damping: float, row: Float | None = None) -> Float:
+        """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
+        triangle, right = (self._triangle, self._right) if row is None else self.reduced(row)
+        matrix = np.vstack([triangle, np.sqrt(damping) * np.diag(self._scale)])
+        there = self._point[self._moving]
+        return box_least_squares(matrix, np.append(right, np.zeros(there.size)), -there, 1 - there)
+
+    def gain(self, s: Float) -> float:
+        """Part of the cost that the linear model promises to save by a step."""
+        after = self._right + self._triangle @ s
+        return 0.5 * float(self._right @ self._right - after @ after)
+
+    def reach(self, s: Float) -> Float:
+        """Return the point of the box that a step leads to, shape (p,)."""
+        point = self._point.copy()
+        point[self._moving] = np.clip(point[self._moving] + s, 0.0, 1.0)
+        return point
+
+    def length(self, s: Float) -> float:
+        """Length of a step, scaled."""
+        return float(np.linalg.norm(self._scale * s))
+
+
+def _corrected(model: _Model, s: Float, damping: float, residuals: Residuals) -> list[Float]:
+    """The same step corrected for the curvature along it; none where that cannot be measured."""
+    origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
+    slope = (residuals(probe[None])[0] - model.residual) / PROBE
+    curvature = 2 / PROBE * (slope - model.jacobian @ ((probe - origin) / PROBE))
+    if not np.isfinite(curvature).all():
+        return []
+    corrected = model.step(damping, model.residual + 0.5 * curvature)
+    return [corrected] if model.length(corrected - s) < CURVED * model.length(s) else []
+
+
+class _Counter:
+    """Residuals whose candidates are counted."""
+
+    def __init__(self, residuals: Residuals) -> None:
+        self._residuals, self.evaluations = residuals, 0
+
+    def __call__(self, points: Float) -> Float:
         self.evaluations += len(points)
         return self._residuals(points)
 
 
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    """The linear model of the residual around a point: residual (R,) there, derivatives (p, R)."""
+def _costs(rows: Float) -> Float:
+    """Half the sum of squares of each row; inf where it is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        costs = 0.5 * np.sum(rows**2, axis=1)
+    return np.where(np.isfinite(costs), costs, np.inf)
 
-    point: Float
-    residual: Float
-    derivatives: Float
 
-    def gain(self, point: Float) -> float:
-        """Share of the cost that the way to another point is expected to save."""
-        expected = self.residual + (point - self.point) @ self.derivatives
-        before = float(self.residual @ self.residual)
-        return (before - float(expected @ expected)) / before
+def _derivatives(residuals: Residuals, point: Float, row: Float, width: float) -> Float:
+    """Derivatives in each parameter by finite differences, shape (p, R): 0 without effect.
+
+    All differences are one batch, towards the wider half of the box. Those that fail are taken to the other
+    side in a second batch; where that fails too, or a bound is there, they are not finite.
+    """
+    h = width * np.where(point > 0.5, -1.0, 1.0)
+    columns = _quotients(residuals, point, row, h, np.ones(point.size, dtype=bool))
+    failed = ~np.isfinite(columns).all(axis=1)
+    if failed.any():
+        columns[failed] = _quotients(residuals, point, row, -h, failed)
+    length = np.linalg.norm(columns, axis=1)
+    suspect = (length > 0) & (length < SUSPECT * length.max())
+    if suspect.any():
+        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
+        wider = np.linalg.norm(_quotients(residuals, point, row, WIDER * h, suspect), axis=1)
+        suspect[suspect] = wider < 0.1 * length[suspect]
+        columns[suspect] = 0.0
+    return columns
+
+
+def _quotients(residuals: Residuals, point: Float, row: Float, h: Float, which: NDArray[np.bool_]) -> Float:
+    """Difference quotients of the parameters `which`, shape (their number, R); nan beyond a bound."""
+    points = (point + np.diag(h))[which]
+    inside = np.all((points >= 0) & (points <= 1), axis=1)
+    quotients = np.full((len(points), row.size), np.nan)
+    if inside.any():
+        rows = residuals(points[inside])
+        taken = (points - point).sum(axis=1)[inside, None]
+        with np.errstate(invalid="ignore", over="ignore"):
+            quotients[inside] = (rows - row) / taken
+    return quotients

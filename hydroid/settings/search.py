@@ -90,9 +90,9 @@ class MultistartSettings(Settings):
     horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0)
     """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
     command on [s]"""
-    iterations: Annotated[int, Field(ge=1)] = 40
+    iterations: Annotated[int, Field(ge=1)] = 100
     """largest number of steps of each of these fits"""
-    step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+    gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
     """as the refinement's; coarser, since the refinement starts from the best result"""
 
     @property
@@ -105,10 +105,11 @@ class RefinementSettings(Settings):
     """The refinement: bounded least squares that start from the search's estimate (ours; not in the
     article)."""
 
-    iterations: Annotated[int, Field(ge=1)] = 100
-    """largest number of steps"""
-    step_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-14
-    """the refinement ends after a step that is shorter than this fraction of the bounds' widths"""
+    iterations: Annotated[int, Field(ge=1)] = 300
+    """largest number of steps; a step takes one to three simulations, some a Jacobian besides"""
+    gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-8
+    """the refinement ends where a step promises to lower the sum of squared errors by less than this
+    fraction"""
 
 
 class SearchSettings(Settings):

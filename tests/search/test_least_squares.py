@@ -1,5 +1,3 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -40,7 +38,7 @@ def test_finds_the_bottom_of_rosenbrocks_valley(start):
     result = least_squares(np.array(start), rosenbrock, SETTINGS)
     np.testing.assert_allclose(result.point, 0.75, atol=1e-9)
     assert result.ending.converged
-    assert result.cost_after < 1e-18 < result.cost_before
+    assert result.cost < 1e-18 < result.cost_before
 
 
 def test_a_problem_over_six_decades_is_solved_to_its_weakest_direction():
@@ -72,37 +70,8 @@ def test_the_unit_of_the_residual_does_not_matter(unit):
         least_squares(start, lambda x: unit * residuals(x), SETTINGS),
     )
     assert (here.point == there.point).all()
-    assert there.cost_after == unit**2 * here.cost_after
+    assert there.cost == unit**2 * here.cost
     assert (here.evaluations, here.ending) == (there.evaluations, there.ending)
-
-
-def test_no_point_is_simulated_twice_in_a_row():
-    residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4), offset=1e-3 * np.sin(np.arange(400)))
-    tried = []
-
-    def watched(x):
-        if len(x) == 1:
-            tried.append(x[0].tobytes())
-        return residuals(x)
-
-    least_squares(np.full(6, 0.5), watched, SETTINGS)
-    assert all(a != b for a, b in pairwise(tried))
-
-
-def test_no_step_below_the_tolerance_is_simulated():
-    residuals, _ = linear(10.0 ** -np.arange(0, 6), np.full(6, 0.4))
-    tried = []
-
-    def watched(x):
-        if len(x) == 1:
-            tried.append(x[0])
-        return residuals(x)
-
-    least_squares(np.full(6, 0.5), watched, RefinementSettings(step_tolerance=1e-9))
-    costs = [float((residuals(x[None]) ** 2).sum()) for x in tried]
-    for k in range(1, len(tried)):
-        origin = tried[int(np.argmin(costs[:k]))]
-        assert np.linalg.norm(tried[k] - origin) >= 1e-9 * np.linalg.norm(origin)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -163,7 +132,7 @@ def test_what_lies_on_a_bound_is_neither_stepped_over_nor_stuck_at(seed):
 def test_bounds_hold_and_the_rest_is_optimal_on_them():
     truth = np.array([1.4, 0.5, -0.3])
     residuals, matrix = linear([2.0, 1.0, 0.5], truth)
-    result = least_squares(np.full(3, 0.5), residuals, SETTINGS)
+    result = least_squares(np.full(3, 0.5), residuals, RefinementSettings(gain_tolerance=1e-14))
     assert ((result.point >= 0) & (result.point <= 1)).all()
     # first-order conditions of a box: no slope inside, slope outwards on the bounds
     slope = matrix.T @ residuals(result.point[None])[0]
@@ -180,7 +149,7 @@ def test_a_rank_deficient_problem_is_fitted_as_well_as_it_can_be(rank):
     singular[rank:] = 0
     residuals, _ = linear(singular, np.full(4, 0.45))
     result = least_squares(np.array([0.2, 0.6, 0.5, 0.3]), residuals, SETTINGS)
-    assert result.cost_after < 1e-18 * result.cost_before
+    assert result.cost < 1e-18 * result.cost_before
     assert result.ending.converged
 
 
@@ -218,8 +187,8 @@ def test_never_worse_than_the_start_and_always_inside(seed, failing):
         return
     after = 0.5 * float((residuals(result.point[None]) ** 2).sum())
     assert result.cost_before == pytest.approx(before, rel=1e-12)
-    assert result.cost_after == pytest.approx(after, rel=1e-12)
-    assert result.cost_after <= result.cost_before
+    assert result.cost == pytest.approx(after, rel=1e-12)
+    assert result.cost <= result.cost_before
     assert ((result.point >= 0) & (result.point <= 1)).all()
 
 
@@ -247,7 +216,7 @@ def test_failures_on_both_sides_end_it_with_the_best_point_so_far():
     assert result.ending is Ending.JACOBIAN_FAILED
     assert not result.ending.converged
     assert (result.point == start).all()
-    assert result.cost_after == result.cost_before
+    assert result.cost == result.cost_before
 
 
 def test_a_bound_is_not_stepped_over_when_the_inner_step_fails():
@@ -268,26 +237,26 @@ def test_failing_trial_steps_are_rejected():
     truth = np.array([0.9, 0.75])
     residuals = fails_where(lambda x: x[:, 0] > 0.6, linear([1.0, 0.7], truth)[0])
     result = least_squares(np.array([0.1, 0.1]), residuals, SETTINGS)
-    assert result.cost_after < 0.3 * result.cost_before
+    assert result.cost < 0.3 * result.cost_before
     assert result.point[0] <= 0.6
 
 
 def test_a_start_that_fails_is_named():
     result = least_squares(np.full(2, 0.5), lambda x: np.full((len(x), 5), np.nan), SETTINGS)
     assert result.ending is Ending.START_FAILED
-    assert (result.evaluations, result.iterations, result.cost_after) == (1, 0, np.inf)
+    assert (result.evaluations, result.iterations, result.cost) == (1, 0, np.inf)
 
 
 def test_a_perfect_start_stays():
     residuals, _ = linear([1.0, 0.5], np.array([0.5, 0.25]))
     result = least_squares(np.array([0.5, 0.25]), residuals, SETTINGS)
     assert (result.point == [0.5, 0.25]).all()
-    assert result.ending is Ending.GRADIENT
+    assert result.ending is Ending.GAIN
 
 
 def test_nothing_with_any_effect_ends_at_once():
     result = least_squares(np.array([0.3, 0.8]), lambda x: np.ones((len(x), 5)), SETTINGS)
-    assert result.ending is Ending.GRADIENT
+    assert result.ending is Ending.GAIN
     assert (result.point == [0.3, 0.8]).all()
 
 
@@ -295,12 +264,7 @@ def test_iterations_run_out():
     result = least_squares(np.array([0.1, 0.9]), rosenbrock, RefinementSettings(iterations=2))
     assert result.ending is Ending.ITERATIONS
     assert result.iterations == 2
-    assert result.cost_after < result.cost_before
-
-
-def test_a_long_tolerance_is_met_by_a_short_step():
-    result = least_squares(np.array([0.1, 0.9]), rosenbrock, RefinementSettings(step_tolerance=0.5))
-    assert result.ending is Ending.STEP
+    assert result.cost < result.cost_before
 
 
 def test_every_simulated_member_is_counted_and_nothing_is_printed(capfd):

@@ -85,7 +85,7 @@ def refit(arm, settings, log: Log, truth: np.ndarray, count: int) -> np.ndarray:
         known = settings.model_copy(update={"priors": {"total mass": total}})
         problem = Problem(known, [replace(log, angle=log.angle + noise)])
         start = truth * np.exp(rng.uniform(-0.05, 0.05, len(truth)))
-        how = RefinementSettings(iterations=30, step_tolerance=1e-6)
+        how = RefinementSettings(gain_tolerance=1e-6)
         point = refine(problem, start, how, lambda simulated: None).point
         errors.append(problem.parameters.from_unit(point[None])[0] / truth - 1)
     return np.array(errors)

@@ -36,7 +36,7 @@ CHANGES = {
     "simulation.other_joints": "locked",
     **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
     **{f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M3", "M4", "M5")},
-    "refinement.step_tolerance": 1e-6,
+    "refinement.gain_tolerance": 1e-6,
 }
 
 

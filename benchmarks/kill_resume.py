@@ -5,7 +5,7 @@
 Five kinds of run: simple GA, NSGA-II, the refinement (with `refine`), multi-start least squares, and a study of
 several seeds. Every run is killed (SIGKILL) twice before it may end, so that resumed runs are killed as well.
 Half of the moments are drawn from the time that the run takes, the earlier the likelier; the others follow
-files: the appearance of a checkpoint's, or any file's, temporary twin, or the growth of the refinement's journal.
+files: the appearance of a checkpoint's, or any file's, temporary twin, or the growth of the refinement's checkpoint.
 What a kill has met is read from what it left. All files are compared, but for the log, the lock and the last
 checkpoint but one.
 
@@ -105,12 +105,12 @@ def finish(folder: Path, log: Path, options: list[str]) -> float:
 def moment(folder: Path, duration: float, rng: random.Random) -> Callable[[], bool]:
     """A question that becomes true when it is time to kill."""
     began = time.monotonic()
-    match rng.choice(["time", "time", "time", "checkpoint", "file", "journal"]):
+    match rng.choice(["time", "time", "time", "checkpoint", "file", "refinement"]):
         case "checkpoint":
             return seen(lambda: parts(folder, ".checkpoint.npz."), rng.randint(1, 20))
         case "file":
             return seen(lambda: parts(folder, "."), rng.randint(1, 60))
-        case "journal":
+        case "refinement":
             return seen(lambda: sizes(folder), rng.randint(1, 60))
         case _:
             after = duration * rng.random() ** 2
@@ -141,7 +141,7 @@ def parts(folder: Path, prefix: str) -> set[object]:
 
 def sizes(folder: Path) -> set[object]:
     found = set[object]()
-    for file in (folder / "refinement.journal", *folder.glob("seed-*/refinement.journal")):
+    for file in (folder / "refinement.npz", *folder.glob("seed-*/refinement.npz")):
         try:
             found.add((file, file.stat().st_size))
         except OSError:
@@ -178,7 +178,7 @@ def phase(folder: Path) -> str:
         return "between runs, or at the end"
     if (run / "estimate.yaml").exists():
         return "report"
-    if (run / "refinement.journal").exists():
+    if (run / "refinement.npz").exists():
         return "refinement"
     return (
         "search, after a checkpoint"

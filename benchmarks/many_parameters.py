@@ -41,8 +41,6 @@ TRUTH = {
 QUANTITIES = {"K": "gain", "D": "damping", "S": "stiffness"}
 FACTOR = 10.0
 NOISE = np.deg2rad(0.1)
-TOLERANCE = 1e-8
-"""relative length of the last step: mujoco.sysid's own"""
 MARGIN = np.deg2rad(5.0)
 REACHED = 0.01
 """of the lowest cost: what is no further above it has reached the optimum"""
@@ -64,7 +62,6 @@ def make_settings(seed: int) -> tuple[FitSettings, Arm]:
         "priors": known,
         "objective": {"norm": 2, "segments": {"equal": 1}},
         "search": {"algorithm": "multistart", "seed": seed, "multistart": {"starts": 1}},
-        "refinement": {"step_tolerance": TOLERANCE},
     }
     settings = load_settings("article-mech", changes)
     return settings, settings.arm

@@ -131,7 +131,7 @@ def _fit(folder: RunFolder, problem: Problem, paths: Sequence[Path], watch: Watc
         _log.info("resumed after generation %d", done)
     else:
         folder.begin(problem.settings, paths)
-    result = fit(problem, folder.save, watch, checkpoint, folder.journal())
+    result = fit(problem, folder.save, watch, checkpoint, folder.refinements())
     folder.write_estimate(problem, result)
     write_page(fit_page(folder.identity(), problem, result), folder.path)
     folder.status("done")

@@ -1,4 +1,4 @@
-"""A fit: search, the estimates taken from it, the refinement, and what moves the response at the end."""
+"""A fit: search, the estimates taken from it, refinement, and the uncertainty of the last estimate."""
 
 import logging
 from collections.abc import Callable
@@ -8,14 +8,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.fitting.journal import Journal
 from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import refine
+from hydroid.fitting.refinement import NoCheckpoint, Refinement, refine
+from hydroid.fitting.refinement import Checkpoint as RefinementCheckpoint
 from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
+from hydroid.problem.norms import overall_objective
 from hydroid.problem.problem import Evaluation, Memo, Problem
+from hydroid.problem.segments import segment_objectives
 from hydroid.search import compromise
-from hydroid.search.least_squares import Refinement
 from hydroid.search.pareto import non_dominated
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.directions import Identifiability, identifiability
@@ -49,7 +50,7 @@ class Fit:
     """What a fit found.
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
-    objectives. refinement: the last one. history: shape (G, len(HISTORY)). uncertainty,
+    objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty,
     identifiability: what the logs say about the final estimate.
     """
 
@@ -57,9 +58,19 @@ class Fit:
     final: str
     front: tuple[Array, Evaluation]
     history: Array
-    refinement: Refinement | None
+    refinements: dict[str, Refinement]
     uncertainty: Uncertainty
     identifiability: Identifiability
+
+    @property
+    def refinement(self) -> Refinement | None:
+        """The last refinement; None where there was none."""
+        return next(reversed(self.refinements.values()), None)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every refinement reached an optimum."""
+        return all(r.ending.converged for r in self.refinements.values())
 
     @property
     def best(self) -> Estimate:
@@ -99,75 +110,78 @@ def fit(
     save: Callable[[SearchState, Memo], None],
     watch: Watcher,
     checkpoint: Checkpoint | None = None,
-    journal: Journal | None = None,
+    refinements: Callable[[str], RefinementCheckpoint] = lambda name: NoCheckpoint(),
 ) -> Fit:
-    """Search, take the estimates, refinement.
+    """Search, take the estimates, refine the best of them.
 
     Args:
         problem: the estimation problem with its settings.
         save: keeps the search's state now and then.
-        watch: is told how far the fit is.
+        watch: takes how far the fit is.
         checkpoint: where an interrupted search was.
-        journal: what an interrupted refinement has simulated.
+        refinements: from a name to where the refinement of that name stores how far it is.
 
     Raises:
-        RunError: every simulated parameter set diverged.
+        RunError: every simulated candidate diverged.
     """
     settings = problem.settings
     memo = Memo(problem)
     if checkpoint is not None:
         memo.restore(*checkpoint.memo)
     if settings.search.algorithm == "multistart":
-        search = Multistart(problem, settings.search, memo, watch.refining, journal)
+        search = Multistart(problem, settings.search, memo, watch.refining, refinements)
     else:
         search = Search(problem, settings.search, memo)
     state = search.run(checkpoint.state if checkpoint else None, save, watch.generation)
     theta = search.theta(state.population)
     evaluation = memo.evaluate(theta)
     if search.single:
-        found = {"best": compromise.best(theta, state.population.objectives[:, 0])}
+        candidates = {"best": compromise.best(theta, state.population.objectives[:, 0])}
     else:
-        found = _from_front(theta, evaluation, memo, settings.search.compromise)
-    estimates = _usable_first(_estimates(problem, found))
-    final, refined, last = next(iter(estimates)), None, problem
-    if settings.refinement is not None:
-        start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
-        refined = _refine(problem, start, watch, journal)
-        theta_refined = problem.parameters.from_unit(refined.point[None])
-        estimates |= _estimates(problem, {"refined": theta_refined[0]})
-        final = "refined"
-        if settings.joint_refinement:
-            last = problem.freed()
-            refined = _refine(last, estimates[final], watch, journal)
-            theta_refined = last.parameters.from_unit(refined.point[None])
-            estimates |= _estimates(last, {"joint": theta_refined[0]})
-            final = "joint"
+        candidates = _from_front(theta, evaluation, memo, settings.search.compromise)
+    estimates = _usable_first(_estimates(problem, candidates))
+    start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
+    results, last, final = dict[str, Refinement](), problem, next(iter(estimates))
+    for name in _refined(problem):
+        last = problem.freed() if name == "joint" else problem
+        assert settings.refinement is not None
+        result = refine(last, start.theta, settings.refinement, watch.refining, refinements(name))
+        if not result.ending.converged:
+            _log.warning("the refinement of the estimate %s did not converge: %s", name, result.ending.value)
+        estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
+        results[name], start, final = result, estimates[name], name
     told = uncertainty(last, estimates[final].theta)
     return Fit(
         estimates,
         final,
         _front(theta, evaluation, memo),
         state.history,
-        refined,
+        results,
         told,
         identifiability(last, told),
     )
 
 
-def _estimates(problem: Problem, found: dict[str, Array]) -> dict[str, Estimate]:
-    theta = np.array(list(found.values()))
-    evaluation, responses = problem.evaluate(theta), problem.responses(theta)
-    rms = problem.rms(problem.residuals(theta))
+def _refined(problem: Problem) -> list[str]:
+    """Names of the estimates that refinements give, in order."""
+    if problem.settings.refinement is None:
+        return []
+    return ["refined", "joint"] if problem.settings.joint_refinement else ["refined"]
+
+
+def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Estimate]:
+    """Simulate candidates by name, each of shape (P,), and measure them."""
+    theta = np.array(list(candidates.values()))
+    responses = problem.responses(theta)
+    errors = np.concatenate([channel.residual(responses) for channel in problem.channels], axis=1)
+    objective = problem.settings.objective
+    segments = segment_objectives(errors, problem.measured, problem.bounds, objective)
+    overall, rms = overall_objective(errors, problem.measured, objective), problem.rms(errors)
     return {
         name: Estimate(
-            name,
-            theta[i],
-            evaluation.segments[i],
-            float(evaluation.overall[i]),
-            float(rms[i]),
-            tuple(r.angle[i] for r in responses),
+            name, theta[i], segments[i], float(overall[i]), float(rms[i]), tuple(r.angle[i] for r in responses)
         )
-        for i, name in enumerate(found)
+        for i, name in enumerate(candidates)
     }
 
 
@@ -199,8 +213,3 @@ def _front(theta: Array, evaluation: Evaluation, memo: Memo) -> tuple[Array, Eva
     theta = theta[keep]
     theta = theta[non_dominated(evaluation.segments[keep])]
     return theta, memo.evaluate(theta)
-
-
-def _refine(problem: Problem, start: Estimate, watch: Watcher, journal: Journal | None) -> Refinement:
-    assert problem.settings.refinement is not None
-    return refine(problem, start.theta, problem.settings.refinement, watch.refining, journal)

@@ -1,98 +1,200 @@
-"""The refinement of an estimate: least squares over all channels, with what is known as further measurements."""
+"""Refinement of an estimate: least squares over all channels, with the priors as further measurements."""
 
 import logging
+import time
 from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hydroid.fitting.journal import Journal, question_of
+from hydroid.fitting import search
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import Refinement, least_squares
+from hydroid.search.least_squares import Ending, State, start, step
 from hydroid.settings.search import RefinementSettings
 from hydroid.uncertainty.noise import prior_weight
 
 ROUNDS = 4
-"""times at most that the noise is estimated, to weigh the logs against what is known"""
+"""times at most that the noise is estimated, to weigh the logs against the priors"""
 SETTLED = 0.02
 """relative change of the noise below which another round would change nothing"""
 
+Arrays = dict[str, NDArray[Any]]
+
 _log = logging.getLogger(__name__)
+
+
+class Checkpoint(Protocol):
+    """Where a refinement stores how far it is."""
+
+    def load(self) -> Arrays | None:
+        """Return what was saved last; None where nothing was."""
+        ...
+
+    def save(self, arrays: Arrays) -> None:
+        """Store arrays in place of what was saved before."""
+        ...
+
+
+class NoCheckpoint:
+    """Stores nothing."""
+
+    def load(self) -> None:
+        """Return nothing."""
+
+    def save(self, arrays: Arrays) -> None:
+        """Ignore the arrays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """Result of a refinement.
+
+    Attributes:
+        point: best point of the unit box of the free parameters, shape (p,).
+        cost_before: half the sum of the squared residuals at the start; inf if it failed.
+        cost: the same at `point`, never more than before.
+        evaluations: candidates simulated.
+        iterations: steps that lowered the cost.
+        ending: why it ended.
+    """
+
+    point: Array
+    cost_before: float
+    cost: float
+    evaluations: int
+    iterations: int
+    ending: Ending
+
+    def __str__(self) -> str:
+        cost = f"half the sum of squares {self.cost_before:.6g} to {self.cost:.6g}"
+        return f"{cost} in {self.evaluations} simulations; {self.ending.value}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """A refinement under way: least squares with the priors weighed by one estimate of the noise.
+
+    weight: residual that a prior's standard deviation counts [rad]. rounds: noise estimates so far.
+    evaluations, iterations, cost_before: of the rounds before this one, and of the first start.
+    """
+
+    state: State
+    weight: float
+    rounds: int
+    evaluations: int
+    iterations: int
+    cost_before: float
+
+    def arrays(self) -> Arrays:
+        own = {n: np.asarray(v) for n, v in vars(self).items() if n != "state"}
+        return {f"descent.{n}": v for n, v in own.items()} | self.state.arrays()
+
+    @staticmethod
+    def from_arrays(arrays: Arrays) -> "_Descent":
+        own = {n.removeprefix("descent."): v.item() for n, v in arrays.items() if n.startswith("descent.")}
+        return _Descent(State.from_arrays(arrays), **own)
+
+    def result(self) -> Refinement:
+        s = self.state
+        evaluations, iterations = self.evaluations + s.evaluations, self.iterations + s.iterations
+        assert s.ending is not None
+        return Refinement(s.point, self.cost_before, s.cost, evaluations, iterations, s.ending)
 
 
 def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    watch: Callable[[int], None],
-    journal: Journal | None = None,
+    progress: Callable[[int], None],
+    checkpoint: Checkpoint | None = None,
 ) -> Refinement:
     """Improve an estimate by bounded least squares.
 
-    Statements of `problem.priors` join as residuals of (value - known) / sd times what a score counts
-    beside the logs' noise (`prior_weight`), which is taken at the start, and again at the result, until it
-    settles.
+    Priors join as residuals of (value - prior) / sd times what one standard deviation counts beside the logs'
+    noise (`prior_weight`). The noise is taken at the start, and again at the result, until it settles.
 
     Args:
         problem: the problem.
         theta: where to start, shape (P,).
         settings: when to end.
-        watch: is told how many simulations were made so far.
-        journal: what an interrupted run has simulated already.
-
-    Returns:
-        Its point is one of the unit box of the free parameters.
+        progress: takes the number of simulations so far.
+        checkpoint: where it continues from, and stores how far it is; a result is stored too.
 
     Raises:
-        RunError: the journal cannot be written.
+        RunError: the checkpoint cannot be written.
     """
-    question = question_of(problem, theta, settings)
-    known = None if journal is None else journal.refined(question)
-    if known is not None:
-        result, simulated = known
-        watch(simulated)
-        return result
-    simulate = problem.residuals if journal is None else journal.residuals(problem)
-    result, simulated = _refine(problem, simulate, theta, settings, watch)
-    _log.info("refinement of %d parameters: %s", result.point.size, _words(result, simulated))
-    if journal is not None:
-        journal.end(question, result, simulated)
+    checkpoint = checkpoint or NoCheckpoint()
+    stored = checkpoint.load()
+    if stored is not None and "descent.weight" not in stored:
+        values = {n: v if v.ndim else v.item() for n, v in stored.items()}
+        return Refinement(**values | {"ending": Ending[values["ending"]]})
+    descent = _begin(problem, theta) if stored is None else _Descent.from_arrays(stored)
+    saved, last = time.monotonic(), descent
+    try:
+        while (after := _next(problem, descent, settings)) is not None:
+            descent = after
+            progress(descent.evaluations + descent.state.evaluations)
+            if time.monotonic() - saved > search.SAVE_EVERY:
+                checkpoint.save(descent.arrays())
+                saved, last = time.monotonic(), descent
+    except BaseException:
+        if descent is not last:
+            checkpoint.save(descent.arrays())
+        raise
+    result = descent.result()
+    _log.info("refinement of %d parameters: %s", result.point.size, result)
+    values = asdict(result) | {"ending": result.ending.name}
+    checkpoint.save({n: np.asarray(v) for n, v in values.items()})
     return result
 
 
-def _refine(
-    problem: Problem,
-    simulate: Callable[[Array], Array],
-    theta: Array,
-    settings: RefinementSettings,
-    watch: Callable[[int], None],
-) -> tuple[Refinement, int]:
-    """The same with the residuals of `simulate`, theta (n, P) -> (n, R), and the number of simulations."""
-    simulated, parameters, priors = 0, problem.parameters, problem.priors
-    noise = _noise(problem, simulate, theta) if len(priors) else 0.0
-
-    def residuals(unit: Array) -> Array:
-        nonlocal simulated
-        simulated += len(unit)
-        watch(simulated)
-        points = parameters.from_unit(unit)
-        rows = simulate(points)
-        return np.column_stack([rows, noise * priors.scores(points)]) if len(priors) else rows
-
-    result = least_squares(parameters.to_unit(theta[None])[0], residuals, settings)
-    for _ in range(ROUNDS - 1 if len(priors) else 0):
-        before, noise = noise, _noise(problem, simulate, parameters.from_unit(result.point[None])[0])
-        if not abs(noise - before) > SETTLED * before:
-            break
-        result = least_squares(result.point, residuals, settings)
-    return result, simulated
+def _begin(problem: Problem, theta: Array) -> _Descent:
+    row = problem.residuals(theta[None])[0]
+    weight = _weight(problem, row)
+    unit = problem.parameters.to_unit(theta[None])[0]
+    state = start(unit, _with_priors(problem, row[None], unit[None], weight)[0])
+    return _Descent(state, weight, 1, 0, 0, state.cost)
 
 
-def _noise(problem: Problem, simulate: Callable[[Array], Array], theta: Array) -> float:
-    return prior_weight(problem.channels, simulate(theta[None])[0], problem.settings.objective)
+def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> _Descent | None:
+    """The refinement one step on; None where it has ended."""
+    state, weight = descent.state, descent.weight
+    if state.ending is None:
+
+        def residuals(unit: Array) -> Array:
+            rows = problem.residuals(problem.parameters.from_unit(unit))
+            return _with_priors(problem, rows, unit, weight)
+
+        return replace(descent, state=step(state, residuals, settings))
+    row = state.residual[: problem.measured.size]
+    again = _weight(problem, row)
+    if descent.rounds == ROUNDS or not abs(again - weight) > SETTLED * weight:
+        return None
+    # the next round starts from a row that is known, at no simulation
+    state = start(state.point, _with_priors(problem, row[None], state.point[None], again)[0])
+    return replace(
+        descent,
+        state=replace(state, evaluations=0, cycle_evaluations=0),
+        weight=again,
+        rounds=descent.rounds + 1,
+        evaluations=descent.evaluations + descent.state.evaluations,
+        iterations=descent.iterations + descent.state.iterations,
+    )
 
 
-def _words(result: Refinement, simulated: int) -> str:
-    """A line for the run's log."""
-    cost = f"half the sum of squares {result.cost_before:.6g} to {result.cost_after:.6g}"
-    return f"{cost} in {simulated} simulations; {result.ending.value}"
+def _with_priors(problem: Problem, rows: Array, unit: Array, weight: float) -> Array:
+    """Rows of residuals, (n, R), with the scores of the priors at points of the unit box, (n, p)."""
+    if not len(problem.priors):
+        return rows
+    scores = problem.priors.scores(problem.parameters.from_unit(unit))
+    return np.column_stack([rows, weight * scores])
+
+
+def _weight(problem: Problem, row: Array) -> float:
+    """What a prior's standard deviation counts beside the noise of a residual, shape (R,) [rad]."""
+    if not len(problem.priors):
+        return 0.0
+    return prior_weight(problem.channels, row, problem.settings.objective)

@@ -4,7 +4,7 @@ import hashlib
 import io
 import json
 import logging
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,10 @@ from hydroid.search.algorithm import Population
 PREVIOUS, DAMAGED = "checkpoint.previous.npz", "checkpoint.damaged.npz"
 """names of the checkpoint before the newest, and of a newest one that turned out to be damaged"""
 
+ANOTHER = "is another run's"
+
+Arrays = dict[str, NDArray[Any]]
+
 _log = logging.getLogger(__name__)
 
 
@@ -29,24 +33,17 @@ def write_checkpoint(file: Path, state: SearchState, memo: Memo, run: str) -> No
     Raises:
         RunError: it cannot be written. Both that were there before are as they were.
     """
-    with undisturbed():
-        write_atomic(file, _content(state, memo, run), keep=file.with_name(PREVIOUS))
-
-
-def _content(state: SearchState, memo: Memo, run: str) -> bytes:
     theta, values = memo.arrays()
-    arrays: dict[str, Any] = {
+    arrays = {
         "chromosomes": state.population.chromosomes,
         "objectives": state.population.objectives,
         "history": state.history,
         "memo_theta": theta,
         "memo_values": values,
         "rng": np.frombuffer(json.dumps(state.rng).encode(), dtype=np.uint8),
-        "run": np.frombuffer(run.encode(), dtype=np.uint8),
     }
-    buffer = io.BytesIO()
-    np.savez(buffer, checksum=np.frombuffer(_checksum(arrays), dtype=np.uint8), **arrays)
-    return buffer.getvalue()
+    with undisturbed():
+        write_atomic(file, _content(arrays, run), keep=file.with_name(PREVIOUS))
 
 
 def read_checkpoint(file: Path, run: str) -> Checkpoint | None:
@@ -60,36 +57,123 @@ def read_checkpoint(file: Path, run: str) -> Checkpoint | None:
     """
     previous = file.with_name(PREVIOUS)
     if not file.exists():
-        return _read(previous, run) if previous.exists() else None
+        return _search(previous, run) if previous.exists() else None
     try:
-        return _read(file, run)
+        return _search(file, run)
     except RunError as error:
         if not previous.exists():
             raise
-        earlier = _read(previous, run)
+        earlier = _search(previous, run)
         _log.warning("%s: %s; going on from the checkpoint before it", error.where, error.what)
         file.replace(file.with_name(DAMAGED))
         return earlier
 
 
-def _read(file: Path, run: str) -> Checkpoint:
+class RefinementCheckpoints:
+    """How far the refinements of a run are, by name, in one file.
+
+    A damaged file is put aside with a warning. The refinements are then done again, to the same bits.
+
+    Args:
+        file: is made with the first checkpoint.
+        run: id of the run.
+
+    Raises:
+        RunError: the file is another run's.
+    """
+
+    def __init__(self, file: Path, run: str) -> None:
+        self._file, self._run = file, run
+        self._arrays: Arrays = {}
+        if not file.exists():
+            return
+        try:
+            self._arrays = _read(file, run)
+        except RunError as error:
+            if error.what == ANOTHER:
+                raise
+            _log.warning("%s: %s; its refinements are done again", error.where, error.what)
+            file.replace(file.with_suffix(".damaged.npz"))
+
+    def __call__(self, name: str) -> "RefinementCheckpoint":
+        """Return the checkpoint of one refinement."""
+        return RefinementCheckpoint(self, name)
+
+    def load(self, name: str) -> Arrays | None:
+        """Return what was stored under a name."""
+        found = {n.split("/")[1]: a for n, a in self._arrays.items() if n.split("/")[0] == name}
+        return found or None
+
+    def save(self, name: str, arrays: Arrays) -> None:
+        """Store arrays under a name, in place of what was there.
+
+        Raises:
+            RunError: the file cannot be written.
+        """
+        others = {n: a for n, a in self._arrays.items() if n.split("/")[0] != name}
+        self._arrays = others | {f"{name}/{n}": a for n, a in arrays.items()}
+        with undisturbed():
+            write_atomic(self._file, _content(self._arrays, self._run))
+
+
+@dataclass(frozen=True)
+class RefinementCheckpoint:
+    """The checkpoint of one refinement in the file of all."""
+
+    _all: RefinementCheckpoints
+    _name: str
+
+    def load(self) -> Arrays | None:
+        """Return what was saved last; None where nothing was."""
+        return self._all.load(self._name)
+
+    def save(self, arrays: Arrays) -> None:
+        """Store arrays in place of what was saved before."""
+        self._all.save(self._name, arrays)
+
+
+def _search(file: Path, run: str) -> Checkpoint:
+    arrays = _read(file, run)
     try:
-        with np.load(file, allow_pickle=False) as data:
-            arrays: dict[str, NDArray[Any]] = {name: data[name] for name in data.files}
-        if arrays.pop("checksum").tobytes() != _checksum(arrays):
-            raise ValueError("checksum")
         population = Population(arrays["chromosomes"], arrays["objectives"])
         state = SearchState(population, json.loads(arrays["rng"].tobytes()), arrays["history"])
-        memo, owner = (arrays["memo_theta"], arrays["memo_values"]), arrays["run"].tobytes().decode()
+        return Checkpoint(state, (arrays["memo_theta"], arrays["memo_values"]))
+    except (KeyError, ValueError) as error:
+        raise _damaged(file, error) from None
+
+
+def _content(arrays: Arrays, run: str) -> bytes:
+    arrays = arrays | {"run": np.frombuffer(run.encode(), dtype=np.uint8)}
+    buffer = io.BytesIO()
+    np.savez(buffer, checksum=np.frombuffer(_checksum(arrays), dtype=np.uint8), **arrays)  # pyright: ignore
+    return buffer.getvalue()
+
+
+def _read(file: Path, run: str) -> Arrays:
+    """Read arrays that `_content` made.
+
+    Raises:
+        RunError: the file is damaged, or another run's.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            arrays: Arrays = {name: data[name] for name in data.files}
+        if arrays.pop("checksum").tobytes() != _checksum(arrays):
+            raise ValueError("checksum")
+        owner = arrays.pop("run").tobytes().decode()
     except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
-        hint = "remove the run's checkpoints to begin again from the seed"
-        raise RunError(f"is damaged ({type(error).__name__})", where=str(file), hint=hint) from None
+        raise _damaged(file, error) from None
     if owner != run:
-        raise RunError("is another run's", where=str(file), hint="put the run's own checkpoint back")
-    return Checkpoint(state, memo)
+        raise RunError(ANOTHER, where=str(file), hint="put the run's own checkpoint back")
+    return arrays
 
 
-def _checksum(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+def _damaged(file: Path, error: Exception) -> RunError:
+    hint = "remove the run's checkpoints to begin again from the seed"
+    return RunError(f"is damaged ({type(error).__name__})", where=str(file), hint=hint)
+
+
+def _checksum(arrays: Arrays) -> bytes:
     """Of names, types, shapes and contents: the zip's own CRC is not looked at where a header lies."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):

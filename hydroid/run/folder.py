@@ -16,12 +16,11 @@ from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
-from hydroid.fitting.journal import Journal
 from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.identified import IdentifiedModel, write_settings
 from hydroid.plant import Plant
 from hydroid.problem.problem import Memo, Problem
-from hydroid.run.checkpoint import read_checkpoint, write_checkpoint
+from hydroid.run.checkpoint import RefinementCheckpoints, read_checkpoint, write_checkpoint
 from hydroid.run.identity import (
     file_hash,
     identity,
@@ -145,9 +144,9 @@ class RunFolder:
         """
         return read_checkpoint(self.path / "checkpoint.npz", self._id())
 
-    def journal(self) -> Journal:
-        """What the refinement under way has simulated."""
-        return Journal(self.path / "refinement.journal")
+    def refinements(self) -> RefinementCheckpoints:
+        """How far the run's refinements are, by name."""
+        return RefinementCheckpoints(self.path / "refinement.npz", self._id())
 
     def _id(self) -> str:
         """What tells this run's checkpoints from those of others."""

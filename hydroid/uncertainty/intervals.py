@@ -26,7 +26,7 @@ ZOOMS = 4
 """times that steps are made smaller because the interval ends within the first two"""
 BETTER_BELOW = -0.1
 """deviance below which a profile has found a better optimum, and not only the estimate's rounding"""
-QUICK = RefinementSettings(iterations=20, step_tolerance=1e-10)
+QUICK = RefinementSettings(iterations=50, gain_tolerance=1e-6)
 BOOTSTRAP_STEPS = 4
 """Gauss-Newton steps of a refit"""
 BATCH = 50
@@ -186,7 +186,7 @@ def _fit_others(
         theta = full(np.empty((1, 0)))
         return theta[0], float(np.sum(residuals(theta)[0] ** 2))
     result = least_squares(unit, lambda points: residuals(full(points)), QUICK)
-    return full(result.point[None])[0], 2 * result.cost_after
+    return full(result.point[None])[0], 2 * result.cost
 
 
 def _pseudo_inverse(uncertainty: Uncertainty) -> Array:

@@ -27,10 +27,11 @@ class Fragile(Problem):
         off = np.abs(unit * STEPS - np.round(unit * STEPS)).max(axis=1) > 1e-6
         return (unit[:, 1] > 0.5) | (off & self.grid)
 
-    def residuals(self, theta):
-        rows = super().residuals(theta)
-        rows[self.bad(theta)] = np.nan
-        return rows
+    def responses(self, theta):
+        responses = super().responses(theta)
+        for response in responses:
+            response.angle[self.bad(theta)] = np.nan
+        return responses
 
 
 class Watcher:

@@ -108,7 +108,7 @@ def test_starts_hold_what_is_known():
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise():
-    settings, arm, log = make(**{"search.multistart.step_tolerance": 1e-9})
+    settings, arm, log = make(**{"search.multistart.gain_tolerance": 1e-9})
     problem = Problem(settings, [log])
     watcher = Watcher()
     search = Multistart(problem, settings.search, Memo(problem), watcher.refining)
@@ -152,9 +152,14 @@ def test_a_resumed_run_ends_bit_for_bit_where_it_would_have(tmp_path: Path, simu
     write_log(tmp_path / "log.csv", log, settings.log)
     folder.begin(settings, [tmp_path / "log.csv"])
     with pytest.raises(KeyboardInterrupt):
-        fit(problem, folder.save, Watcher(stop_after=1, simulations=simulations))
+        fit(
+            problem,
+            folder.save,
+            Watcher(stop_after=1, simulations=simulations),
+            refinements=folder.refinements(),
+        )
     watcher = Watcher()
-    again = fit(problem, folder.save, watcher, folder.checkpoint())
+    again = fit(problem, folder.save, watcher, folder.checkpoint(), folder.refinements())
     assert [row[0] for row in watcher.rows] == [2, 3]  # the first start is not repeated
     np.testing.assert_array_equal(again.history, whole.history)
     np.testing.assert_array_equal(again.best.theta, whole.best.theta)

@@ -14,7 +14,8 @@ from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.problem.segments import segment_objectives
 from hydroid.run.folder import RunFolder
-from hydroid.search.least_squares import Ending, Refinement
+from hydroid.fitting.refinement import Refinement
+from hydroid.search.least_squares import Ending
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -107,7 +108,7 @@ def make_fit(
     evaluations = np.arange(1, 8) * 20.0
     best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
     history = np.column_stack([np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5])
-    refined = Refinement(np.full(free, 0.5), 1.0, 0.1, 40, 5, Ending.STEP) if "refined" in names else None
+    refined = Refinement(np.full(free, 0.5), 1.0, 0.1, 40, 5, Ending.GAIN)
     return Fit(
         estimates,
         final,
@@ -116,7 +117,7 @@ def make_fit(
             Evaluation(segments, segments.max(axis=1, initial=0)),
         ),
         history,
-        refined,
+        {"refined": refined} if "refined" in names else {},
         uncertain,
         identifiability(problem, uncertain),
     )

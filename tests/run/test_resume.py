@@ -55,7 +55,7 @@ def content(folder: Path) -> dict[str, bytes]:
 def test_killed_runs_end_the_same(tmp_path: Path):
     options = [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"]
     finish(start(tmp_path, *options, out="whole"))
-    for met in ("run.json", "checkpoint.npz", "refinement.journal"):
+    for met in ("run.json", "checkpoint.npz", "refinement.npz"):
         process = start(tmp_path, *options, out="killed")
         wait_for(process, tmp_path / "killed" / met)
         time.sleep(0.02)

@@ -2,10 +2,10 @@
 
     python benchmarks/kill_resume.py --kills 100 --seed 1
 
-Five kinds of run: simple GA, NSGA-II, the refinement (with `refine`), multi-start least squares, and a study of
+Five kinds of run: simple GA, NSGA-II, the joint refinement, multi-start least squares, and a study of
 several seeds. Every run is killed (SIGKILL) twice before it may end, so that resumed runs are killed as well.
 Half of the moments are drawn from the time that the run takes, the earlier the likelier; the others follow
-files: the appearance of a checkpoint's, or any file's, temporary twin, or the growth of the refinement's checkpoint.
+files: the temporary twin of a checkpoint or of any file appears, or the refinement's checkpoint grows.
 What a kill has met is read from what it left. All files are compared, but for the log, the lock and the last
 checkpoint but one.
 

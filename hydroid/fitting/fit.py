@@ -179,7 +179,12 @@ def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Esti
     overall, rms = overall_objective(errors, problem.measured, objective), problem.rms(errors)
     return {
         name: Estimate(
-            name, theta[i], segments[i], float(overall[i]), float(rms[i]), tuple(r.angle[i] for r in responses)
+            name,
+            theta[i],
+            segments[i],
+            float(overall[i]),
+            float(rms[i]),
+            tuple(r.angle[i] for r in responses),
         )
         for i, name in enumerate(candidates)
     }

@@ -16,13 +16,12 @@ the box, D the lengths of J's columns, with Nielsen's rule for the damping λ. W
 - Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual along
   the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved valleys of
   problems whose parameters compensate each other.
-- A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `_derivatives`.
+- A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `derivatives`.
 - Where no step helps, the Jacobian is taken over wider differences: a joint that meets its stop makes small
   jumps in the response, and narrow differences see nothing but the jumps.
 - A candidate whose simulation fails is a step that does not help.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from typing import Any
@@ -30,19 +29,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.search.box import box_least_squares
+from hydroid.search.derivatives import Residuals, derivatives
+from hydroid.search.linear_model import LinearModel
 from hydroid.settings.search import RefinementSettings
 
 Float = NDArray[np.float64]
-Residuals = Callable[[Float], Float]
-"""points of the unit box (n, p) -> residuals (n, R); a row that is not finite is a failed candidate"""
 
 WIDTHS = (2.0**-26, 2.0**-20, 2.0**-14)
 """finite differences in the unit box: the root of the rounding unit, and wider where that leads nowhere"""
-WIDER = 2.0**10
-"""how much wider the step is that tells a weak effect from rounding noise"""
-SUSPECT = 1e-3
-"""a column this much shorter than the longest one may be noise, and is taken twice"""
 DAMPING = 1e-3
 """λ at the start, and after the differences became wider"""
 UNDAMPED = 1e-14
@@ -112,6 +106,11 @@ class State:
     iterations: int
     ending: Ending | None
 
+    @property
+    def converged(self) -> bool:
+        """Whether it has ended at an optimum."""
+        return self.ending is not None and self.ending.converged
+
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the state as arrays by name, to be stored."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -120,7 +119,9 @@ class State:
     @staticmethod
     def from_arrays(arrays: dict[str, NDArray[Any]]) -> "State":
         """Return the state that `arrays` stored."""
-        values = {f.name: arrays[f.name] if arrays[f.name].ndim else arrays[f.name].item() for f in fields(State)}
+        values = {
+            f.name: arrays[f.name] if arrays[f.name].ndim else arrays[f.name].item() for f in fields(State)
+        }
         return State(**values | {"ending": Ending[values["ending"]] if values["ending"] else None})
 
 
@@ -163,13 +164,17 @@ def step(state: State, residuals: Residuals, settings: RefinementSettings) -> St
     if state.ending is not None:
         return state
     count = _Counter(residuals)
-    after = _differentiate(state, count, settings) if not len(state.jacobian) else _advance(state, count, settings)
+    after = (
+        _differentiate(state, count, settings)
+        if not len(state.jacobian)
+        else _advance(state, count, settings)
+    )
     return replace(after, evaluations=state.evaluations + count.evaluations)
 
 
 def _differentiate(state: State, residuals: Residuals, settings: RefinementSettings) -> State:
     """Take the Jacobian; end where it promises no gain."""
-    columns = _derivatives(residuals, state.point, state.residual, WIDTHS[state.width])
+    columns = derivatives(residuals, state.point, state.residual, WIDTHS[state.width])
     if not np.isfinite(columns).all():
         return replace(state, ending=Ending.JACOBIAN_FAILED)
     after = replace(
@@ -179,7 +184,7 @@ def _differentiate(state: State, residuals: Residuals, settings: RefinementSetti
         cycle_cost=state.cost,
         cycle_evaluations=state.evaluations,
     )
-    model = _Model(after)
+    model = _model(after)
     if model.gain(model.step(UNDAMPED)) <= settings.gain_tolerance * state.cost:
         return replace(after, ending=Ending.GAIN)
     return after
@@ -187,7 +192,7 @@ def _differentiate(state: State, residuals: Residuals, settings: RefinementSetti
 
 def _advance(state: State, residuals: "_Counter", settings: RefinementSettings) -> State:
     """Try a step, or two; take the better one if it helps."""
-    model = _Model(state)
+    model = _model(state)
     steps = [model.step(state.damping)]
     promised = model.gain(steps[0])
     if state.fresh and np.linalg.norm(steps[0]) > SHORTEST:
@@ -243,7 +248,7 @@ def _updated(state: State, point: Float, row: Float) -> Float:
     return state.jacobian + np.outer((row - state.residual - state.jacobian @ move) / (scaled @ move), scaled)
 
 
-def _damped(state: State, model: "_Model", settings: RefinementSettings) -> State:
+def _damped(state: State, model: LinearModel, settings: RefinementSettings) -> State:
     """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
     if not state.fresh:
         return replace(state, jacobian=np.empty((0, state.point.size)))
@@ -263,46 +268,11 @@ def _no_step(state: State) -> State:
     return replace(state, ending=Ending.NO_IMPROVEMENT)
 
 
-class _Model:
-    """The linear model of the residual around a state, in the coordinates of the parameters with effect."""
-
-    def __init__(self, state: State) -> None:
-        self._point, self.residual, self.jacobian = state.point, state.residual, state.jacobian
-        length = np.linalg.norm(state.jacobian, axis=0)
-        self._moving = np.flatnonzero(length > 0)
-        self._scale = length[self._moving]
-        self._triangle, self._right = self.reduced(state.residual)
-
-    def reduced(self, row: Float) -> tuple[Float, Float]:
-        """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
-        p = len(self._moving)
-        both = np.linalg.qr(np.column_stack([self.jacobian[:, self._moving], row]), mode="r")
-        return both[:p, :p], both[:p, p]
-
-    def step(self, damping: float, row: Float | None = None) -> Float:
-        """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
-        triangle, right = (self._triangle, self._right) if row is None else self.reduced(row)
-        matrix = np.vstack([triangle, np.sqrt(damping) * np.diag(self._scale)])
-        there = self._point[self._moving]
-        return box_least_squares(matrix, np.append(right, np.zeros(there.size)), -there, 1 - there)
-
-    def gain(self, s: Float) -> float:
-        """Part of the cost that the linear model promises to save by a step."""
-        after = self._right + self._triangle @ s
-        return 0.5 * float(self._right @ self._right - after @ after)
-
-    def reach(self, s: Float) -> Float:
-        """Return the point of the box that a step leads to, shape (p,)."""
-        point = self._point.copy()
-        point[self._moving] = np.clip(point[self._moving] + s, 0.0, 1.0)
-        return point
-
-    def length(self, s: Float) -> float:
-        """Length of a step, scaled."""
-        return float(np.linalg.norm(self._scale * s))
+def _model(state: State) -> LinearModel:
+    return LinearModel(state.point, state.residual, state.jacobian)
 
 
-def _corrected(model: _Model, s: Float, damping: float, residuals: Residuals) -> list[Float]:
+def _corrected(model: LinearModel, s: Float, damping: float, residuals: Residuals) -> list[Float]:
     """The same step corrected for the curvature along it; none where that cannot be measured."""
     origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
     slope = (residuals(probe[None])[0] - model.residual) / PROBE
@@ -329,37 +299,3 @@ def _costs(rows: Float) -> Float:
     with np.errstate(over="ignore", invalid="ignore"):
         costs = 0.5 * np.sum(rows**2, axis=1)
     return np.where(np.isfinite(costs), costs, np.inf)
-
-
-def _derivatives(residuals: Residuals, point: Float, row: Float, width: float) -> Float:
-    """Derivatives in each parameter by finite differences, shape (p, R): 0 without effect.
-
-    All differences are one batch, towards the wider half of the box. Those that fail are taken to the other
-    side in a second batch; where that fails too, or a bound is there, they are not finite.
-    """
-    h = width * np.where(point > 0.5, -1.0, 1.0)
-    columns = _quotients(residuals, point, row, h, np.ones(point.size, dtype=bool))
-    failed = ~np.isfinite(columns).all(axis=1)
-    if failed.any():
-        columns[failed] = _quotients(residuals, point, row, -h, failed)
-    length = np.linalg.norm(columns, axis=1)
-    suspect = (length > 0) & (length < SUSPECT * length.max())
-    if suspect.any():
-        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
-        wider = np.linalg.norm(_quotients(residuals, point, row, WIDER * h, suspect), axis=1)
-        suspect[suspect] = wider < 0.1 * length[suspect]
-        columns[suspect] = 0.0
-    return columns
-
-
-def _quotients(residuals: Residuals, point: Float, row: Float, h: Float, which: NDArray[np.bool_]) -> Float:
-    """Difference quotients of the parameters `which`, shape (their number, R); nan beyond a bound."""
-    points = (point + np.diag(h))[which]
-    inside = np.all((points >= 0) & (points <= 1), axis=1)
-    quotients = np.full((len(points), row.size), np.nan)
-    if inside.any():
-        rows = residuals(points[inside])
-        taken = (points - point).sum(axis=1)[inside, None]
-        with np.errstate(invalid="ignore", over="ignore"):
-            quotients[inside] = (rows - row) / taken
-    return quotients

@@ -7,7 +7,12 @@ from pydantic import BaseModel
 LONGEST = 60
 """characters of a value in a message"""
 
-RENAMED = {"polish": "refinement", "refine": "joint_refinement", "known": "priors"}
+RENAMED = {
+    "polish": "refinement",
+    "refine": "joint_refinement",
+    "known": "priors",
+    "step_tolerance": "gain_tolerance",
+}
 """settings of earlier versions, and what they are called now"""
 
 _PLAIN = {

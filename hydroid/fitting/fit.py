@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import NoCheckpoint, Refinement, refine
 from hydroid.fitting.refinement import Checkpoint as RefinementCheckpoint
+from hydroid.fitting.refinement import NoCheckpoint, Refinement, refine
 from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.norms import overall_objective

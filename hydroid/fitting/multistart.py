@@ -1,10 +1,10 @@
 """Multi-start least squares: from random starts, each over a growing part of the record.
 
 From far off, the response over a whole record says nothing to a local method: it runs to the joints' stops,
-and there no parameter has an effect. Over the first seconds it cannot get that far. A start is therefore fitted
-to the first quarter of a second, to the first seconds, and then to all of it (a *progressive horizon*). Each
-fit keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, all of 30
-starts reached the noise this way; one in eight of those fitted to the whole record at once ended at the stops.
+where no parameter has an effect. Over the first seconds it cannot get that far. A start is therefore fitted to
+the first quarter of a second, to the first seconds, and then to all of it (a *progressive horizon*). Each fit
+keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30 starts
+reached the noise this way. One in eight of those fitted to the whole record at once ended at the stops.
 """
 
 from collections.abc import Callable
@@ -21,13 +21,13 @@ from hydroid.settings.search import RefinementSettings, SearchSettings
 WIDE = 10.0
 """bounds of a larger ratio than this are searched by the logarithm: a start is as likely in each decade"""
 DRAWS = 16
-"""candidates drawn for a start; of the hydraulics' parameters, more than half may have no force-stroke curve"""
+"""candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
 
 
 class Multistart:
     """Least squares from one random start after the other.
 
-    The state is that of a search by populations. Its candidates are the points that the starts reached, and its
+    The state is that of a search by populations. Its candidates are the points that the starts reached; its
     objective is their rms residual, priors included. A start depends on the seed and its number alone.
 
     Args:

@@ -7,14 +7,15 @@
 A state is a frozen record of numbers and arrays; `step` is a pure function of it. So a state is also the
 checkpoint: a run that continues from a stored state ends with the same bits.
 
-One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and ends
-where the linear model promises no gain. *With one* it tries a step s that minimises |r + J s|² + λ |D s|² inside
-the box, D the lengths of J's columns, with Nielsen's rule for the damping λ. What differs from a textbook:
+One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
+ends where the linear model promises no gain. *With one* it tries a step s that minimises
+|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ. What
+differs from a textbook:
 
 - A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
-  long as the updated one lowers the logarithm of the cost by as much per simulation as the Jacobian before did.
-- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual along
-  the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved valleys of
+  long as the updated one lowers the logarithm of the cost by as much per simulation as the one before did.
+- Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual
+  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved valleys of
   problems whose parameters compensate each other.
 - A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `derivatives`.
 - Where no step helps, the Jacobian is taken over wider differences: a joint that meets its stop makes small

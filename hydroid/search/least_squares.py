@@ -9,8 +9,8 @@ checkpoint: a run that continues from a stored state ends with the same bits.
 
 One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
 ends where the linear model promises no gain. *With one* it tries a step s that minimises
-|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ. What
-differs from a textbook:
+|r + J s|² + λ |D s|² inside the box, D the lengths of J's columns, with Nielsen's rule for the damping λ.
+What differs from a textbook:
 
 - A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
   long as the updated one lowers the logarithm of the cost by as much per simulation as the one before did.

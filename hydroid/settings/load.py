@@ -102,7 +102,9 @@ def validate(
         loc = tuple(str(part) for part in first["loc"])
         more = f"{len(others)} more fault{'s' if len(others) > 1 else ''}"
         what, hint = explain(".".join(loc), first, kind), f"and {more} in this file" if others else ""
-        raise SettingsError(what, where=_where(loc, source, lines, overridden), hint=hint) from None
+        where = _where(loc, source, lines, overridden)
+        what = what.removeprefix(f"{where.removeprefix('--set ')}: ")  # the override is named already
+        raise SettingsError(what, where=where, hint=hint) from None
 
 
 def _where(

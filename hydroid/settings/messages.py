@@ -1,5 +1,6 @@
 """Messages for faults that pydantic finds in settings."""
 
+import difflib
 from typing import Any
 
 from pydantic import BaseModel
@@ -34,23 +35,30 @@ def explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
     """Return what is wrong with the setting `key`, a clause.
 
     Args:
-        key: dotted.
+        key: dotted; empty where the settings as a whole are at fault.
         fault: one of pydantic's `ValidationError.errors()`.
         kind: the settings class that was asked for.
     """
     if fault["type"] == "extra_forbidden":
-        if new := RENAMED.get(str(fault["loc"][-1])):
+        name = str(fault["loc"][-1])
+        if new := RENAMED.get(name):
             return f"unknown setting {shown(key)}; it is now called {new!r}"
         allowed = _allowed(kind, fault["loc"][:-1])
-        return f"unknown setting {shown(key)}" + (f"; allowed here: {allowed}" if allowed else "")
+        near = difflib.get_close_matches(name, allowed, n=1)
+        choice = f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(allowed)}"
+        return f"unknown setting {shown(key)}" + (f"; {choice}" if allowed else "")
     if fault["type"] == "missing":
         return f"setting {key!r} is missing"
-    return f"{shown(key)[1:-1] or 'settings'}: {_problem(fault)} (given: {shown(fault['input'])})"
+    problem = f"{shown(key)[1:-1]}: {_problem(fault)}" if key else _problem(fault)
+    return problem if isinstance(fault["input"], dict) else f"{problem} (given: {shown(fault['input'])})"
 
 
 def shown(value: object) -> str:
-    """Return a value as Python writes it, cut where it is long."""
-    text = repr(value)
+    """Return a value as YAML writes it, shortened where it is long."""
+    words = {True: "true", False: "false"} if isinstance(value, bool) else {None: "null"}
+    text = words[value] if value is None or isinstance(value, bool) else repr(value)
+    if isinstance(value, tuple):
+        text = f"[{', '.join(map(shown, value))}]"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
 
 
@@ -71,12 +79,12 @@ def _problem(fault: Any) -> str:
     return message[:1].lower() + message[1:]
 
 
-def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> str:
+def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
     """Names of the settings at `loc`, if the path can be followed through nested classes."""
     for part in loc:
         field = kind.model_fields.get(str(part))
         inner = field.annotation if field else None
         if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
-            return ""
+            return []
         kind = inner
-    return ", ".join(kind.model_fields)
+    return list(kind.model_fields)

@@ -49,7 +49,7 @@ def test_overrides_replace_one_setting(tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (MINIMAL + "sarch: {}\n", ["line 7", "unknown setting 'sarch'", "search"]),
+        (MINIMAL + "sarch: {}\n", ["line 7", "unknown setting 'sarch'; did you mean 'search'?"]),
         (MINIMAL.replace("link1", "2"), ["line 5", "parameters.M1.link"]),
         (MINIMAL.replace("[1, 2]", "[2, 1]"), ["line 3", "lower < upper"]),
         (MINIMAL.replace("bounds: [1, 2]", "x: 1"), ["unknown setting 'parameters.M1.x'"]),
@@ -93,17 +93,17 @@ def test_a_malformed_override_is_refused(text: str):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("search: {seed: true}\n", "search.seed: must be a whole number (given: True)"),
+        ("search: {seed: true}\n", "search.seed: must be a whole number (given: true)"),
         ("search: {seed: 2.0}\n", "search.seed: must be a whole number (given: 2.0)"),
         ("search: {seed: '3'}\n", "search.seed: must be a whole number (given: '3')"),
-        ("log: {delay_s: false}\n", "log.delay_s: must be a number (given: False)"),
+        ("log: {delay_s: false}\n", "log.delay_s: must be a number (given: false)"),
         ("log: {delay_s: '0.1'}\n", "log.delay_s: must be a number (given: '0.1')"),
         ("joint_refinement: 1\n", "joint_refinement: must be true or false (given: 1)"),
         ("joint_refinement: yes\n", "joint_refinement: must be true or false (given: 'yes')"),
         ("outputs: 2\n", "outputs: must be a list in brackets"),
-        ("outputs: [true]\n", "outputs.0: must be a whole number (given: True)"),
-        ("objective: {weights: {true: 1}}\n", "must be a whole number (given: True)"),
-        ("objective: {norm: true}\n", "objective.norm: must be 1, 2 or 'inf' (given: True)"),
+        ("outputs: [true]\n", "outputs.0: must be a whole number (given: true)"),
+        ("objective: {weights: {true: 1}}\n", "must be a whole number (given: true)"),
+        ("objective: {norm: true}\n", "objective.norm: must be 1, 2 or 'inf' (given: true)"),
     ],
 )
 def test_values_of_another_type_are_refused(tmp_path: Path, text: str, says: str):

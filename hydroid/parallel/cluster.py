@@ -33,7 +33,7 @@ CONNECT = 20.0
 """seconds in which a scheduler must answer"""
 PEM = ["tls_ca_file", *(f"tls_{r}_{k}" for r in ("scheduler", "worker", "client") for k in ("cert", "key"))]
 """attributes of Dask's credentials"""
-CLOSED = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+CLOSED: dict[str, list[str]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 """Dask's configuration for what is started here: its HTTP servers have no TLS, and serve nothing"""
 
 
@@ -88,21 +88,24 @@ def write_credentials(folder: Path) -> None:
     Raises:
         FileExistsError: the folder is there already.
     """
-    from distributed.security import Security
-
-    security = Security.temporary()
+    security = _new_credentials()
     configs = {role: security.get_tls_config_for_role(role) for role in ("scheduler", "worker", "client")}
     tls: dict[str, Any] = {role: {key: c[key] for key in ("cert", "key")} for role, c in configs.items()}
     tls["ca-file"] = configs["client"]["ca_file"]
-    closed = {name: {"http": {"routes": []}} for name in ("scheduler", "worker")}
+    closed: dict[str, Any] = {name: {"http": {"routes": []}} for name in ("scheduler", "worker")}
     comm = {"default-scheme": "tls", "require-encryption": True, "tls": tls}
     folder.mkdir(mode=0o700)
     (folder / "distributed.yaml").write_text(yaml.safe_dump({"distributed": {"comm": comm} | closed}))
 
 
+def _new_credentials() -> Any:
+    from distributed.security import Security
+
+    return Security.temporary()  # pyright: ignore[reportUnknownMemberType]
+
+
 def _start_local(stack: ExitStack, count: int) -> Any:
     from distributed import LocalCluster
-    from distributed.security import Security
 
     with _signals_blocked(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the port of the HTTP server that serves nothing
@@ -111,7 +114,7 @@ def _start_local(stack: ExitStack, count: int) -> Any:
             threads_per_worker=1,
             memory_limit=0,  # unlimited
             host="127.0.0.1",
-            security=Security.temporary(),
+            security=_new_credentials(),
             dashboard_address=None,  # pyright: ignore[reportArgumentType]  # documented: none
             silence_logs=logging.CRITICAL,
         )
@@ -141,7 +144,7 @@ def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
 
     folder = tempfile.mkdtemp(prefix=".hydroid-dask-", dir=Path.cwd())  # only this user can read it
     stack.callback(shutil.rmtree, folder, ignore_errors=True)
-    credentials, files = Security.temporary(), {name: f"{folder}/{name}.pem" for name in PEM}
+    credentials, files = _new_credentials(), {name: f"{folder}/{name}.pem" for name in PEM}
     for name, file in files.items():
         Path(file).write_text(getattr(credentials, name))
     cluster: Any = SLURMCluster(

@@ -84,7 +84,7 @@ class DaskWorkers:
 
     def _map(self, target: object, method: str, chunks: Sequence[Float]) -> list[Float | None]:
         """Results in the chunks' order; None for a chunk that Dask has given up."""
-        from distributed import wait
+        import distributed
         from distributed.scheduler import KilledWorker
 
         where: Any = list(self.client.nthreads()) or None
@@ -104,7 +104,7 @@ class DaskWorkers:
         try:
             while True:
                 with suppress(TimeoutError):
-                    wait(futures, timeout=LOOK)
+                    distributed.wait(futures, timeout=LOOK)  # pyright: ignore[reportUnknownMemberType]
                     break
                 if self.client.status in ("closing", "closed"):
                     raise ConnectionError("no answer")

@@ -33,6 +33,7 @@ demo: setup  ## both stages on one log of the virtual rig, and the other log to 
 bench: setup  ## the time to an answer, what a simulation costs, and what hydroid adds to it (docs/measured.md)
 	$(BIN)/python benchmarks/answer.py
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/plant.py
 	$(BIN)/python benchmarks/scaling.py
 
 structure: setup  ## size and shape of the code

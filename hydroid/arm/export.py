@@ -12,10 +12,11 @@ from hydroid.files import write_atomic
 FITTED, MECHANICS, ACTUATORS, README = "fitted.xml", "mechanics.xml", "actuators.yaml", "README.txt"
 
 _MECHANICAL_README = """\
-fitted.xml is the fitted arm for MuJoCo alone. Set ctrl to the commands [%], call mj_step once per {timestep:g} s:
-it moves as the fit does, within 1e-6 rad.
-It holds for the keyframe `start`, the pose in which {joints} began. Other joints are fused in that pose, springs are
-slack there, and each motor adds the constant torque that balances gravity there. For another pose use hydroid:
+fitted.xml is the fitted arm for MuJoCo alone. Set ctrl to the commands [%] and call mj_step once per
+{timestep:g} s: it moves as the fit does, within 1e-6 rad.
+It holds for one start pose, the keyframe `start`, and moves {joints}. Other joints are fused in that
+pose, springs are slack there, and each motor adds the constant torque that balances gravity there.
+For another pose use hydroid:
 
     plant = hydroid.load_plant(FOLDER)      # the folder that holds model/
     plant.reset(pose)                       # plant.save(OTHER) writes fitted.xml for this pose
@@ -30,9 +31,9 @@ MuJoCo alone cannot step this arm: the fit has hydraulics, and MuJoCo has none. 
     plant.reset(pose)
     q = plant.step(command)                 # plant.model and plant.data are MuJoCo's
 
-mechanics.xml is the fitted arm without its hydraulics: masses, dampers and springs, and no motors. The keyframe
-`start` is the pose in which {joints} began; other joints are fused in that pose. Commands do not move it.
-actuators.yaml lists the parameters of the hydraulics of each joint. arm.xml is the arm before the fit.
+mechanics.xml is the fitted arm without its hydraulics: masses, dampers and springs, and no motors. Its
+moving joints are {joints}; the others are fused in the start pose, which is the keyframe `start`.
+actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm before the fit.
 """
 
 

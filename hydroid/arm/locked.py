@@ -197,7 +197,7 @@ def _skeleton(fusion: Fusion) -> mujoco.MjModel:
     for option in _OPTIONS:
         setattr(model.opt, option, getattr(full.opt, option))
     disable = mujoco.mjtDisableBit
-    # what the skeleton has not got costs a tenth of a step to look for; a diverged candidate must stay diverged
+    # looking for what the skeleton lacks takes a tenth of a step; a diverged candidate must stay diverged
     idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
     chosen = [full.joint(name).id for name in fusion.joints]

@@ -1,4 +1,4 @@
-"""An arm with locked joints as an MJCF of its own, with its looks: what a plant steps and shows, and what is exported.
+"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows, and what is exported.
 
 The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them. Shapes, sites,
 cameras and lights of a fused body hang on the body that carries it; contacts are off, as in every simulation.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hydroid.arm.quiet import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
-from hydroid.hydraulics.records import has_force_curve
+from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
@@ -145,7 +145,7 @@ class HydraulicSimulation:
         arm.start(start.values, row, pose)
         angle = np.full((1 + samples, len(pose)), np.nan)
         state = start.state.joints[row]
-        seen = np.zeros((1 + samples if observe else 1, len(state)), state.dtype)
+        seen = np.zeros((1 + samples if observe else 1, len(state)), JOINT_STATE)
         angle[0], seen[0] = pose, state
         commands = np.concatenate([start.state.commands[1:], self._command])
         arm.attach(start.actuator, state, row)

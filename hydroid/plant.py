@@ -5,9 +5,9 @@
     while plant.time < 10:
         q = plant.step(controller(q))
 
-It gives, bit for bit, what the simulations of a fit give. `model` and `data` are MuJoCo's: contact forces apart,
-whatever acts on them (`xfrc_applied`, a changed `qpos`) acts on the plant; `qfrc_applied` is the plant's own.
-Between two steps use `mj_kinematics` to refresh positions of bodies.
+It gives, bit for bit, what the simulations of a fit give; contacts are off as there. `model` and `data` are
+MuJoCo's: what acts on them (`xfrc_applied`, a changed `qpos`) acts on the plant; `qfrc_applied` is the plant's
+own. Between two steps use `mj_kinematics` to refresh the positions of bodies.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,21 +45,21 @@ class Plant:
 
     Args:
         identified: settings and parameters.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared. With
-            `other_joints: passive` in the settings all others move under their springs and dampers; otherwise
-            they are locked where `reset` puts them.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
+            With `other_joints: passive` in the settings all others move under their springs and dampers;
+            otherwise they are locked where `reset` puts them.
         period: how long one command is held [s], a multiple of MuJoCo's step; by default the logs' period.
         payload: mass in the gripper [kg].
 
     Attributes:
         joints: those that take commands.
-        model: the arm in MuJoCo, with one motor per moving joint whose `ctrl` holds the command; locked joints
-            are fused. `reset` to a pose with other angles of locked joints replaces it.
+        model: the arm in MuJoCo, with one motor per moving joint, whose `ctrl` holds the command. Locked
+            joints are fused; `reset` to a pose with other angles of locked joints replaces model and data.
         data: its state.
 
     Raises:
-        SettingsError: a joint that does not exist, a period that is no multiple, a payload without a place, or
-            parameters without a force-stroke curve.
+        SettingsError: a joint that does not exist, a period that is no multiple, a payload without a place,
+            or parameters without a force-stroke curve.
     """
 
     model: mujoco.MjModel
@@ -140,7 +140,8 @@ class Plant:
         """Put the arm at rest, in static balance, its springs slack.
 
         Args:
-            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by default the settings' start pose.
+            pose: a pose of the arm's file, or joint angles [rad], shape (J,); by default the settings' start
+                pose.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -291,9 +292,9 @@ def load_plant(
     """Read a plant.
 
     Args:
-        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a shipped
-            name such as "fit-hyd", whose parameters are then nominal: as the hydraulics and the arm's file have
-            them.
+        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a
+            shipped name such as "article-hyd". Parameters that these do not fix are then nominal: as the
+            hydraulics and the arm's file have them, and 0 for dampers and springs.
         overrides: settings to replace, by dotted key.
         joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
         period: how long one command is held [s].

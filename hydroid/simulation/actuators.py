@@ -1,4 +1,4 @@
-"""The actuators of one arm, whatever the candidate: which joints have them, and where they meet MuJoCo's model."""
+"""The actuators of one arm, whatever the candidate: which joints have them, where they meet MuJoCo's model."""
 
 import mujoco
 import numpy as np

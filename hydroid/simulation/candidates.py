@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 class Candidates:
     """Physical values of n candidates; J joints and L links in the arm's order.
 
-    gain [N·m/%], damping [N·m·s/rad], stiffness [N·m/rad], friction [N·m]: shape (n, J). mass [kg]: shape (n, L).
-    actuators: in stage 2, of all J joints.
+    gain [N·m/%], damping [N·m·s/rad], stiffness [N·m/rad], friction [N·m]: shape (n, J).
+    mass [kg]: shape (n, L). actuators: in stage 2, of all J joints.
     """
 
     gain: Array

@@ -1,8 +1,8 @@
 """Stage 1: the hydraulics as a gain, tau = K u + tau0 on every driven joint (article section 3).
 
 The whole population is stepped by `mujoco.batch`. Every candidate starts at rest in the log's first pose, in
-static balance with gravity: its springs are slack there, and a constant torque tau0 = g(q0), computed anew for
-every candidate, holds it.
+static balance with gravity: its springs are slack there, and a constant torque tau0 = g(q0), computed for
+each candidate, holds it.
 """
 
 from typing import Any

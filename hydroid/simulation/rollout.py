@@ -92,14 +92,14 @@ class HydraulicArm(SingleArm):
         return balance
 
     def attach(self, actuator: Actuator, state: NDArray[np.void], row: int) -> None:
-        """Take the actuators of one candidate of a population; `state`, (J,) of JOINT_STATE, changes with each step."""
+        """Take the actuators of one candidate of a population; steps change `state`, (J,) of JOINT_STATE."""
         self._plugin, self._state, self._row = actuator.plugin, state, row
 
     def roll(self, commands: Array, angle: Array, seen: NDArray[np.void], servo: Array) -> None:
         """Step the arm, up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
 
         Args:
-            commands: held during each of T steps [%], after those before the start, shape (past + T steps, J).
+            commands: held during each step [%], after those before the start, shape (past + T steps, J).
             angle: receives the angles after each of T samples [rad], shape (T, V).
             seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
             servo: torque of the joints that follow a log at each step [N·m], shape (T steps, P).

@@ -1,4 +1,4 @@
-"""What is simulated of one log: which joints move, from where, under which commands; and how chunks are made."""
+"""What is simulated of one log: which joints move, from where, under which commands."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""The plant is the simulation of a fit, one command at a time, bit for bit; and it can be saved and taken elsewhere."""
+"""The plant is the simulation of a fit, one command at a time, bit for bit; it can be saved and exported."""
 
 from pathlib import Path
 

@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.estimate import read_values
-from hydroid.experiment.commands import Draw, pose_limits
-from hydroid.experiment.design import design, start_poses
-from hydroid.experiment.information import statement_information
+from hydroid.experiment.commands import Draw
+from hydroid.experiment.design import design
+from hydroid.experiment.information import prior_information
 from hydroid.experiment.trial import Bench, violation
 from hydroid.fitting.refinement import refine
 from hydroid.jobs import load_settings
@@ -60,16 +60,13 @@ def make_settings(values: dict, arguments: argparse.Namespace):
     return settings, settings.arm
 
 
-def random_experiments(arm, settings, bench: Bench, count: int) -> list:
+def random_experiments(settings, bench: Bench, count: int) -> list:
     """Single draws that drive all joints and keep the limits at the estimate."""
-    how, rng = settings.design, np.random.default_rng(SEED + 1)
-    low, high = pose_limits(arm, np.radians(how.margin_deg))
-    joints = [j - 1 for j in settings.outputs]
-    draw = Draw(how, joints, start_poses(settings), low, high, settings.log.period_s, rng)
+    draw = Draw(settings, np.random.default_rng(SEED + 1))
     found = []
     while len(found) < count:
         experiment = draw.new()
-        if len(experiment.inputs) == len(joints) and (kept := bench.kept(experiment)) is not None:
+        if len(experiment.inputs) == len(settings.outputs) and (kept := bench.kept(experiment)) is not None:
             found.append(kept[0])
     return found
 
@@ -108,12 +105,12 @@ def main() -> None:
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
     period, samples = settings.log.period_s, len(found.best.angle)
     blind, seeing = (Bench(settings, theta, period, samples) for theta in (estimate, truth))
-    randoms = random_experiments(arm, settings, blind, arguments.random)
+    randoms = random_experiments(settings, blind, arguments.random)
     stage = Problem(settings, [found.log])
-    known = statement_information(stage.priors, stage.parameters, truth)
+    known = prior_information(stage.priors, stage.parameters, truth)
 
     def predicted(experiment) -> np.ndarray:
-        told = seeing.told(experiment)
+        told = seeing.information(experiment)
         return np.sqrt(np.diag(np.linalg.inv(known + told)))
 
     designed = predicted(found.best.experiment)

@@ -3,11 +3,11 @@
     python benchmarks/interval_coverage.py [--logs 200] [--seconds 20] [--noisy-start]
 
 Shoulder and elbow are driven and measured, the other joints locked; K, D, S (shared by both), M2 and M6 are
-free, M1, M3, M4 and M5 held as if weighed: from these angles all five are determined. The noise of 0.1 deg is
-white, or a first-order autoregression with a correlation time of 0.15 s; each fit estimates it from its own
-residual. The refinement starts at the truth times random factors within 5 %: this is a study of the intervals,
-not of the search. The first sample is the start pose and has no noise, unless --noisy-start. The Cramér-Rao
-bound is that of the true noise at the true parameters.
+free, M1, M3, M4 and M5 held as if weighed: from these angles all five are determined. The noise of 0.1 deg
+is white, or a first-order autoregression with a correlation time of 0.15 s; each fit estimates it from its
+own residual. The refinement starts at the truth times random factors within 5 %: this is a study of the
+intervals, not of the search. The first sample is the start pose and has no noise, unless --noisy-start. The
+Cramér-Rao bound is that of the true noise at the true parameters.
 """
 
 import argparse

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.experiment.design import Tell, design
+from hydroid.experiment.design import design
 from hydroid.identified import IdentifiedModel, load_identified
 from hydroid.jobs import read_logs
 from hydroid.log import Warn, write_log
 from hydroid.problem.problem import Problem
+from hydroid.progress import Progress
 from hydroid.report.page import write_page
 from hydroid.report.study_reports import design_page, sensitivity_page, surface_page
 from hydroid.report.table import Table
@@ -34,7 +35,7 @@ def load_subject(
 
 
 def study_sensitivity(
-    subject: IdentifiedModel, logs: Sequence[Path], out: Path, warn: Warn, tell: Tell
+    subject: IdentifiedModel, logs: Sequence[Path], out: Path, warn: Warn, tell: Progress
 ) -> Table:
     """Write how every output depends on every free parameter against time (article, figure 10).
 
@@ -55,7 +56,7 @@ def study_surface(
     points: int,
     around: float | None,
     warn: Warn,
-    tell: Tell,
+    tell: Progress,
 ) -> Table:
     """Write the error over pairs of parameters (article, figure 11).
 
@@ -85,7 +86,7 @@ def study_surface(
 
 
 def study_design(
-    subject: IdentifiedModel, logs: Sequence[Path], out: Path, seed: int, warn: Warn, tell: Tell
+    subject: IdentifiedModel, logs: Sequence[Path], out: Path, seed: int, warn: Warn, tell: Progress
 ) -> Table:
     """Design the next experiment; write its commands, the predicted motion and the predicted precision.
 
@@ -120,7 +121,7 @@ def study_identifiability(
     refits: int,
     seed: int,
     warn: Warn,
-    tell: Tell,
+    tell: Progress,
 ) -> UncertaintyStudy:
     """Write what logs determine at a parameter set, with profiles and a bootstrap where they are asked for.
 

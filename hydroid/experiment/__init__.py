@@ -1,1 +1,1 @@
-"""The next experiment: the one that tells most about what is known least."""
+"""The next experiment: its commands, what it would measure, and how precisely."""

@@ -1,6 +1,6 @@
 """Experiments: a start pose and pseudo-random commands, drawn and changed at random.
 
-A command is a chain of levels, each held for a random time, as in the article's figure 17.
+A command is a sequence of levels, each held for a random time, as in the article's figure 17.
 """
 
 from collections.abc import Mapping
@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
-from hydroid.settings.experiment import DesignSettings
+from hydroid.settings.fit import FitSettings
 
 Ints = NDArray[np.int64]
 
@@ -46,8 +48,8 @@ class Experiment:
 
     def scaled(self, factor: float) -> "Experiment":
         """Return the experiment with all commands times a factor."""
-        smaller = {j: replace(i, level=np.round(factor * i.level, 1)) for j, i in self.inputs.items()}
-        return replace(self, inputs=smaller)
+        inputs = {j: replace(i, level=np.round(factor * i.level, 1)) for j, i in self.inputs.items()}
+        return replace(self, inputs=inputs)
 
     def with_level(self, joint: int, segment: int, level: float) -> "Experiment":
         """Return the experiment with one level [%] of one joint replaced."""
@@ -58,37 +60,28 @@ class Experiment:
 
 
 class Draw:
-    """Draws experiments, and changes them, by one random stream.
+    """Draws experiments, and changes them, from one random stream.
 
     Args:
-        settings: length, joints' inputs, poses.
-        joints: joints that may be driven, 0-based.
-        poses: start poses [rad], shape (N, J); with `free`, others within their limits are drawn too.
-        lower: of a start pose [rad], shape (J,).
-        upper: of a start pose [rad], shape (J,).
-        period: of the commands [s].
+        settings: the joints that may be driven, their commands, the start poses.
         rng: the stream.
+
+    Raises:
+        SettingsError: joints or poses that cannot be.
     """
 
-    def __init__(
-        self,
-        settings: DesignSettings,
-        joints: list[int],
-        poses: Array,
-        lower: Array,
-        upper: Array,
-        period: float,
-        rng: np.random.Generator,
-    ) -> None:
-        self._settings, self._joints, self._poses, self._rng = settings, joints, poses, rng
-        self._free, self._lower, self._upper = settings.poses == "any", lower, upper
-        self.period = period
-        self.samples = round(settings.duration_s / period) + 1
-        shortest, longest = (max(1, round(t / period)) for t in settings.dwell_s)
-        self._dwell = (shortest, longest)
+    def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
+        self._settings, self._rng = settings.design, rng
+        self._joints, self._poses = driven_joints(settings), start_poses(settings)
+        self._lower, self._upper = pose_limits(settings.arm, np.radians(settings.design.margin_deg))
+        self._any_pose = settings.design.poses == "any"
+        self.period = settings.log.period_s
+        """of the commands [s]"""
+        self.samples = round(settings.design.duration_s / self.period) + 1
+        self._dwell = tuple(max(1, round(t / self.period)) for t in settings.design.dwell_s)
 
     def new(self) -> Experiment:
-        """Draw an experiment: half of them drive all allowed joints, the others some of them."""
+        """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5
         driven = self._joints if self._rng.random() < 0.5 or not some.any() else np.array(self._joints)[some]
         return Experiment(self._pose(), {int(j): self._input() for j in driven})
@@ -119,18 +112,18 @@ class Draw:
         return Input(np.array(starts), self._level(len(starts)))
 
     def _level(self, count: int) -> Array:
-        most = self._settings.command_pct
-        return np.round(self._rng.uniform(-most, most, count), 1)
+        limit = self._settings.command_pct
+        return np.round(self._rng.uniform(-limit, limit, count), 1)
 
     def _varied(self, old: Input) -> Input:
         """One level redrawn or moved, one switch moved, or a stretch drawn anew."""
         rng, count = self._rng, len(old.level)
         at, kind = int(rng.integers(count)), int(rng.integers(4))
-        level, most = old.level.copy(), self._settings.command_pct
+        level, limit = old.level.copy(), self._settings.command_pct
         if kind == 0:
             level[at] = self._level(1)[0]
         elif kind == 1:
-            level[at] = np.clip(level[at] + rng.normal(0.0, 0.25 * most), -most, most).round(1)
+            level[at] = np.clip(level[at] + rng.normal(0.0, 0.25 * limit), -limit, limit).round(1)
         elif kind == 2 and at > 0:
             return replace(old, start=self._shifted(old.start, at))
         else:
@@ -139,7 +132,7 @@ class Draw:
         return replace(old, level=level)
 
     def _shifted(self, start: Ints, at: int) -> Ints:
-        """Switch times with one moved between its neighbours, no dwell shorter or longer than allowed."""
+        """Switch times with one moved between its neighbours, each level held for an allowed time."""
         shortest, longest = self._dwell
         before, after = int(start[at - 1]), int(np.append(start, self.samples)[at + 1])
         low, high = max(before + shortest, after - longest), min(after - shortest, before + longest)
@@ -149,12 +142,12 @@ class Draw:
         return moved
 
     def _pose(self) -> Array:
-        if self._free and (not len(self._poses) or self._rng.random() < 0.75):
+        if self._any_pose and (not len(self._poses) or self._rng.random() < 0.75):
             return self._rng.uniform(self._lower, self._upper)
         return self._poses[self._rng.integers(len(self._poses))]
 
     def _moved(self, pose: Array) -> Array:
-        if not self._free:
+        if not self._any_pose:
             return self._pose()
         step = self._rng.normal(0.0, 0.1, len(pose)) * (self._upper - self._lower)
         return np.clip(pose + step, self._lower, self._upper)
@@ -165,3 +158,39 @@ def pose_limits(arm: Arm, margin: float) -> tuple[Array, Array]:
     ranges = np.radians([joint.range for joint in arm.joints])
     inward = np.minimum(margin, 0.5 * np.ptp(ranges, axis=1))
     return ranges[:, 0] + inward, ranges[:, 1] - inward
+
+
+def driven_joints(settings: FitSettings) -> list[int]:
+    """Joints that may be driven, 0-based.
+
+    Raises:
+        SettingsError: one that the arm lacks, or that stage 1 has no gain for.
+    """
+    joints = sorted(settings.design.joints or settings.outputs)
+    if joints[-1] > len(settings.arm.joints):
+        raise SettingsError(f"the arm has joints 1 to {len(settings.arm.joints)}", where="design.joints")
+    driven = np.isin(np.arange(len(settings.arm.joints)) + 1, joints)
+    Stage(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
+    return [j - 1 for j in joints]
+
+
+def start_poses(settings: FitSettings) -> Array:
+    """Named start poses [rad], shape (N, J), in which the joints that move are within their limits.
+
+    Raises:
+        SettingsError: a name that does not exist, or none is left.
+    """
+    design = settings.design
+    names = tuple(settings.arm.poses) if design.poses is None or design.poses == "any" else design.poses
+    poses = np.array([settings.arm.pose(name) for name in names])
+    moving = [j - 1 for j in {*(design.joints or ()), *settings.outputs}]
+    margin = np.radians(design.margin_deg)
+    inside = (poses >= settings.arm.lower + margin) & (poses <= settings.arm.upper - margin)
+    poses = poses[inside[:, moving].all(axis=1)]
+    if not len(poses) and design.poses != "any":
+        raise SettingsError(
+            f"no pose of {', '.join(names)} is {design.margin_deg:g} deg inside the ranges of what moves",
+            where="design.poses",
+            hint="add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
+        )
+    return poses

@@ -1,7 +1,7 @@
-"""Experiments tried on the model: their motion, whether it keeps the limits, what it would tell.
+"""Experiments simulated at the present estimate: their motion, whether it keeps the limits, their information.
 
-Limits hold for the simulated response at the present estimate, and for nothing else: an arm that differs from
-the model moves otherwise. Collisions of the arm with itself or with anything around it are not looked for.
+Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
+Collisions of the arm with itself or with its surroundings are not checked.
 """
 
 from collections import Counter
@@ -20,20 +20,22 @@ from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 from hydroid.uncertainty.jacobian import STEP, relative_scale
 
-REPAIRS = 60
+MAX_REPAIRS = 60
 """changes of an experiment after which it is given up"""
-TURNED = (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
-"""factors of a level that leads out of a joint's range, tried in turn: as an operator turns the arm round"""
-SLOWED = (0.7, 0.5, 0.35, 0.2, 0.0)
-"""the same for a joint that becomes too fast"""
+RANGE_FACTORS = (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+"""factors tried in turn on a level that leads out of a joint's range"""
+SPEED_FACTORS = (0.7, 0.5, 0.35, 0.2, 0.0)
+"""factors tried in turn on a level that makes a joint too fast"""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
     """An experiment that keeps the limits.
 
-    information: about relative changes of the free parameters, shape (F, F). angle: simulated [rad] at the
-    log's period, shape (T, J); joints that do not move stay in their pose.
+    Attributes:
+        experiment: its commands.
+        information: about relative changes of the free parameters, shape (F, F).
+        angle: simulated [rad] at the log's period, shape (T, J); joints that do not move stay in their pose.
     """
 
     experiment: Experiment
@@ -51,10 +53,9 @@ class Violation:
 
 
 class Bench:
-    """Tries experiments on the model of one parameter set.
+    """Simulates experiments at one parameter vector.
 
     Args:
-        arm: the arm.
         settings: model, outputs, free parameters, and the limits in `design`.
         theta: the present estimate, shape (P,).
         period: of the commands [s].
@@ -62,50 +63,47 @@ class Bench:
     """
 
     def __init__(self, settings: FitSettings, theta: Array, period: float, samples: int) -> None:
-        self._arm, self._spec, self._limits = (
-            settings.arm,
-            load_model(settings.arm.model, settings.arm),
-            settings.design,
-        )
-        # joints that an analysis of a log would prescribe stand still in an experiment
-        how = settings.simulation
-        locked = how.model_copy(update={"other_joints": "locked"}) if how.other_joints == "measured" else how
-        self._settings = settings.model_copy(update={"simulation": locked})
+        self._spec = load_model(settings.arm.model, settings.arm)
+        if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
+            simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
+            settings = settings.model_copy(update={"simulation": simulation})
+        self._settings = settings
         self._outputs = [j - 1 for j in settings.outputs]
         self._period, self._samples = period, samples
         stage = Stage(settings)
-        # one-sided: a fifth of the simulations of `jacobian`, and the same to a part in a thousand
+        # one-sided differences take a quarter of the simulations of `jacobian` and agree to 0.1 %
         moved = theta + STEP * np.diag(relative_scale(stage.parameters, theta))[stage.parameters.free]
         self._noise = sensor_noise(settings.design, samples, period)
-        self._members = stage.candidates(np.vstack([theta, moved]))
+        self._candidates = stage.candidates(np.vstack([theta, moved]))
 
     def kept(self, experiment: Experiment) -> tuple[Experiment, Array] | None:
-        """Return the experiment, levels turned round or reduced until it keeps the limits, and its motion.
+        """Return the experiment with levels reversed or reduced until it keeps the limits, and its motion.
 
-        None where it leaves them all the same, or its simulation diverges.
+        None where it still leaves them, or its simulation diverges.
         """
-        blamed: Counter[tuple[int, int]] = Counter()
-        for _ in range(REPAIRS):
+        changes: Counter[tuple[int, int]] = Counter()
+        for _ in range(MAX_REPAIRS):
             angle = self._simulate(experiment, 1)
             if angle is None:
                 return None
-            found = violation(angle[0], self._period, self._arm, self._limits)
-            if found is None:
+            first = violation(angle[0], self._period, self._settings.arm, self._settings.design)
+            if first is None:
                 return experiment, angle[0]
-            if found.sample == 0:
+            if first.sample == 0:
                 return None  # the start pose itself
-            experiment = _repaired(experiment, found, blamed)
+            experiment = _repaired(experiment, first, changes)
         return None
 
     def trial(self, experiment: Experiment) -> Trial | None:
-        """Return what an experiment would tell, changed to keep the limits; None where it cannot."""
-        kept = self.kept(experiment)
-        told = None if kept is None else self.told(kept[0])
-        return None if kept is None or told is None else Trial(kept[0], told, kept[1])
+        """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
+        if (kept := self.kept(experiment)) is None:
+            return None
+        gained = self.information(kept[0])
+        return None if gained is None else Trial(kept[0], gained, kept[1])
 
-    def told(self, experiment: Experiment) -> Array | None:
+    def information(self, experiment: Experiment) -> Array | None:
         """Return the information of an experiment as it is, shape (F, F); None where it diverges."""
-        rows = self._simulate(experiment, len(self._members))
+        rows = self._simulate(experiment, len(self._candidates))
         if rows is None:
             return None
         outputs = rows[:, :, self._outputs]
@@ -119,7 +117,7 @@ class Bench:
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
-        response = simulation.simulate(self._members[:candidates])
+        response = simulation.simulate(self._candidates[:candidates])
         if not response.feasible.all():
             return None
         angle = np.tile(log.angle, (candidates, 1, 1))
@@ -142,20 +140,20 @@ def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> 
     return Violation(sample, joint, not out[sample, joint])
 
 
-def _repaired(experiment: Experiment, found: Violation, blamed: Counter[tuple[int, int]]) -> Experiment:
-    """Change the level that led to a violation, or the one before it once that has come to nothing."""
-    signal = experiment.inputs.get(found.joint)
+def _repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[int, int]]) -> Experiment:
+    """Change the level before a violation, or the one before that where no factor of it has helped."""
+    signal = experiment.inputs.get(first.joint)
     if signal is not None:
-        factors = SLOWED if found.fast else TURNED
-        last = int(np.searchsorted(signal.start, found.sample - 1, side="right")) - 1
+        factors = SPEED_FACTORS if first.fast else RANGE_FACTORS
+        last = int(np.searchsorted(signal.start, first.sample - 1, side="right")) - 1
         for segment in range(last, -1, -1):
-            tries = blamed[found.joint, segment]
+            tries = changes[first.joint, segment]
             if signal.level[segment] == 0.0 or tries >= len(factors):
                 continue
             # factors are of the level as drawn: undo the one before
             before = factors[tries - 1] if tries else 1.0
-            blamed[found.joint, segment] += 1
+            changes[first.joint, segment] += 1
             return experiment.with_level(
-                found.joint, segment, factors[tries] / before * signal.level[segment]
+                first.joint, segment, factors[tries] / before * signal.level[segment]
             )
     return experiment.scaled(0.7)

@@ -216,7 +216,7 @@ def test_more_time_never_tells_less(designed):
     settings, arm, found = designed
     seen = np.zeros((6, 6))
     for samples in (200, 400, 601):
-        told = Bench(settings, THETA, found.period, samples).told(shortened(found, samples))
+        told = Bench(settings, THETA, found.period, samples).information(shortened(found, samples))
         assert told is not None
         assert np.linalg.eigvalsh(told - seen).min() > -1e-6 * np.trace(told)
         seen = told

@@ -27,7 +27,7 @@ from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.noise import Noise
 
 LEVEL = np.deg2rad(0.1)
-MEMORY = 0.15  # [s]
+CORRELATION_TIME = 0.15  # [s]
 JOINTS = [2, 3]
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 """masses as in the article; K, D, S are ours: with the article's the arm is too slow to feel its masses"""
@@ -90,7 +90,7 @@ def study(phi: float, logs: int, seconds: float, *, start: bool) -> None:
         deviations.append(told.standard_deviation[free])
         hits.append((told.interval[free, 0] <= truth[free]) & (truth[free] <= told.interval[free, 1]))
     spread = np.std(estimates, axis=0, ddof=1)
-    kind = f"AR(1), correlation time {MEMORY} s" if phi else "white"
+    kind = f"AR(1), correlation time {CORRELATION_TIME} s" if phi else "white"
     print(f"\n{kind} noise, {logs} logs of {seconds:g} s, {time.perf_counter() - started:.0f} s", end="")
     print(", the start pose with noise" if start else "")
     print("\n| parameter | covered | spread [%] | spread / bound | predicted / spread |")
@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--noisy-start", action="store_true")
     arguments = parser.parse_args()
-    for phi in (0.0, float(np.exp(-0.01 / MEMORY))):
+    for phi in (0.0, float(np.exp(-0.01 / CORRELATION_TIME))):
         study(phi, arguments.logs, arguments.seconds, start=arguments.noisy_start)
 
 

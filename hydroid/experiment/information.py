@@ -1,7 +1,7 @@
 """Fisher information of experiments about the parameters, and the precision that follows from it.
 
-All matrices are in relative changes of the free parameters, x = d theta / theta: sizes and units do not matter,
-and a standard deviation of 0.1 means 10 %.
+All matrices are in relative changes of the free parameters, x = d theta / theta. Units do not matter, and a
+standard deviation of 0.1 means 10 %.
 """
 
 from dataclasses import dataclass
@@ -88,7 +88,7 @@ class Judge:
         return Judge(known, vectors[:, improved])
 
     def covariance(self, information: Array | None = None) -> Array:
-        """Of relative errors after an experiment with information `information`, or without one; shape (F, F)."""
+        """Covariance of relative errors after an experiment, or without one, shape (F, F)."""
         total = self.known + np.eye(len(self.known)) / PRIOR_SD**2
         if information is not None:
             total = total + information

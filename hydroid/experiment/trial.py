@@ -1,4 +1,4 @@
-"""Experiments simulated at the present estimate: their motion, whether it keeps the limits, their information.
+"""Experiments simulated at the present estimate: motion, limits, information.
 
 Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
 Collisions of the arm with itself or with its surroundings are not checked.

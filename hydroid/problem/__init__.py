@@ -1,1 +1,1 @@
-"""The estimation problem: which parameters, where they enter, what is compared, what is known besides."""
+"""The estimation problem: parameters, channels, objectives and priors; candidates in, objectives out."""

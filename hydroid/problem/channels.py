@@ -1,4 +1,4 @@
-"""Channels: what is measured and simulated, one log and one signal each, and its place in a row of errors."""
+"""Channels: the signals that are compared, one of one log each, and their places in a row of residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +46,10 @@ class Channel:
 
 
 def make_channels(
-    logs: Sequence[Log], outputs: Sequence[int], pressures: Sequence[Sequence[int]], how: ObjectiveSettings
+    logs: Sequence[Log],
+    outputs: Sequence[int],
+    pressures: Sequence[Sequence[int]],
+    objective: ObjectiveSettings,
 ) -> tuple[Channel, ...]:
     """List the channels log by log, angles first.
 
@@ -54,14 +57,14 @@ def make_channels(
         logs: the logs.
         outputs: joints whose angles are compared, 0-based.
         pressures: for each log the joints whose pressures are compared, 0-based.
-        how: weights.
+        objective: weights.
     """
     channels: list[Channel] = []
     at = 0
     for i, log in enumerate(logs):
         count = len(log.time)
         for column, joint in enumerate(outputs):
-            weight = how.weights.get(joint + 1, 1.0)
+            weight = objective.weights.get(joint + 1, 1.0)
             rows = slice(at, at + count)
             channels.append(Channel(i, joint + 1, "angle", column, log.angle[:, joint], weight, rows))
             at += count
@@ -71,7 +74,7 @@ def make_channels(
                 measured = log.pressure[:, joint, side]
                 if np.isnan(measured[0]):
                     continue
-                weight = np.deg2rad(how.pressure_weight) / 1e5  # deg/bar -> rad/Pa
+                weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
                 rows = slice(at, at + count)
                 channels.append(Channel(i, joint + 1, quantity, column, measured, weight, rows))  # pyright: ignore[reportArgumentType]
                 at += count

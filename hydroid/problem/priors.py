@@ -1,7 +1,7 @@
-"""What is known besides the logs: linear statements about parameters, each with its standard deviation.
+"""Priors: linear combinations or ratios of parameters that are known besides the logs.
 
-A search stays where every statement holds within REACH standard deviations; the refinement and the uncertainty
-take a statement as one more measurement.
+Each has a value and a standard deviation; without one it is a constraint. A search stays where every prior
+holds within REACH standard deviations. The refinement and the uncertainty take it as one more measurement.
 """
 
 from collections.abc import Mapping
@@ -13,31 +13,31 @@ from hydroid.parameters import Array, ParameterSet
 from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0
-"""standard deviations that a search may be off a statement"""
-EXACT = 1e-5
-"""an exact statement's standard deviation, as a part of what its parameters' bounds leave open"""
-SWEEPS = 200
-"""projections on all statements in turn; two that are nearly parallel take the most"""
+"""standard deviations that a candidate of a search may be away from a prior"""
+CONSTRAINT_SD = 1e-5
+"""standard deviation of a constraint, as a part of the range that its parameters' bounds allow"""
+MAX_SWEEPS = 200
+"""projections on all priors in turn; two that are nearly parallel need the most"""
 
 
 class Priors:
-    """M statements about P parameters; those about fixed ones only say nothing here.
+    """M priors about P parameters; those about fixed parameters only are left out.
 
     Args:
-        settings: the statements by name.
+        settings: the priors by name.
         parameters: the parameters.
 
     Attributes:
-        names: of the M statements.
+        names: of the M priors.
 
     Raises:
-        SettingsError: a parameter that does not exist, or statements that the bounds contradict.
+        SettingsError: a parameter that does not exist, or priors that the bounds contradict.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
         self._parameters = parameters
-        for name, statement in settings.items():
-            for parameter in statement.factors:
+        for name, prior in settings.items():
+            for parameter in prior.factors:
                 if parameter not in parameters.names:
                     hint = f"known: {', '.join(parameters.names)}"
                     raise SettingsError(f"no parameter {parameter!r}", where=f"priors.{name}", hint=hint)
@@ -48,14 +48,14 @@ class Priors:
             [[s.factors.get(n, 0.0) for n in parameters.names] for s in active.values()]
         ).reshape(len(active), len(parameters.names))
         self._value = np.array([0.0 if s.ratio else s.value for s in active.values()])
-        # of a ratio: the column of what is divided by, which turns a - value b into a / b - value
+        # column of a ratio's denominator b, which turns a - value b into a / b - value
         self._divisor = [parameters.names.index(s.ratio[1]) if s.ratio else None for s in active.values()]
         width = np.where(parameters.free, parameters.upper - parameters.lower, 0.0)
         open_ = np.abs(self._factors) @ width
-        self._sd = np.array([s.sd or EXACT * o for s, o in zip(active.values(), open_, strict=True)])
+        self._sd = np.array([s.sd or CONSTRAINT_SD * o for s, o in zip(active.values(), open_, strict=True)])
         self._steps = np.zeros_like(self._factors)
         if len(active):
-            # the shortest way in the box of the free parameters that changes a statement by 1
+            # the shortest step in the box of the free parameters that changes a prior's left side by 1
             self._steps = self._factors * width**2 / np.sum((self._factors * width) ** 2, axis=1)[:, None]
         self._refuse_contradictions()
 
@@ -63,22 +63,22 @@ class Priors:
         return len(self.names)
 
     def scores(self, theta: Array) -> Array:
-        """Return (what theta makes of each statement - what is known) / sd; (n, P) -> (n, M)."""
+        """Return (left side at theta - value) / sd of each prior; (n, P) -> (n, M)."""
         scores = np.empty((len(theta), len(self)))
         for m, divisor in enumerate(self._divisor):
             scores[:, m] = self._excess(theta, m) / self._tolerance(theta, m, divisor)
         return scores
 
     def project(self, theta: Array) -> Array:
-        """Return theta, (n, P), moved by the shortest ways to within REACH sd of every statement.
+        """Return theta, (n, P), moved by the shortest steps to within REACH sd of every prior.
 
-        Projections on the statements in turn (Kaczmarz), within the bounds; a row depends on itself alone.
+        Projections on the priors in turn (S. Kaczmarz, 1937), within the bounds. Each row is moved by itself.
         """
         if not len(self):
             return theta
         theta, free = theta.copy(), self._parameters.free
         low, high = self._parameters.lower[free], self._parameters.upper[free]
-        for _ in range(SWEEPS):
+        for _ in range(MAX_SWEEPS):
             before = theta.copy()
             for m, divisor in enumerate(self._divisor):
                 excess, slack = self._excess(theta, m), REACH * self._tolerance(theta, m, divisor)
@@ -90,7 +90,7 @@ class Priors:
         return theta
 
     def _excess(self, theta: Array, m: int) -> Array:
-        # a sum along the last axis: a matrix product may round by the number of rows
+        # the sum along the last axis is the same for any number of rows; a matrix product may not be
         return (theta * self._factors[m]).sum(axis=1) - self._value[m]
 
     def _tolerance(self, theta: Array, m: int, divisor: int | None) -> Array:
@@ -109,7 +109,7 @@ class Priors:
         worst = int(np.argmax(off))
         if off[worst] > 1.5 * REACH:
             raise SettingsError(
-                "cannot hold within the bounds and beside the other statements",
+                "cannot hold within the bounds and beside the other priors",
                 where=f"priors.{self.names[worst]}",
                 hint="widen the bounds, correct the value, or give it a larger sd",
             )

@@ -32,9 +32,9 @@ from hydroid.simulation.scenario import Scenario
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Objectives of n parameter sets: by segment, shape (n, S), and over all, shape (n,) [rad or relative].
+    """Objectives of n candidates: by segment, shape (n, S), and overall, shape (n,) [rad or relative].
 
-    A set whose simulation diverged has inf throughout.
+    A candidate whose simulation diverged has inf throughout.
     """
 
     segments: Array
@@ -53,7 +53,7 @@ class Spread(Protocol):
 
 
 class Problem:
-    """Logs, the model that is to reproduce them, and how the difference is measured.
+    """Logs, the model that should reproduce them, and how the difference is measured.
 
     Args:
         settings: the fit's settings.
@@ -63,7 +63,7 @@ class Problem:
 
     Attributes:
         channels: what is compared, in the order of a row of residuals.
-        priors: what is known besides the logs.
+        priors: about the parameters, from the settings.
         measured: all channels in a row, times their weights, shape (R,).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
@@ -93,13 +93,13 @@ class Problem:
         return Problem(self.settings.freed(), self.logs, self._spread)
 
     def first(self, seconds: float) -> "Problem":
-        """Return the same problem up to so long after each log's first command, in one segment a channel."""
+        """Return the problem of the first seconds after each log's first command, one segment per channel."""
         objective = self.settings.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
         settings = self.settings.model_copy(update={"objective": objective})
         return Problem(settings, [log.first(seconds) for log in self.logs], self._spread)
 
     def theta(self, unit: Array) -> Array:
-        """Return parameter sets, (n, P), from points of the unit box, moved to where what is known holds."""
+        """Return candidates, (n, P), from points of the unit box, moved to where the priors hold."""
         return self.priors.project(self.parameters.from_unit(unit))
 
     def evaluate(self, theta: Array) -> Evaluation:
@@ -133,7 +133,7 @@ class Problem:
         return np.concatenate([channel.residual(responses) for channel in self.channels], axis=1)
 
     def responses(self, theta: Array) -> list[Response]:
-        """Simulate theta, shape (n, P); one response of n candidates a log."""
+        """Simulate theta, shape (n, P); return one response of n candidates per log."""
         candidates = self.stage.candidates(theta)
         return [simulation.simulate(candidates) for simulation in self._simulations]
 
@@ -175,7 +175,7 @@ def make_simulation(
     settings: FitSettings,
     pressures: Sequence[int] = (),
 ) -> MechanicalSimulation | HydraulicSimulation:
-    """Return what simulates one log in the settings' stage.
+    """Return the simulation of one log in the settings' stage.
 
     Args:
         spec: the arm's MJCF.
@@ -194,22 +194,22 @@ def make_simulation(
 
 
 class Memo:
-    """Evaluates each parameter set once: identical chromosomes are not simulated again."""
+    """Evaluates each candidate once: identical chromosomes are not simulated again."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self._known: dict[bytes, tuple[Array, float]] = {}
         self.infeasible = 0
-        """sets whose simulation diverged"""
+        """candidates whose simulation diverged"""
 
     @property
     def simulated(self) -> int:
-        """Sets simulated so far."""
+        """Candidates simulated so far."""
         return len(self._known)
 
     @property
     def best(self) -> Array:
-        """The set with the lowest objective over the whole record, shape (P,)."""
+        """The candidate with the lowest overall objective, shape (P,)."""
         return np.frombuffer(min(self._known, key=lambda key: self._known[key][1]))
 
     def evaluate(self, theta: Array) -> Evaluation:
@@ -222,7 +222,7 @@ class Memo:
 
     def _keep(self, theta: Array) -> None:
         result = self.problem.evaluate(theta)
-        # what is not finite somewhere is infeasible throughout: no objective of it may win anywhere
+        # a candidate with one infinite objective is infeasible: none of its objectives may win
         finite = np.isfinite(np.column_stack([result.segments, result.overall]))
         failed = np.logical_not(np.all(finite, axis=1))
         self.infeasible += int(failed.sum())
@@ -232,12 +232,12 @@ class Memo:
             self._known[row.tobytes()] = (segments, float(overall))
 
     def arrays(self) -> tuple[Array, Array]:
-        """All sets and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
+        """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
         theta = np.array([np.frombuffer(key) for key in self._known])
         values = np.array([np.append(segments, overall) for segments, overall in self._known.values()])
         return theta, values
 
     def restore(self, theta: Array, values: Array) -> None:
-        """Take back what `arrays` returned."""
+        """Restore what `arrays` returned."""
         self._known = {t.tobytes(): (v[:-1].copy(), float(v[-1])) for t, v in zip(theta, values, strict=True)}
         self.infeasible = int(np.sum(~np.isfinite(values[:, -1])))

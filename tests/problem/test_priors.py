@@ -1,4 +1,4 @@
-"""What is known besides the logs: statements hold in the search, and count as measurements in the refinement."""
+"""Priors hold in the search, and count as measurements in the refinement."""
 
 from dataclasses import replace
 

@@ -15,6 +15,8 @@ Cell = str | int | float | None
 """Text, a count, a measured number, or nothing."""
 
 _UNLIMITED = 1000
+_TEXT_WIDTH = 18
+"""width below which a column of text is not squeezed while optional columns can be left out"""
 
 
 class Given(float):
@@ -125,7 +127,9 @@ class Table:
             name, right = self.header[i], self.numeric[i]
             header = Text(name.replace(" ", "\n") if right and tight else name)
             # rich wraps words where room is short, but never numbers
-            least = self._width(i, wrap=True)
+            least = max(
+                self._width(i, wrap=True), 0 if right else min(self._width(i, wrap=False), _TEXT_WIDTH)
+            )
             table.add_column(
                 header, justify="right" if right else "left", no_wrap=right, min_width=least, overflow="fold"
             )
@@ -134,9 +138,10 @@ class Table:
         return table
 
     def _least_width(self, left_out: int) -> int:
-        """Return the width at which all words and numbers are whole, without the first optional columns."""
+        """Return the width at which words and numbers are whole and text does not stand word by word."""
         kept = [i for i, name in enumerate(self.header) if name not in self.optional[:left_out]]
-        return sum(self._width(i, wrap=True) + 2 for i in kept)
+        room = (0 if self.numeric[i] else min(self._width(i, wrap=False), _TEXT_WIDTH) for i in kept)
+        return sum(max(self._width(i, wrap=True), r) + 2 for i, r in zip(kept, room, strict=True))
 
     def _width(self, i: int, *, wrap: bool) -> int:
         """Return the width of a column, with text and header on one line or wrapped at words."""

@@ -1,11 +1,11 @@
 """Fits made by hand for the report's tests: any shape of problem, no simulation."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hydroid.fitting.fit import Estimate, Fit
+from hydroid.fitting.refinement import Refinement
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.channels import make_channels
@@ -13,10 +13,7 @@ from hydroid.problem.norms import overall_objective
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.problem.segments import segment_objectives
-from hydroid.run.folder import RunFolder
-from hydroid.fitting.refinement import Refinement
 from hydroid.search.least_squares import Ending
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty_from
@@ -143,17 +140,3 @@ def make_uncertainty(
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
     return uncertainty_from(problem, theta, at, noise)
-
-
-class Folder(RunFolder):
-    """A run folder that knows what it is without having been begun."""
-
-    def settings(self, overrides: dict[str, Any] | None = None) -> tuple[FitSettings, Arm]:
-        return make_problem().settings
-
-    def identity(self) -> dict[str, Any]:
-        return {"hydroid": "0", "mujoco": "4", "logs": {"a.csv": "f" * 64}}
-
-
-def folder(path: Path) -> RunFolder:
-    return Folder(path)

@@ -221,10 +221,9 @@ def _effort(fit: Fit) -> tuple[tuple[str, str], ...]:
             ("candidates", f"{evaluations:,} evaluated, {simulated:,} of them simulated"),
             ("diverged", f"{diverged:,} of {simulated:,} simulated candidates; ranked behind all others"),
         ]
-    if fit.refinement is not None:
-        last = fit.refinement
-        effort = f"{last.iterations} iterations, {last.evaluations:,} simulations"
-        facts.append(("refinement", f"{effort}; {last.ending.value}"))
+    for name, one in fit.refinements.items():
+        effort = f"{one.iterations} iterations, {one.evaluations:,} simulations"
+        facts.append((f"refinement to {name}", f"{effort}; {one.ending.value}"))
     return tuple(facts)
 
 

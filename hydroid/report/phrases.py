@@ -168,11 +168,12 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
     said: list[str] = []
     if fit.refinement is None:
         said.append("The estimate is the search's own, without a refinement: it need not be an optimum.")
-    elif not fit.refinement.ending.converged:
-        said.append(
-            f"The refinement did not converge: {fit.refinement.ending.value}. The estimate need not be an "
-            "optimum. Allow more iterations (refinement.iterations)."
-        )
+    said += [
+        f"The refinement to the {name} estimate did not converge: {refinement.ending.value}. The estimate need "
+        "not be an optimum. Allow more iterations (refinement.iterations)."
+        for name, refinement in fit.refinements.items()
+        if not refinement.ending.converged
+    ]
     for side in ("lower", "upper"):
         at_bound = [
             f"{p.name} ({plain(p.lower if side == 'lower' else p.upper)} {p.unit})"

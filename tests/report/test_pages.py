@@ -119,7 +119,8 @@ def test_the_page_begins_with_the_prediction_and_warnings_and_then_has_the_param
     assert "its refinement converged" in text
     assert fit.refinement is not None
     ending = next(e for e in type(fit.refinement.ending) if not e.converged)
-    page = fit_page(IDENTITY, problem, replace(fit, refinement=replace(fit.refinement, ending=ending)))
+    ended = {"refined": replace(fit.refinement, ending=ending)}
+    page = fit_page(IDENTITY, problem, replace(fit, refinements=ended))
     assert "did not converge" in page.lead
     assert ending.value in page.warnings[0]
 

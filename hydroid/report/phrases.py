@@ -169,8 +169,8 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
     if fit.refinement is None:
         said.append("The estimate is the search's own, without a refinement: it need not be an optimum.")
     said += [
-        f"The refinement to the {name} estimate did not converge: {refinement.ending.value}. The estimate need "
-        "not be an optimum. Allow more iterations (refinement.iterations)."
+        f"The refinement to the {name} estimate did not converge: {refinement.ending.value}. The estimate "
+        "need not be an optimum. Allow more iterations (refinement.iterations)."
         for name, refinement in fit.refinements.items()
         if not refinement.ending.converged
     ]

@@ -111,6 +111,15 @@ def with_values(parameters: Records, values: Mapping[str, Any]) -> Records:
     return replaced
 
 
+def drawing_values(parameters: Records, joints: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return the units, and the parameters of some joints, shape (K,), by joint and quantity in them."""
+    rows = {
+        joint: {name: float(row[name] / q.factor) for name, q in QUANTITIES.items()}
+        for joint, row in zip(joints, parameters, strict=True)
+    }
+    return {"units": {name: q.unit for name, q in QUANTITIES.items()}} | rows
+
+
 def has_force_curve(parameters: Records) -> NDArray[np.bool_]:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     p = parameters

@@ -1,19 +1,8 @@
-"""The plant: an identified arm, hydraulics included, to be stepped in a program of one's own.
+"""One candidate of a fit, stepped command by command."""
 
-    plant = load_plant("runs/a")
-    q = plant.reset()
-    while plant.time < 10:
-        q = plant.step(controller(q))
-
-It gives, bit for bit, what the simulations of a fit give; contacts are off as there. `model` and `data` are
-MuJoCo's: what acts on them (`xfrc_applied`, a changed `qpos`) acts on the plant; `qfrc_applied` is the plant's
-own. Between two steps use `mj_kinematics` to refresh the positions of bodies.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -28,10 +17,9 @@ from hydroid.arm.quiet import quiet_mujoco
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.hydraulics.actuator import ActuatorState
-from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
-from hydroid.identified import IdentifiedModel, load_identified, write_settings
+from hydroid.hydraulics.records import JOINT_STATE, drawing_values, has_force_curve
+from hydroid.identified import IdentifiedModel, write_settings
 from hydroid.problem.stage import Stage
-from hydroid.settings.hydraulics import QUANTITIES
 from hydroid.simulation.actuators import ArmActuators
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout
 from hydroid.simulation.scenario import model_values
@@ -217,10 +205,9 @@ class Plant:
         self.export(folder / "model")
 
     def export(self, folder: Path) -> None:
-        """Write the arm in its start pose for other programs; `README.txt` in the folder says what for.
+        """Write the arm for other programs to `model/` of a saved plant or a run folder, beside `arm.xml`.
 
-        Args:
-            folder: `model/` of a saved plant or a run folder, which holds `arm.xml`.
+        `README.txt` there says what the files are good for.
 
         Raises:
             RunError: the folder cannot be written.
@@ -228,18 +215,12 @@ class Plant:
         model, candidate, arm = copy(self.model), self._candidate, self.identified.settings.arm
         model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
         spec = load_model(folder / "arm.xml", arm)  # with the meshes' names there
-        if candidate.actuators is None:
-            motors, actuators = np.array([self._gain, self._balance]), None
-        else:
-            motors, actuators = None, {"units": {name: q.unit for name, q in QUANTITIES.items()}}
-            for j in self.joints:
-                row = candidate.actuators[0, j - 1]
-                actuators[arm.joint_names[j - 1]] = {
-                    n: float(row[n] / q.factor) for n, q in QUANTITIES.items()
-                }
-        joints = ", ".join(arm.joint_names[j - 1] for j in self.joints)
+        names = [arm.joint_names[j - 1] for j in self.joints]
+        motors, actuators = np.array([self._gain, self._balance]), None
+        if candidate.actuators is not None:
+            motors, actuators = None, drawing_values(candidate.actuators[0, self._active], names)
         text = arm_mjcf(spec, self._fusion, model, motors, "meshes")
-        write_fitted(folder, text, self.timestep, joints, actuators)
+        write_fitted(folder, text, self.timestep, ", ".join(names), actuators)
 
     def _advance(self, command: Array) -> None:
         arm, steps = self._arm, self._steps
@@ -279,35 +260,3 @@ class Plant:
             np.empty((0, len(self._columns)), JOINT_STATE),
         )
         self._servo = np.empty((self._steps, 0))
-
-
-def load_plant(
-    source: str | Path,
-    *,
-    overrides: Mapping[str, Any] | None = None,
-    joints: Sequence[int] | None = None,
-    period: float | None = None,
-    payload: float = 0.0,
-) -> Plant:
-    """Read a plant.
-
-    Args:
-        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a
-            shipped name such as "article-hyd". Parameters that these do not fix are then nominal: as the
-            hydraulics and the arm's file have them, and 0 for dampers and springs.
-        overrides: settings to replace, by dotted key.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
-        period: how long one command is held [s].
-        payload: mass in the gripper [kg].
-
-    Raises:
-        RunError: the folder holds no estimate.
-        SettingsError: what `Plant` refuses, a file that cannot be read, or nominal parameters of stage mech.
-    """
-    if Path(source).is_dir():
-        identified = load_identified(source, overrides=overrides)
-    else:
-        identified = load_identified(None, source, overrides, nominal=True)
-        if identified.settings.stage == "mech":
-            raise SettingsError("stage mech has no nominal gain", where=str(source), hint="name a run folder")
-    return Plant(identified, joints=joints, period=period, payload=payload)

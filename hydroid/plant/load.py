@@ -1,0 +1,41 @@
+"""A plant from a run folder, from a folder that it was saved in, or from settings alone."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hydroid.errors import SettingsError
+from hydroid.identified import load_identified
+from hydroid.plant.plant import Plant
+
+
+def load_plant(
+    source: str | Path,
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    joints: Sequence[int] | None = None,
+    period: float | None = None,
+    payload: float = 0.0,
+) -> Plant:
+    """Read a plant.
+
+    Args:
+        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a
+            shipped name such as "article-hyd". Parameters that these do not fix are then nominal: as the
+            hydraulics and the arm's file have them, and 0 for dampers and springs.
+        overrides: settings to replace, by dotted key.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
+        period: how long one command is held [s].
+        payload: mass in the gripper [kg].
+
+    Raises:
+        RunError: the folder holds no estimate.
+        SettingsError: what `Plant` refuses, a file that cannot be read, or nominal parameters of stage mech.
+    """
+    if Path(source).is_dir():
+        identified = load_identified(source, overrides=overrides)
+    else:
+        identified = load_identified(None, source, overrides, nominal=True)
+        if identified.settings.stage == "mech":
+            raise SettingsError("stage mech has no nominal gain", where=str(source), hint="name a run folder")
+    return Plant(identified, joints=joints, period=period, payload=payload)

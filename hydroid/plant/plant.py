@@ -50,9 +50,6 @@ class Plant:
             or parameters without a force-stroke curve.
     """
 
-    model: mujoco.MjModel
-    data: mujoco.MjData
-
     def __init__(
         self,
         identified: IdentifiedModel,
@@ -227,7 +224,7 @@ class Plant:
         if isinstance(arm, HydraulicArm):
             self._commands[:-steps] = self._commands[steps:]
             self._commands[-steps:] = command
-            # of the step before: positions that are refreshed in between must not change a bit
+            # M of the step before: refreshing positions in between must not change a bit
             np.copyto(self.data.M, self._mass)
             arm.roll(self._commands, self._rolled, self._unseen, self._servo)
             np.copyto(self._mass, self.data.M)

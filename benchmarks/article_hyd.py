@@ -14,12 +14,12 @@ import numpy as np
 from article_mech import Silent
 from pseudo_random import pseudo_random_log
 
+from hydroid import load_settings
 from hydroid.fitting.fit import fit
-from hydroid.jobs import load_settings
 from hydroid.log import Log
 from hydroid.parameters import relative_error
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.simulating import simulate_log
 
 TRUTH = {  # table 7
     "A_A": 1000.0,

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from pseudo_random import pseudo_random_log
 
+from hydroid import load_settings
 from hydroid.estimate import read_values
 from hydroid.fitting.fit import Fit, fit
-from hydroid.jobs import load_settings
 from hydroid.parameters import relative_error
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 

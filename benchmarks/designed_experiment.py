@@ -21,17 +21,17 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid import load_settings
 from hydroid.estimate import read_values
 from hydroid.experiment.commands import Draw
 from hydroid.experiment.design import design
 from hydroid.experiment.information import prior_information
 from hydroid.experiment.trial import Bench, violation
 from hydroid.fitting.refinement import refine
-from hydroid.jobs import load_settings
 from hydroid.log import Log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
-from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 MASSES = [f"M{i}" for i in range(1, 7)]

@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 from pseudo_random import pseudo_random_log
 
+from hydroid import load_settings
 from hydroid.fitting.refinement import refine
-from hydroid.jobs import load_settings
 from hydroid.log import Log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.simulating import simulate_log
 from hydroid.uncertainty.covariance import uncertainty
 from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.noise import Noise

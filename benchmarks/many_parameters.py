@@ -23,14 +23,14 @@ from pseudo_random import pseudo_random_log
 from scipy.stats import norm
 from sysid_peer import Peer
 
+from hydroid import load_settings
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.multistart import random_start
-from hydroid.jobs import load_settings
 from hydroid.log import Log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.simulating import simulate_log
 from hydroid.uncertainty.flags import WEAK_ABOVE
 
 JOINTS = range(1, 8)

@@ -16,14 +16,14 @@ import numpy as np
 from mujoco.batch import Batch
 from pseudo_random import pseudo_random_log
 
+from hydroid import load_settings
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
 from hydroid.fitting.search import Search
-from hydroid.jobs import load_settings
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Memo, Problem
 from hydroid.settings.arm import Arm
-from hydroid.simulating import simulate_log
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 MEMBERS, REPEATS = 70, 9

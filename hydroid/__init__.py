@@ -1,3 +1,80 @@
-"""hydroid: physical parameters of a hydraulic manipulator from its logs, on MuJoCo."""
+"""hydroid: physical parameters of a hydraulic manipulator from its logs, on MuJoCo.
+
+    settings = hydroid.load_settings("fit-hyd", {"search.seed": 3})
+    logs = hydroid.read_logs(["a.csv", "b.csv"], settings)
+    result = hydroid.fit(settings, logs, out="runs/a")
+
+    plant = hydroid.load_plant("runs/a")
+    plant.reset()
+    angle = plant.step(command)
+
+Each command of `hydroid --help` is one function here. Every name is imported when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hydroid.api.fit import FitOptions as FitOptions
+    from hydroid.api.fit import FitResult as FitResult
+    from hydroid.api.fit import FitRuns as FitRuns
+    from hydroid.api.fit import collect as collect
+    from hydroid.api.fit import fit as fit
+    from hydroid.api.fit import fit_hyd as fit_hyd
+    from hydroid.api.fit import fit_mech as fit_mech
+    from hydroid.api.judge import identifiability as identifiability
+    from hydroid.api.judge import sensitivity as sensitivity
+    from hydroid.api.judge import surface as surface
+    from hydroid.api.judge import validate as validate
+    from hydroid.api.look import LogCheck as LogCheck
+    from hydroid.api.look import check as check
+    from hydroid.api.look import load_settings as load_settings
+    from hydroid.api.look import plot_actuator as plot_actuator
+    from hydroid.api.look import read_commands as read_commands
+    from hydroid.api.look import read_logs as read_logs
+    from hydroid.api.look import view as view
+    from hydroid.api.model import build_model as build_model
+    from hydroid.api.model import simulate as simulate
+    from hydroid.api.plan import design as design
+    from hydroid.api.study import Study as Study
+    from hydroid.errors import HydroidError as HydroidError
+    from hydroid.identified import IdentifiedModel as IdentifiedModel
+    from hydroid.identified import identified as identified
+    from hydroid.identified import load_identified as load_identified
+    from hydroid.identified import middle_of_bounds as middle_of_bounds
+    from hydroid.log import Log as Log
+    from hydroid.log import write_log as write_log
+    from hydroid.parallel.cluster import open_workers as open_workers
+    from hydroid.plant import Plant as Plant
+    from hydroid.plant import load_plant as load_plant
 
 __version__ = "0.1.0"
+
+_NAMES = {
+    "hydroid.api.fit": "FitOptions FitResult FitRuns collect fit fit_hyd fit_mech",
+    "hydroid.api.judge": "identifiability sensitivity surface validate",
+    "hydroid.api.look": "LogCheck check load_settings plot_actuator read_commands read_logs view",
+    "hydroid.api.model": "build_model simulate",
+    "hydroid.api.plan": "design",
+    "hydroid.api.study": "Study",
+    "hydroid.errors": "HydroidError",
+    "hydroid.identified": "IdentifiedModel identified load_identified middle_of_bounds",
+    "hydroid.log": "Log write_log",
+    "hydroid.parallel.cluster": "open_workers",
+    "hydroid.plant": "Plant load_plant",
+}
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+
+__all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hydroid' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -55,3 +55,15 @@ class ModelError(HydroidError):
 
 class RunError(HydroidError):
     """A run folder that cannot be written, continued or read."""
+
+
+class Stopped(KeyboardInterrupt):
+    """A fit that Ctrl-C or a signal ended.
+
+    Args:
+        kept: what remains of it, a clause.
+    """
+
+    def __init__(self, kept: str) -> None:
+        self.kept = kept
+        super().__init__(kept)

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from hydroid.assets import find_config
-from hydroid.estimate import FitSummary, ParameterEstimate, estimate_file, read_values
+from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
 from hydroid.files import is_file, write_atomic
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
@@ -37,6 +37,12 @@ class IdentifiedModel:
     source: str
     summary: FitSummary | None = None
     nominal: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the run folder or the file that the estimate came from."""
+        file = Path(self.source)
+        return file.resolve().parent.name if file.name == NAME else file.stem
 
     @property
     def values(self) -> dict[str, float]:

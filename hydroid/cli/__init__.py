@@ -1,1 +1,1 @@
-"""The command line: thin covers of the functions in `hydroid.jobs`."""
+"""The command line: one thin function for each function of `hydroid.api`."""

@@ -1,52 +1,93 @@
-"""`hydroid`: one file a command, and how commands end.
+"""`hydroid`: the commands in their groups, and how they end.
 
 Nothing heavy is imported before a command runs, so that `--help` answers at once.
 """
 
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
-from hydroid.cli import (
-    check,
-    collect,
-    design,
-    fit,
-    identifiability,
-    model,
-    plot_actuator,
-    sensitivity,
-    simulate,
-    stopping,
-    surface,
-    validate,
-    view,
-)
+from hydroid.cli import fit, judge, look, model, options, plan, stopping
 
 STOPPED = 130
 """exit status of what Ctrl-C or a signal ended, as shells have it"""
+GROUPS = {
+    "look": "Look at logs, at the arm and at its actuators",
+    "fit": "Fit parameters to logs",
+    "judge": "Judge a fit",
+    "plan": "Plan the next experiment",
+    "model": "Use and build models",
+}
+
+
+class Grouped(TyperGroup):
+    """Lists the commands of a group under its heading."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write one section for each group."""
+        width = max(map(len, self.commands))
+        for name, heading in GROUPS.items():
+            commands = [(n, c) for n, c in self.commands.items() if getattr(c, "rich_help_panel", "") == name]
+            with formatter.section(heading):
+                limit = formatter.width - 6 - width
+                formatter.write_dl([(n.ljust(width), c.get_short_help_str(limit)) for n, c in commands])
+
 
 app = typer.Typer(
     name="hydroid",
-    help="Find the physical parameters of a hydraulic manipulator from logs of commands and joint angles.",
+    cls=Grouped,
+    help="Estimate the physical parameters of a hydraulic manipulator from logs of commands and joint angles.",
+    epilog="Start with: hydroid check LOG.csv, then hydroid fit-mech LOG.csv",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,  # plain help: importing rich would triple the time it takes
     pretty_exceptions_enable=False,
 )
-app.command("fit-mech")(fit.fit_mech)
-app.command("fit-hyd")(fit.fit_hyd)
-app.command("validate")(validate.validate)
-app.command("simulate")(simulate.simulate)
-app.command("check")(check.check)
-app.command("collect")(collect.collect)
-app.command("identifiability")(identifiability.identifiability)
-app.command("sensitivity")(sensitivity.sensitivity)
-app.command("surface")(surface.surface)
-app.command("design")(design.design)
-app.command("plot-actuator")(plot_actuator.plot_actuator)
-app.command("view")(view.view)
-app.command("build-model")(model.build_model)
+
+
+def _add(group: str, function: Callable[..., None], summary: str, example: str) -> None:
+    name = function.__name__.replace("_", "-")
+    epilog = f"Example: hydroid {name} {example}"
+    register = app.command(name, rich_help_panel=group, short_help=summary, epilog=epilog)
+    register(options.command(function))
+
+
+_add("look", look.check, "what is wrong or odd about logs", "LOG.csv")
+_add("look", look.view, "the arm in motion, in a window or a GIF", "LOG.csv --fit runs/hyd")
+_add("look", look.plot_actuator, "the curves of an actuator", "--fit runs/hyd --joint 2")
+_add("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech")
+_add("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd")
+_add("fit", fit.collect, "merge runs with different seeds", "runs/array/seed-*")
+_add(
+    "judge",
+    judge.validate,
+    "fits on logs they were not fitted to",
+    "OTHER.csv --fit runs/mech --fit runs/hyd",
+)
+_add(
+    "judge",
+    judge.identifiability,
+    "which parameters the logs determine",
+    "LOG.csv --fit runs/hyd --profile F1",
+)
+_add("judge", judge.sensitivity, "outputs against parameters over time", "LOG.csv --fit runs/mech")
+_add("judge", judge.surface, "the error over two parameters", "LOG.csv --fit runs/mech --over K,D")
+_add(
+    "plan",
+    plan.design,
+    "start pose and commands that determine most",
+    "LOG.csv --fit runs/mech --duration 30",
+)
+_add(
+    "model",
+    model.simulate,
+    "what the model does under commands",
+    "COMMANDS.csv --fit runs/hyd --out predicted.csv",
+)
+_add("model", model.build_model, "an arm's MJCF from its meshes", "--arm my-arm.yaml")
 
 
 def _version(wanted: bool) -> None:
@@ -68,6 +109,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 def main() -> None:
     """Run a command: exit 0 done, 2 for what the user can mend, 130 when stopped."""
+    from hydroid.cli.output import show_error, show_usage_error
     from hydroid.errors import HydroidError
 
     stopping.listen()
@@ -76,29 +118,25 @@ def main() -> None:
     except typer.Exit as end:
         code = end.exit_code
     except HydroidError as error:
-        code = _fail(str(error))
-    except KeyboardInterrupt:
-        code = STOPPED
+        show_error(error)
+        code = 2
+    except KeyboardInterrupt as stop:
+        code = _stopped(stop)
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
         code = 0
-    except Exception as error:  # after a notice: what the interrupt met may have made another error of it
-        code = STOPPED if stopping.asked() else _usage(error)
-    if code == STOPPED:
-        message = "stopped; what was computed is kept, and the same command with --resume goes on"
-        typer.echo(f"hydroid: {message}", err=True)
+    except Exception as error:
+        if stopping.asked():  # what the interrupt met may have made another error of it
+            code = _stopped(error)
+        elif getattr(error, "show", None) is None:
+            raise  # a defect of hydroid
+        else:
+            show_usage_error(error)
+            code = int(getattr(error, "exit_code", 2))
     sys.exit(code or 0)
 
 
-def _fail(message: str) -> int:
-    typer.echo(f"hydroid: {' '.join(message.split())}", err=True)
-    return 2
-
-
-def _usage(error: Exception) -> int:
-    """Show click's own errors (a missing argument, an unknown option) its way; let defects through."""
-    show = getattr(error, "show", None)
-    if show is None:
-        raise error
-    show()
-    return int(getattr(error, "exit_code", 2))
+def _stopped(stop: BaseException) -> int:
+    kept = getattr(stop, "kept", "")
+    typer.echo(f"hydroid: stopped; {kept}" if kept else "hydroid: stopped", err=True)
+    return STOPPED

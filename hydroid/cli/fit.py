@@ -1,162 +1,189 @@
-"""`hydroid fit-mech` and `hydroid fit-hyd`: the two stages of a fit."""
+"""`hydroid fit-mech`, `fit-hyd` and `collect`."""
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import (
-    Config,
-    Dask,
-    DaskInsecure,
-    Json,
-    Quiet,
-    Repair,
-    Set,
-    Verbose,
-    Workers,
-    overrides,
-    warn,
-)
+from hydroid.cli.options import Config, Output, Repair, Set, overrides
+from hydroid.cli.output import rows, show
 
-Logs = Annotated[
+if TYPE_CHECKING:
+    from hydroid.api.fit import FitOptions, FitRuns
+
+SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
+"""keys of the table of several runs"""
+_PYMOO = "pymoo:"
+
+FitLogs = Annotated[
     list[Path] | None,
     typer.Argument(
         metavar="LOG.csv...", help="Logs to fit together; with --resume, the run's own if left out."
     ),
 ]
-Algorithm = Annotated[
-    str | None,
-    typer.Option(help="ga (simple), nsga2, cmaes, multistart, or one of pymoo's: pymoo:NSGA3, ..."),
-]
-_PYMOO = "pymoo:"
-Seed = Annotated[int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")]
-Runs = Annotated[int, typer.Option(min=1, max=10_000, help="Repeat over this many seeds, from --seed on.")]
-Out = Annotated[Path | None, typer.Option(help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run in --out, or begin it.")]
-Refinement = Annotated[bool | None, typer.Option(help="Least squares from the search's estimate.")]
-Threads = Annotated[
-    int | None,
-    typer.Option(min=0, max=1024, help="Number of threads (0: one per core; one per worker with --dask)."),
-]
 
 
-def fit_mech(
-    logs: Logs = None,
-    config: Config = "fit-mech",
-    algorithm: Algorithm = None,
-    seed: Seed = None,
-    runs: Runs = 1,
-    out: Out = None,
-    resume: Resume = False,
-    refinement: Refinement = None,
-    threads: Threads = None,
-    dask: Dask = None,
-    dask_insecure: DaskInsecure = False,
-    workers: Workers = None,
-    setting: Set = None,
-    repair: Repair = False,
-    json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
+def _renamed(value: str | None) -> None:
+    if value is not None:
+        raise typer.BadParameter(f"is now --dask local:{value}")
+
+
+@dataclass(kw_only=True)
+class FitFlags:
+    """The options of a fit."""
+
+    algorithm: Annotated[
+        str | None,
+        typer.Option(help="ga (simple), nsga2, cmaes, multistart, or pymoo's, such as pymoo:NSGA3."),
+    ] = None
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")
+    ] = None
+    runs: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Repeat with this many seeds, from --seed on.")
+    ] = 1
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")
+    ] = None
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out, or begin it.")] = False
+    refinement: Annotated[
+        bool | None,
+        typer.Option("--refinement/--no-refinement", help="Refine the search's estimate by least squares."),
+    ] = None
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=1024, help="Number of threads (0: one per core; one per worker with --dask)."
+        ),
+    ] = None
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="local[:N]|slurm|ADDRESS",
+            help="Simulate in N processes of this machine, in Slurm jobs (settings: cluster), or on the workers "
+            "of a Dask scheduler (address or scheduler file). The result is the same.",
+        ),
+    ] = None
+    dask_insecure: Annotated[
+        bool,
+        typer.Option(
+            "--dask-insecure",
+            help="Accept a --dask address without TLS: anyone who reaches its port can run code as you.",
+        ),
+    ] = False
+    workers: Annotated[str | None, typer.Option("--workers", hidden=True, callback=_renamed)] = None
+    setting: Set = None
+    repair: Repair = False
+
+    def changes(self) -> dict[str, Any]:
+        """Return the settings that the options replace."""
+        pymoo = self.algorithm is not None and self.algorithm.startswith(_PYMOO)
+        flags = {
+            "search.algorithm": "pymoo" if pymoo else self.algorithm,
+            "search.pymoo.algorithm": self.algorithm.removeprefix(_PYMOO)
+            if self.algorithm and pymoo
+            else None,
+            "search.seed": self.seed,
+            "simulation.threads": self.threads,
+        }
+        return overrides(self.setting, **flags) | ({"refinement": None} if self.refinement is False else {})
+
+    def options(self, output: Output) -> "FitOptions":
+        """Return what else the options ask for."""
+        from hydroid.api.fit import FitOptions
+        from hydroid.cli.progress import FitProgress
+
+        return FitOptions(
+            runs=self.runs,
+            resume=self.resume,
+            repair=self.repair,
+            dask=self.dask,
+            dask_insecure=self.dask_insecure,
+            progress=partial(FitProgress, quiet=output.silent),
+        )
+
+
+def fit_mech(flags: FitFlags, output: Output, logs: FitLogs = None, config: Config = "fit-mech") -> None:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder: parameter tables, figures, report.html, estimate.yaml, the fitted MJCF, history,
-    checkpoint. Tell what the estimate is worth with `hydroid validate` on a log it was not fitted on.
+    Writes a run folder: report.html, estimate.yaml, tables, figures, the fitted arm, checkpoint. Judge the estimate
+    with `hydroid validate` on a log it was not fitted to.
     """
-    changes = _changes(setting, algorithm, seed, threads, refinement)
-    from hydroid.cli.running import run_fits
+    from hydroid.api.fit import fit_mech
 
-    run_fits(
-        logs or [],
-        config,
-        changes,
-        out,
-        runs,
-        resume=resume,
-        repair=repair,
-        json=json,
-        quiet=quiet,
-        verbose=verbose,
-        warn=warn,
-        dask=dask,
-        dask_insecure=dask_insecure,
-    )
+    changes, how = flags.changes(), flags.options(output)
+    _show(fit_mech(logs or [], flags.out, config=config, overrides=changes, options=how), output)
 
 
 def fit_hyd(
-    logs: Logs = None,
+    flags: FitFlags,
+    output: Output,
+    logs: FitLogs = None,
     mech: Annotated[
         Path | None,
-        typer.Option(metavar="RUN|YAML", help="Stage 1: its run folder, or a YAML of its values."),
+        typer.Option(
+            metavar="RUN|YAML",
+            help="Stage 1: its run folder, whose arm and log layout count where --config has none, or its values.",
+        ),
     ] = None,
     config: Config = "fit-hyd",
-    algorithm: Algorithm = None,
-    seed: Seed = None,
-    runs: Runs = 1,
-    out: Out = None,
-    resume: Resume = False,
-    refinement: Refinement = None,
-    refine: Annotated[
-        bool | None, typer.Option(help="Then refinement both stages' parameters together.")
+    joint: Annotated[
+        bool | None,
+        typer.Option("--joint/--no-joint", help="Then refine the parameters of both stages together."),
     ] = None,
-    threads: Threads = None,
-    dask: Dask = None,
-    dask_insecure: DaskInsecure = False,
-    workers: Workers = None,
-    setting: Set = None,
-    repair: Repair = False,
-    json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
-    """Estimate the hydraulic actuator with the arm fixed at stage 1's estimate (stage 2).
+    """Estimate the hydraulic actuator with the arm fixed at the estimate of stage 1 (stage 2).
 
-    Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as
-    fit-mech does.
+    Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as fit-mech
+    does.
     """
-    changes = _changes(setting, algorithm, seed, threads, refinement)
-    if refine is not None:
-        changes["joint_refinement"] = refine
-    from hydroid.cli.running import run_fits, with_mechanical
+    from hydroid.api.fit import fit_hyd
 
-    if logs:
-        changes = with_mechanical(mech, config, changes)
-    run_fits(
-        logs or [],
-        config,
-        changes,
-        out,
-        runs,
-        resume=resume,
-        repair=repair,
-        json=json,
-        quiet=quiet,
-        verbose=verbose,
-        warn=warn,
-        dask=dask,
-        dask_insecure=dask_insecure,
-    )
+    changes = flags.changes() | ({} if joint is None else {"joint_refinement": joint})
+    how = flags.options(output)
+    _show(fit_hyd(logs or [], flags.out, mech=mech, config=config, overrides=changes, options=how), output)
 
 
-def _changes(
-    setting: list[str] | None,
-    algorithm: str | None,
-    seed: int | None,
-    threads: int | None,
-    refinement: bool | None,
-) -> dict[str, Any]:
-    """The settings that flags replace."""
-    changes = overrides(setting)
-    pymoo = algorithm is not None and algorithm.startswith(_PYMOO)
-    flags: dict[str, Any] = {
-        "search.algorithm": "pymoo" if pymoo else algorithm,
-        "search.pymoo.algorithm": algorithm.removeprefix(_PYMOO) if algorithm and pymoo else None,
-        "search.seed": seed,
-        "simulation.threads": threads,
-    }
-    changes |= {key: value for key, value in flags.items() if value is not None}
-    if refinement is False:
-        changes["refinement"] = None
-    return changes
+def collect(
+    runs: Annotated[list[str], typer.Argument(metavar="RUN...", help="Run folders, or patterns of them.")],
+    output: Output,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and tables.")] = Path(
+        "runs/collected"
+    ),
+) -> None:
+    """Merge runs of the same logs and settings with different seeds: median and spread of their estimates.
+
+    Runs that are not finished or are damaged are named and left out. Nothing is copied.
+    """
+    from hydroid.api.fit import collect
+    from hydroid.report.spread import final_spread
+
+    study = collect(runs, out)
+    best, table = study.result.best, final_spread(study.page)
+
+    def content() -> dict[str, Any]:
+        found = {str(run.path): {"seed": run.seed, "rms_deg": run.rms_deg} for run in study.result.runs}
+        return {"out": str(out), "best": str(best.path), "runs": found, "parameters": rows(table, *SPREAD)}
+
+    line = f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
+    show(output, content, [table, line, str(out / f"{study.page.name}.html")])
+
+
+def _show(runs: "FitRuns", output: Output) -> None:
+    from hydroid.report.fit_report import objective_table, parameter_table
+    from hydroid.report.phrases import fit_summary, fit_warnings
+    from hydroid.report.spread import final_spread
+
+    first = runs.results[0]
+    if runs.spread is not None:
+        lines = [final_spread(runs.spread), str(runs.out / f"{runs.spread.name}.html")]
+        found = [r.summary.plain() | {"out": str(r.folder)} for r in runs.results]
+        show(output, lambda: {"out": str(runs.out), "runs": found}, lines)
+        return
+    problem, fit = first.problem, first.fit
+    tables = [objective_table(problem, fit), parameter_table(problem, fit)]
+    words = [fit_summary(fit), *fit_warnings(problem, fit)]
+    content = partial(dict[str, Any], first.summary.plain(), out=str(runs.out))
+    show(output, content, [*tables, *words, str(runs.out / "report.html")])

@@ -1,29 +1,66 @@
-"""`hydroid build-model`: from meshes and the arm's file to MJCF."""
+"""`hydroid simulate` and `build-model`."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hydroid.cli.options import Estimate, Output, overrides
+from hydroid.cli.output import show
+
+
+def simulate(
+    commands: Annotated[
+        Path, typer.Argument(metavar="COMMANDS.csv", help="Commands; angles give the start pose.")
+    ],
+    estimate: Estimate,
+    output: Output,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG.csv", help="The log to write [default: runs/COMMANDS-simulated.csv]."),
+    ] = None,
+    pose: Annotated[
+        str | None, typer.Option(help="Start pose of the arm's file, for commands without angles.")
+    ] = None,
+    noise_deg: Annotated[
+        float, typer.Option(min=0, max=90, help="Standard deviation of Gaussian noise on the angles [deg].")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    trace: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Also write pressures, flows, spool and force (stage 2)."),
+    ] = None,
+) -> None:
+    """Simulate commands with an estimate and write a log: a prediction, or data to test a fit with."""
+    from hydroid.api.look import read_commands
+    from hydroid.api.model import simulate
+    from hydroid.errors import SettingsError
+    from hydroid.identified import load_identified
+
+    target = out or Path("runs") / f"{commands.stem}-simulated.csv"
+    if target.resolve() == commands.resolve():
+        raise SettingsError("would overwrite the commands", where=f"--out {target}", hint="name another file")
+    model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
+    start = read_commands(commands, model.settings, pose)
+    log = simulate(model, start, target, noise_deg=noise_deg, seed=seed, trace=trace)
+    content = {"out": str(target), "samples": len(log.time), "duration_s": float(log.duration)}
+    show(output, lambda: content | {"trace": trace and str(trace)}, [str(target)])
+
 
 def build_model(
+    output: Output,
     arm: Annotated[
         str, typer.Option(help="The arm: a YAML file, or the name of a shipped one.")
     ] = "hydrolek",
     meshes: Annotated[
-        Path | None, typer.Option(help="Folder of the meshes [default: as the arm says].")
+        Path | None, typer.Option(metavar="DIR", help="Folder of the meshes [default: as the arm says].")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="MODEL.xml", help="MJCF to write [default: as it says].")
+        Path | None, typer.Option(metavar="MODEL.xml", help="MJCF to write [default: as the arm says].")
     ] = None,
 ) -> None:
-    """Compute every link's centre of mass and inertia from its mesh and write the arm's MJCF model."""
-    from hydroid.arm.model import write_model
-    from hydroid.settings.arm import load_arm
+    """Compute each link's centre of mass and inertia from its mesh and write the arm's MJCF model."""
+    from hydroid.api.model import build_model
 
-    settings = load_arm(arm)
-    if meshes is not None:
-        settings = settings.model_copy(update={"meshes": meshes.resolve()})
-    target = out or settings.model
-    write_model(settings, target)
-    typer.echo(str(target))
+    target = build_model(arm, meshes, out)
+    show(output, lambda: {"out": str(target)}, [str(target)])

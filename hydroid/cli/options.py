@@ -1,76 +1,137 @@
-"""Options that several commands share."""
+"""Options that several commands share, as records, and what turns a function with records into a command."""
 
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
+
+from hydroid.cli.output import log_lines
 
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG.csv...", help="Logs: commands [%] and joint angles.")
 ]
 Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped one.")]
-ActuatorConfig = Annotated[
-    str | None, typer.Option("--config", help="Settings [default: those beside the parameters, or fit-hyd].")
-]
-Params = Annotated[
-    Path | None,
+Fit = Annotated[
+    Path,
     typer.Option(
-        "--params",
         "--fit",
-        metavar="P",
-        help="Run folder of fit-hyd, its estimate.yaml, or values by name [default: nominal values].",
+        "--params",
+        metavar="RUN|YAML",
+        help="An estimate: a run folder, a saved plant, an estimate.yaml, or a YAML file of values by name.",
     ),
 ]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace one setting, such as search.ga.generations=80."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a setting, such as search.ga.generations=80."),
 ]
-Dask = Annotated[
-    str | None,
-    typer.Option(
-        metavar="local[:N]|slurm|ADDRESS",
-        help="Simulate in N processes of this machine, in Slurm jobs (settings: cluster), or on the workers "
-        "of a Dask scheduler (address or scheduler file). The result is the same.",
-    ),
-]
-DaskInsecure = Annotated[
-    bool,
-    typer.Option(
-        "--dask-insecure",
-        help="Accept a --dask address without TLS: anyone who reaches its port can run code as you.",
-    ),
-]
+Repair = Annotated[bool, typer.Option("--repair", help="Fill short gaps of the logs, and say how many.")]
+FLAGS = {
+    "search.algorithm": "--algorithm",
+    "search.pymoo.algorithm": "--algorithm",
+    "search.seed": "--seed",
+    "simulation.threads": "--threads",
+    "refinement": "--no-refinement",
+    "joint_refinement": "--joint",
+    "design.duration_s": "--duration",
+    "design.joints": "--joints",
+    "design.criterion": "--criterion",
+}
+"""settings that have an option of their own"""
 
 
-def _renamed(value: str | None) -> None:
-    if value is not None:
-        raise typer.BadParameter(f"is now --dask local:{value}")
+@dataclass(kw_only=True)
+class Output:
+    """How a command prints its result."""
+
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON (docs/json.md).")] = False
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")] = False
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Print the lines of run.log too.")] = False
+
+    @property
+    def silent(self) -> bool:
+        """Whether progress is hidden."""
+        return self.quiet or self.json
 
 
-Workers = Annotated[str | None, typer.Option("--workers", hidden=True, callback=_renamed)]
-FitDir = Annotated[
-    Path | None, typer.Option("--fit", metavar="DIR", help="Run folder of a fit: its estimate and settings.")
-]
-Estimate = Annotated[
-    Path | None, typer.Option("--params", metavar="P.yaml", help="Values by name, instead of --fit.")
-]
-StudyConfig = Annotated[
-    str | None,
-    typer.Option("--config", help="Settings [default: the fit's, those beside the values, or fit-mech]."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for scripts.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show the lines of run.log as they come.")]
-Repair = Annotated[bool, typer.Option(help="Fill short gaps of the logs, and say how many.")]
+@dataclass(kw_only=True)
+class Estimate:
+    """The estimate that a command is about, and its settings."""
+
+    fit: Fit
+    config: Annotated[
+        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-mech].")
+    ] = None
+    setting: Set = None
 
 
-def overrides(texts: list[str] | None) -> dict[str, Any]:
-    """Read the `--set` options, by key."""
+@dataclass(kw_only=True)
+class NominalEstimate:
+    """The same with nominal values where none are given."""
+
+    fit: Annotated[
+        Path | None,
+        typer.Option(
+            "--fit",
+            "--params",
+            metavar="RUN|YAML",
+            help="An estimate, as everywhere [default: nominal values of the arm and the settings].",
+        ),
+    ] = None
+    config: Annotated[
+        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-hyd].")
+    ] = None
+    setting: Set = None
+
+
+def command(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a function whose parameters are those of `function`, with each record's fields in its place."""
+    hints = get_type_hints(function, include_extras=True)
+    records: dict[str, Any] = {}
+    parameters: list[inspect.Parameter] = []
+    for parameter in inspect.signature(function).parameters.values():
+        kind = hints[parameter.name]
+        if not is_dataclass(kind):
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=kind))
+            continue
+        records[parameter.name] = kind
+        own = get_type_hints(kind, include_extras=True)
+        for field in fields(kind):
+            default = field.default if field.default is not _MISSING else inspect.Parameter.empty
+            parameters.append(
+                inspect.Parameter(
+                    field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=own[field.name]
+                )
+            )
+
+    def run(**given: Any) -> None:
+        packed = {
+            name: kind(**{field.name: given.pop(field.name) for field in fields(kind)})
+            for name, kind in records.items()
+        }
+        output = packed.get("output", Output())
+        with log_lines(verbose=output.verbose, quiet=output.quiet):
+            function(**given, **packed)
+
+    run.__name__, run.__doc__, run.__module__ = function.__name__, function.__doc__, function.__module__
+    run.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
+
+
+def overrides(texts: list[str] | None, **flags: Any) -> dict[str, Any]:
+    """Return the settings to replace: those of `--set` and, where not None, those of options by dotted key."""
     from hydroid.settings.load import parse_override
 
-    return dict(parse_override(text) for text in texts or [])
+    changes = dict(parse_override(text) for text in texts or [])
+    return changes | {key: value for key, value in flags.items() if value is not None}
 
 
-def warn(finding: object) -> None:
-    """Print a finding about a log."""
-    typer.echo(f"hydroid: {getattr(finding, 'level', 'note')}: {finding}", err=True)
+def names(text: str) -> list[str]:
+    """Split a list such as `K,D`."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+_MISSING = fields(Estimate)[0].default

@@ -1,9 +1,7 @@
 """Several runs with different seeds, of one command or collected from folders: their spread as a page."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from functools import partial
-from math import degrees
 from pathlib import Path
 
 import numpy as np
@@ -14,40 +12,7 @@ from hydroid.report.page import Page, Plot, Section
 from hydroid.report.phrases import listed, runs_phrase
 from hydroid.report.plots import estimates as plots
 from hydroid.report.table import Cell, Table
-
-
-@dataclass(frozen=True, eq=False)
-class RunEstimate:
-    """One estimate of one run: the run's seed, theta of shape (P,), rms output error [rad]."""
-
-    seed: int
-    theta: Array
-    rms: float
-
-
-@dataclass(frozen=True, eq=False)
-class RunResult:
-    """What one run found.
-
-    path: the run's folder. searched: the search's estimate. best: the final one. refined: whether these two
-    differ. without_effect: parameters without effect on the outputs.
-    """
-
-    path: Path
-    searched: RunEstimate
-    best: RunEstimate
-    refined: bool
-    without_effect: frozenset[str]
-
-    @property
-    def seed(self) -> int:
-        """Of the search."""
-        return self.best.seed
-
-    @property
-    def rms_deg(self) -> float:
-        """Rms output error of the final estimate [deg]."""
-        return degrees(self.best.rms)
+from hydroid.run.collection import RunEstimate, RunResult
 
 
 def run_result(path: Path, seed: int, fit: Fit, names: Sequence[str]) -> RunResult:

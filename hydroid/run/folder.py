@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import logging
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,23 +18,22 @@ from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.search import Checkpoint, SearchState
-from hydroid.identified import IdentifiedModel, write_settings
+from hydroid.identified import CONFIG, IdentifiedModel, write_settings
+from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run.checkpoint import RefinementCheckpoints, read_checkpoint, write_checkpoint
-from hydroid.run.identity import (
-    file_hash,
-    identity,
-    model_hash,
-    refuse_other_arm,
-    refuse_other_identity,
-    refuse_other_settings,
-)
+from hydroid.run.identity import identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
 from hydroid.run.summary import summarise
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+
+DESCRIPTION = "run.json"
+"""name of the file that describes the run: versions, seed, hashes of its logs and files, status"""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class RunFolder:
     @property
     def exists(self) -> bool:
         """Whether a run has begun here."""
-        return (self.path / "run.json").is_file()
+        return (self.path / DESCRIPTION).is_file()
 
     @contextmanager
     def owned(self) -> Generator[None]:
-        """Hold the folder against other processes, and write what happens meanwhile to `run.log`.
+        """Hold the folder against other processes, and write the `hydroid` logger's lines to `run.log`.
 
         Raises:
             RunError: another process holds it, it holds other files, or it cannot be written.
@@ -59,8 +59,24 @@ class RunFolder:
             remove_parts(self.path)
             yield
 
-    def begin(self, settings: FitSettings, logs: Sequence[Path]) -> None:
-        """Write what the run is: settings, the arm it is about, versions, seed, hashes of the logs.
+    def begin_or_continue(self, settings: FitSettings, logs: Sequence[Log]) -> Checkpoint | None:
+        """Describe a new run, or return the checkpoint that the run here continues from, if it has one.
+
+        Raises:
+            RunError: the run here is another one, no checkpoint is whole, or the folder cannot be written.
+        """
+        if not self.exists:
+            self.begin(settings, logs)
+            return None
+        self.check(settings, logs)
+        checkpoint = self.checkpoint()
+        self.status("running")
+        done = 0 if checkpoint is None else len(checkpoint.state.history)
+        _log.info("resumed after generation %d", done)
+        return checkpoint
+
+    def begin(self, settings: FitSettings, logs: Sequence[Log]) -> None:
+        """Write the settings, the arm, versions, seed, and hashes of the logs.
 
         Raises:
             RunError: the folder cannot be written, or holds other files.
@@ -68,69 +84,68 @@ class RunFolder:
         self._refuse_other_files()
         copy_model(load_model(settings.arm.model, settings.arm), self.path / "model")
         write_settings(self.path, settings)
-        files = {"files": self._hashes(), "origin": model_hash(settings.arm), "status": "running"}
-        self.write("run.json", json.dumps(identity(settings, logs) | files, indent=2) + "\n")
+        files = {"files": own_hashes(self.path), "origin": model_hash(settings.arm), "status": "running"}
+        self._describe(identity(settings, logs) | files)
 
-    def check(self, settings: FitSettings, logs: Sequence[Path]) -> None:
+    def check(self, settings: FitSettings, logs: Sequence[Log]) -> None:
         """Refuse to continue a run that was another one.
 
         Raises:
-            RunError: other settings, another arm, another log, another version; each with its name.
+            RunError: other settings, another arm, another log, another version, or a file that was changed.
         """
-        then = self.identity()
-        refuse_other_identity(self.path, then, settings, logs)
-        self._refuse_changed_files(then.get("files", {}))
-        theirs = self.settings()
-        refuse_other_settings(self.path, theirs, settings)
-        if settings.arm.model.resolve() != (self.path / "model" / "arm.xml").resolve():  # its own is its own
-            refuse_other_arm(self.path, theirs.arm, settings.arm, then.get("origin"))
+        refuse_other_run(self.path, self.identity(), self.settings(), settings, logs)
 
     def identity(self) -> dict[str, Any]:
-        """Read run.json.
+        """Read the run's description.
 
         Raises:
             RunError: missing or damaged.
         """
-        file = self.path / "run.json"
+        file = self.path / DESCRIPTION
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
-            hint = "name a folder that `hydroid fit-mech --out` has made"
-            raise RunError(
-                f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})",
-                where=str(file),
-                hint=hint,
-            ) from None
+            what = f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})"
+            raise RunError(what, where=str(file), hint="name a folder that a fit has made") from None
         hashes = [content.get(key, {}) for key in ("logs", "files")] if isinstance(content, dict) else [None]
         if not all(isinstance(h, dict) and all(isinstance(v, str) for v in h.values()) for h in hashes):
             raise RunError("is not a run's description", where=str(file))
         return content
 
     def settings(self, overrides: dict[str, Any] | None = None) -> FitSettings:
-        """Read back the resolved settings, some of them replaced."""
-        self.identity()  # says what is wrong where the folder holds no run
-        return load(self.path / "config.yaml", FitSettings, overrides)
+        """Read back the resolved settings, some of them replaced.
+
+        Raises:
+            RunError, SettingsError: they are missing or damaged.
+        """
+        self.identity()  # raises the clearer error where the folder holds no run
+        return load(self.path / CONFIG, FitSettings, overrides)
 
     def write_estimate(self, problem: Problem, fit: Fit) -> None:
-        """Write `estimate.yaml` and the fitted arm in `model/`."""
+        """Write `estimate.yaml`, and the fitted arm in `model/` as it began the first log."""
         write_estimate(self.path, summarise(problem, fit))
         log, settings = problem.logs[0], self.settings()
-        theta = fit.best.theta
+        model = IdentifiedModel(settings, fit.best.theta, str(self.path / "estimate.yaml"))
         driven = {int(j) + 1 for j in np.flatnonzero(log.driven)} | set(settings.outputs)
-        payload = settings.payloads.get(Path(log.source).name, 0.0)
-        source = str(self.path / "estimate.yaml")
-        identified = IdentifiedModel(settings, theta, source)
-        plant = Plant(identified, joints=sorted(driven), payload=payload)
+        plant = Plant(model, joints=sorted(driven), payload=settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")
 
     def status(self, word: str) -> None:
-        """Record how far the run is: running, interrupted or done."""
-        self.write("run.json", json.dumps(self.identity() | {"status": word}, indent=2) + "\n")
+        """Record whether the run is running, interrupted or done."""
+        self._describe(self.identity() | {"status": word})
 
-    def write(self, name: str, content: str | bytes) -> None:
-        """Write one file of the run."""
-        write_atomic(self.path / name, content)
+    def interrupt(self) -> str:
+        """Record the status `interrupted`, and return what is kept."""
+        if not self.exists:
+            return "nothing was written"
+        self.status("interrupted")
+        checkpoint = self.checkpoint()
+        if checkpoint is None:
+            return f"{self.path} holds no checkpoint yet, and resuming begins again"
+        return (
+            f"{self.path} holds a checkpoint after {len(checkpoint.state.history)} generations to resume from"
+        )
 
     def save(self, state: SearchState, memo: Memo) -> None:
         """Write the checkpoint; the one before it is kept (see `checkpoint`)."""
@@ -145,31 +160,20 @@ class RunFolder:
         return read_checkpoint(self.path / "checkpoint.npz", self._id())
 
     def refinements(self) -> RefinementCheckpoints:
-        """How far the run's refinements are, by name."""
+        """Return how far the run's refinements are, by name."""
         return RefinementCheckpoints(self.path / "refinement.npz", self._id())
 
+    def _describe(self, content: dict[str, Any]) -> None:
+        write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")
+
     def _id(self) -> str:
-        """What tells this run's checkpoints from those of others."""
+        """A digest that distinguishes this run's checkpoints from those of others."""
         identity = {key: value for key, value in self.identity().items() if key != "status"}
         return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
-    def _hashes(self) -> dict[str, str]:
-        """What the run's own settings and model are, by file."""
-        names = ("config.yaml", "arm.yaml", "model/arm.xml")
-        files = [self.path / name for name in names]
-        files += sorted((self.path / "model" / "meshes").glob("*"))
-        return {f.relative_to(self.path).as_posix(): file_hash(f) for f in files if f.is_file()}
-
-    def _refuse_changed_files(self, then: dict[str, str]) -> None:
-        now = self._hashes()
-        for name, known in then.items():
-            if now.get(name) != known:
-                hint = "put it back as it was, or choose another --out"
-                raise RunError("has changed since the run began", where=str(self.path / name), hint=hint)
-
     def _refuse_other_files(self) -> None:
-        """A folder is the run's where it is empty, or has the run's description or at least its lock."""
+        """A folder is the run's if it is empty, or holds a run's description or at least its lock."""
         if not self.path.exists() or self.exists or (self.path / LOCK).exists():
             return
         if not self.path.is_dir() or any(self.path.iterdir()):
-            raise RunError("exists and holds no run", where=str(self.path), hint="choose another --out")
+            raise RunError("exists and holds no run", where=str(self.path), hint="choose another folder")

@@ -7,86 +7,103 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import hydroid
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
-from hydroid.identified import portable
+from hydroid.files import is_file
+from hydroid.identified import ARM, CONFIG, MODEL, portable
+from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 
+FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
+"""settings on which no result depends"""
 
-def identity(settings: FitSettings, logs: Sequence[Path]) -> dict[str, Any]:
-    """Versions, seed, and hashes of the logs."""
+
+def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
+    """Return versions, seed, and hashes of the logs."""
     return {
         "hydroid": hydroid.__version__,
         "mujoco": version("mujoco"),
         "numpy": version("numpy"),
         "python": platform.python_version(),
         "seed": settings.search.seed,
-        "logs": {str(path): file_hash(path) for path in logs},
+        "logs": {log.source: _log_hash(log) for log in logs},
     }
 
 
-def refuse_other_identity(
-    where: Path, then: dict[str, Any], settings: FitSettings, logs: Sequence[Path]
+def own_hashes(folder: Path) -> dict[str, str]:
+    """Return hashes of the settings and the model in a run folder, by file."""
+    files = [folder / name for name in (CONFIG, ARM, MODEL)]
+    files += sorted((folder / MODEL).parent.glob("meshes/*"))
+    return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
+
+
+def refuse_other_run(
+    folder: Path, then: dict[str, Any], before: FitSettings, settings: FitSettings, logs: Sequence[Log]
 ) -> None:
-    """Raise RunError where other logs or versions decide the result."""
+    """Refuse to continue the run in a folder where anything that decides its result is another.
+
+    Args:
+        folder: of the run.
+        then: its description.
+        before: its settings.
+        settings: of now.
+        logs: of now.
+
+    Raises:
+        RunError: other logs, versions, settings, another arm or model, or a file of the run that was changed.
+    """
+    other = "choose another folder"
     now = identity(settings, logs)
     for key in ("hydroid", "mujoco", "logs"):
         if then.get(key) != now[key]:
-            raise RunError(
-                f"holds a run with other {key}: {then.get(key)}, now {now[key]}",
-                where=str(where),
-                hint="choose another --out",
-            )
-
-
-def refuse_other_settings(where: Path, then: FitSettings, now: FitSettings) -> None:
-    """Raise RunError with the first setting that differs and changes the result."""
-    for key, old, new in other_settings(then, now):
-        raise RunError(
-            f"holds a run with {key} = {old}, now {new}",
-            where=str(where),
-            hint="continue it with its own settings, or choose another --out",
-        )
+            what = f"holds a run with other {key}: {then.get(key)}, now {now[key]}"
+            raise RunError(what, where=str(folder), hint=other)
+    hashes = own_hashes(folder)
+    for name, known in then.get("files", {}).items():
+        if hashes.get(name) != known:
+            hint = f"put it back as it was, or {other}"
+            raise RunError("has changed since the run began", where=str(folder / name), hint=hint)
+    for key, old, new in other_settings(before, settings):
+        hint = f"continue it with its own settings, or {other}"
+        raise RunError(f"holds a run with {key} = {old}, now {new}", where=str(folder), hint=hint)
+    if settings.arm.model.resolve() == (folder / MODEL).resolve():
+        return
+    arms = (arm.model_dump(mode="json", exclude={"model", "meshes"}) for arm in (before.arm, settings.arm))
+    for key, old, new in _differences(*arms):
+        hint = f"continue it with its own arm, or {other}"
+        raise RunError(f"holds a run of an arm with {key} = {old}, now {new}", where=str(folder), hint=hint)
+    if model_hash(settings.arm) != then.get("origin"):
+        hint = f"resume it by its folder alone, or {other}"
+        what = f"holds a run of another model than {settings.arm.model} is now"
+        raise RunError(what, where=str(folder), hint=hint)
 
 
 def other_settings(then: FitSettings, now: FitSettings) -> list[tuple[str, Any, Any]]:
-    """The settings that differ and change the result, with their values; threads, memory and jobs do not."""
-    return [
-        (key, old, new)
-        for key, old, new in _differences(portable(then), portable(now))
-        if not key.startswith("cluster.") and key not in ("simulation.threads", "simulation.chunk_mib")
-    ]
-
-
-def refuse_other_arm(where: Path, then: Arm, now: Arm, model: str | None) -> None:
-    """Raise RunError with the first of the arm's settings that differs, or where its model's hash does."""
-    old, new = (a.model_dump(mode="json", exclude={"model", "meshes"}) for a in (then, now))
-    for key, before, after in _differences(old, new):
-        raise RunError(
-            f"holds a run of an arm with {key} = {before}, now {after}",
-            where=str(where),
-            hint="continue it with its own arm, or choose another --out",
-        )
-    if model_hash(now) != model:
-        hint = "continue it by `--resume --out` alone, or choose another --out"
-        raise RunError(f"holds a run of another model than {now.model} is now", where=str(where), hint=hint)
+    """Return the settings that differ and change the result, with their values."""
+    return [d for d in _differences(portable(then), portable(now)) if not d[0].startswith(FREE)]
 
 
 def model_hash(arm: Arm) -> str:
-    """Hash of the arm's MJCF and of its meshes."""
+    """Return the hash of the arm's MJCF and of its meshes."""
     spec = load_model(arm.model, arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
     return file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
 
 
 def file_hash(*files: Path) -> str:
-    """SHA-256 of the files' contents."""
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
+    """Return the SHA-256 of the files' contents."""
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _log_hash(log: Log) -> str:
+    """Of the log's file, or of its samples where it has none."""
+    if is_file(Path(log.source)):
+        return file_hash(Path(log.source))
+    return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
 
 
 def _differences(old: Any, new: Any) -> list[tuple[str, Any, Any]]:

@@ -5,18 +5,19 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
+from hydroid.uncertainty.covariance import Uncertainty
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
     """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
     objective = 1.0 if problem.settings.objective.relative else 180 / np.pi
-    names = problem.parameters.names
+    ending = None if fit.refinement is None else fit.refinement.ending
     return FitSummary(
         stage=problem.settings.stage,
-        estimate={name: _parameter(problem, fit, i) for i, name in enumerate(names)},
+        estimate=parameter_estimates(problem, fit.uncertainty),
         final=fit.final,
-        converged=None if fit.refinement is None else fit.refinement.ending.converged,
-        ending=None if fit.refinement is None else fit.refinement.ending.value,
+        converged=None if ending is None else ending.converged,
+        ending=None if ending is None else ending.value,
         rms_deg=finite(np.degrees(fit.best.rms)),
         seed=problem.settings.search.seed,
         simulations=int(fit.history[-1, 2]),
@@ -32,14 +33,18 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     )
 
 
-def _parameter(problem: Problem, fit: Fit, i: int) -> ParameterEstimate:
-    found = fit.uncertainty
-    low, high = found.interval[i]
-    return ParameterEstimate(
-        value=float(fit.best.theta[i]),
-        unit=problem.parameters.parameters[i].unit,
-        sd=finite(found.standard_deviation[i]),
-        interval=(finite(low), finite(high)),
-        flag=found.status[i].flag.value,
-        at_bound=found.status[i].at_bound,
-    )
+def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str, ParameterEstimate]:
+    """Return each parameter with its uncertainty, by name."""
+    return {
+        parameter.name: ParameterEstimate(
+            value=float(uncertainty.theta[i]),
+            unit=parameter.unit,
+            sd=finite(uncertainty.standard_deviation[i]),
+            interval=(finite(uncertainty.interval[i, 0]), finite(uncertainty.interval[i, 1])),
+            flag=status.flag.value,
+            at_bound=status.at_bound,
+        )
+        for i, (parameter, status) in enumerate(
+            zip(problem.parameters.parameters, uncertainty.status, strict=True)
+        )
+    }

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hydroid import load_settings
 from hydroid.errors import SettingsError
 from hydroid.experiment.design import Design, design
 from hydroid.experiment.information import Judge, log_information, sensor_noise
 from hydroid.experiment.trial import Bench, violation
-from hydroid.jobs import load_settings
 from hydroid.log import Log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.report.page import write_page
 from hydroid.report.plots.contours import contours
@@ -19,7 +20,6 @@ from hydroid.report.study_reports import design_table, sensitivity_page
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
-from hydroid.simulating import simulate_log
 from hydroid.uncertainty.surface import surface
 from hydroid.uncertainty.sweep import SWEEP_POINTS, sweep
 

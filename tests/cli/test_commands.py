@@ -41,24 +41,25 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     done = hydroid("fit-mech", short, "--algorithm", "ga", "--out", "run", "--json", *QUICK, cwd=tmp_path)
-    (found,) = json.loads(done.stdout)["runs"]
+    found = json.loads(done.stdout)
     assert set(found["estimate"]) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
     assert [name for name, p in found["estimate"].items() if p["flag"] == "no effect"] == ["M1"]
     run = tmp_path / "run"
     estimate = yaml.safe_load((run / "estimate.yaml").read_text())
-    assert estimate == found
+    assert estimate | {"out": "run"} == found
     for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.tex", "figures/response.svg"):
         assert (run / name).stat().st_size > 0
     assert json.loads((run / "run.json").read_text())["status"] == "done"
 
     done = hydroid("validate", short, "--fit", "run", "--json", "--out", "val", cwd=tmp_path)
-    (row,) = json.loads(done.stdout)
-    assert row["rms [deg]"] == pytest.approx(found["estimates"]["refined"]["rms_deg"], rel=1e-9)
+    (row,) = json.loads(done.stdout)["results"]
+    assert set(row) == {"fit", "log", "joint", "mae_deg", "rms_deg", "max_deg", "fit_percent"}
+    assert row["rms_deg"] == pytest.approx(found["estimates"]["refined"]["rms_deg"], rel=1e-9)
 
     done = hydroid("simulate", short, "--params", "run/estimate.yaml", "--out", "sim.csv", cwd=tmp_path)
     assert done.stdout == "sim.csv\n"
     done = hydroid("validate", "sim.csv", "--fit", "run", "--json", "--out", "val2", cwd=tmp_path)
-    assert json.loads(done.stdout)[0]["largest [deg]"] < 1e-6  # its own prediction
+    assert json.loads(done.stdout)["results"][0]["max_deg"] < 1e-6  # its own prediction
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 
@@ -68,11 +69,12 @@ def test_identifiability_tells_what_a_log_determines(short: Path, tmp_path: Path
     how = ["--params", values, "--bootstrap", 20, "--profile", "S", "--set", "objective.noise_deg=0.5"]
     done = hydroid("identifiability", short, *how, "--out", "told", "--json", cwd=tmp_path)
     found = json.loads(done.stdout)
-    assert any("M1 has no effect on the angle of joint 2" in words for words in found["open"])
-    rows = {row["name"]: row for row in found["parameters"]}
+    assert any("M1 has no effect on" in words for words in found["unidentifiable_directions"])
+    rows = found["estimate"]
     assert set(rows) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
     assert rows["M1"]["flag"] == "no effect"
-    assert rows["M1"]["standard deviation"] is None  # JSON has no infinity
+    assert rows["M1"]["sd"] is None  # JSON has no infinity
+    assert rows["S"]["profile_interval"] is not None
     for name in ("identifiability.html", "tables/intervals.csv", "figures/profiles.png"):
         assert (tmp_path / "told" / name).stat().st_size > 0
     done = hydroid("identifiability", short, "--profile", "Z", cwd=tmp_path, code=2)
@@ -126,10 +128,10 @@ def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, tmp_path: Path):
     ("arguments", "says"),
     [
         (["fit-mech", "nowhere.csv"], "nowhere.csv"),
-        (["fit-mech"], "no log given"),
+        (["fit-mech"], "no log is given"),
         (["fit-mech", "{log}", "--config", "nonsense"], "nonsense"),
         (["fit-mech", "{log}", "--set", "search.seed=x"], "--set search.seed"),
-        (["fit-mech", "{log}", "--algorithm", "pso"], "'nsga2', 'cmaes'"),
+        (["fit-mech", "{log}", "--algorithm", "pso"], "hydroid: --algorithm: must be 'ga', 'nsga2'"),
         (["fit-mech", "{log}", "--out", "."], "holds no run"),
         (["fit-mech", "{log}", "--set", "outputs=[9]"], "joint 9"),
         (["fit-mech", "{log}", "--sed", "1"], "--sed"),
@@ -203,7 +205,7 @@ def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
         "--json",
         *QUICK,
     ]
-    (found,) = json.loads(hydroid(*arguments, cwd=tmp_path).stdout)["runs"]
+    found = json.loads(hydroid(*arguments, cwd=tmp_path).stdout)
     assert list(found["estimates"]) == ["best", "refined", "joint"]
     assert all(found["estimates"]["refined"]["values"][name] == v for name, v in values.items())
     rms = [found["estimates"][name]["rms_deg"] for name in ("best", "refined", "joint")]
@@ -215,13 +217,13 @@ def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
     assert len(rows) == 1000
     (row,) = json.loads(
         hydroid("validate", "s.csv", "--fit", "run", "--json", "--out", "v", cwd=tmp_path).stdout
-    )
-    assert row["largest [deg]"] < 1e-6
+    )["results"]
+    assert row["max_deg"] < 1e-6
 
 
 def test_the_second_stage_needs_the_first(short: Path, tmp_path: Path):
     done = hydroid("fit-hyd", short, cwd=tmp_path, code=2)
-    assert "--mech" in done.stderr
+    assert "run of stage 1 (mech)" in done.stderr
     (tmp_path / "mech.yaml").write_text("D: 80.0\n")
     done = hydroid("fit-hyd", short, "--mech", "mech.yaml", cwd=tmp_path, code=2)
     assert "M6" in done.stderr

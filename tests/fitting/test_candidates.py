@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import load_settings
 from hydroid.errors import HydroidError
 from hydroid.fitting.fit import fit
-from hydroid.jobs import load_settings
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Evaluation, Memo, Problem
 from hydroid.report.fit_report import fit_page, objective_table, parameter_table
 from hydroid.report.phrases import fit_warnings
-from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 STEPS = 2**16 - 1

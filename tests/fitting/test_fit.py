@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import load_settings
 from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.fitting.fit import fit
 from hydroid.fitting.validation import error_indices
-from hydroid.jobs import load_settings
 from hydroid.log import write_log
 from hydroid.parameters import relative_error
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Memo, Problem
 from hydroid.problem.stage import Stage
 from hydroid.run.folder import RunFolder
-from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SMALL = {

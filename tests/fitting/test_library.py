@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+import hydroid
+from hydroid import load_settings, read_logs
 from hydroid.errors import RunError, SettingsError
 from hydroid.fitting.fit import Fit, fit
-from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
-from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SMALL = {"objective.segments": {"equal": 3}, "simulation.other_joints": "locked", "refinement": None}
@@ -111,5 +112,5 @@ def test_a_library_that_does_not_repeat_itself_is_found_out(tmp_path: Path):
 def test_an_algorithm_that_cannot_begin_leaves_no_folder(tmp_path: Path):
     study = Study(tmp_path, "NSGA3", **{"objective.segments": {"equal": 1}})
     with pytest.raises(SettingsError, match="minimises several objectives"):
-        fit_logs(study.settings, [study.path], tmp_path / "out", Watcher(), lambda finding: None)
+        hydroid.fit(study.settings, read_logs([study.path], study.settings), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import load_settings
 from hydroid.errors import RunError
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Refinement, refine
-from hydroid.jobs import load_settings
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run.checkpoint import RefinementCheckpoints
 from hydroid.settings.search import RefinementSettings
-from hydroid.simulating import simulate_log
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SHORT = RefinementSettings(iterations=6)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from conftest import step_log
 
-from hydroid.jobs import load_settings
+from hydroid import load_settings
 from hydroid.log import Log
 from hydroid.problem.problem import Problem, Spread
 from hydroid.settings.fit import FitSettings

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from hydroid import load_settings, read_logs
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel, identified
-from hydroid.jobs import load_settings, read_logs
 from hydroid.log import Log
 from hydroid.plant import Plant, load_plant
 from hydroid.problem.problem import make_simulation

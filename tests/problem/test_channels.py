@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import fit, load_settings, read_logs
 from hydroid.arm.payload import add_payload
 from hydroid.errors import SettingsError
-from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import read_log, write_log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.simulating import simulate_log
 
 MECHANICAL = {"D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 HYDRAULIC = MECHANICAL | {
@@ -131,5 +131,5 @@ def test_a_payload_of_no_log_is_refused(tmp_path):
     settings, arm, log, truth = mechanical(payloads={"heavy.csv": 5.0})
     write_log(tmp_path / "light.csv", simulate_log(settings, log, truth, "t"), settings.log)
     with pytest.raises(SettingsError, match="none of the logs"):
-        fit_logs(settings, [tmp_path / "light.csv"], tmp_path / "out", None, print)  # type: ignore[arg-type]
+        fit(settings, read_logs([tmp_path / "light.csv"], settings), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import load_settings
 from hydroid.errors import SettingsError
 from hydroid.fitting.refinement import refine
-from hydroid.jobs import load_settings
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.prediction import simulate_log
 from hydroid.problem.priors import REACH, Priors
 from hydroid.problem.problem import Problem
 from hydroid.settings.problem import PriorSettings
 from hydroid.settings.search import RefinementSettings
-from hydroid.simulating import simulate_log
 
 PARAMETERS = ParameterSet(
     (

@@ -11,10 +11,11 @@ from hydroid.report.fit_report import objective_table, parameter_table, pareto_t
 from hydroid.report.joint_record import joint_records
 from hydroid.report.names import log_names
 from hydroid.report.phrases import fit_warnings, parameter_advice
-from hydroid.report.spread import RunEstimate, spread_table
+from hydroid.report.spread import spread_table
 from hydroid.report.table import Table
 from hydroid.report.uncertainty_report import UncertaintyStudy, interval_table
 from hydroid.report.validation_report import Validation, validation_page
+from hydroid.run.collection import RunEstimate
 from hydroid.uncertainty.directions import identifiability
 
 

@@ -14,19 +14,18 @@ import numpy as np
 import pytest
 from conftest import step_log
 
-from hydroid import jobs
+from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
 from hydroid.fitting.search import SearchState
-from hydroid.jobs import fit_logs, load_settings
 from hydroid.log import write_log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Memo, Problem
 from hydroid.run import lock
 from hydroid.run.checkpoint import DAMAGED, PREVIOUS
 from hydroid.run.folder import RunFolder
 from hydroid.run.lock import locked
 from hydroid.search.algorithm import Population
-from hydroid.simulating import simulate_log
 
 SMALL = {
     "search.algorithm": "ga",
@@ -65,7 +64,7 @@ def made(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def _no_report(monkeypatch):
     """Figures take longer than all else here."""
-    monkeypatch.setattr(jobs, "write_page", lambda *_: [])
+    monkeypatch.setattr("hydroid.report.page.write_page", lambda *_: [])
 
 
 @pytest.fixture
@@ -73,7 +72,7 @@ def folder(made, tmp_path) -> RunFolder:
     """A run that has begun, with two checkpoints of one and of two generations."""
     settings, arm, path, _ = made
     folder = RunFolder(tmp_path / "run")
-    folder.begin(settings, [path])
+    folder.begin(settings, read_logs([path], settings))
     for generations in (1, 2):
         folder.save(*state_of(made, generations))
     return folder
@@ -166,7 +165,7 @@ def test_the_checkpoint_of_another_run_is_refused(folder, made, tmp_path):
     settings, arm, path, _ = made
     other = RunFolder(tmp_path / "other")
     search = settings.search.model_copy(update={"seed": 2})
-    other.begin(settings.model_copy(update={"search": search}), [path])
+    other.begin(settings.model_copy(update={"search": search}), read_logs([path], settings))
     shutil.copy(folder.path / "checkpoint.npz", other.path)
     with pytest.raises(RunError, match="another run's"):
         other.checkpoint()
@@ -198,13 +197,13 @@ def test_a_full_disk_leaves_both_checkpoints(folder, made, fault, monkeypatch):
 
 def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_path):
     settings, arm, path, _ = made
-    fit_logs(settings, [path], tmp_path / "whole", Watcher(), print)
+    fit(settings, read_logs([path], settings), tmp_path / "whole", progress=Watcher())
     with pytest.raises(KeyboardInterrupt):
-        fit_logs(settings, [path], tmp_path / "run", Watcher(stop_at=2), print)
+        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
     with files_up_to(4000), pytest.raises(RunError, match="cannot be written"):
-        fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+        fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
     assert len(RunFolder(tmp_path / "run").checkpoint().state.history) == 2
-    fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+    fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
     for name in ("checkpoint.npz", "estimate.yaml", "model/fitted.xml"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
@@ -213,7 +212,7 @@ def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
     settings, arm, path, _ = made
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match=r"file/run: cannot be written \(Not a directory\)"):
-        fit_logs(settings, [path], tmp_path / "file" / "run", Watcher(), print)
+        fit(settings, read_logs([path], settings), tmp_path / "file" / "run", progress=Watcher())
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
@@ -221,7 +220,7 @@ def test_a_read_only_folder_is_refused_before_anything_is_simulated(folder, made
     settings, arm, path, _ = made
     folder.path.chmod(0o555)
     with pytest.raises(RunError, match=r"cannot be written \(Permission denied\)"):
-        fit_logs(settings, [path], folder.path, Watcher(1), print, resume=True)
+        fit(settings, read_logs([path], settings), folder.path, resume=True, progress=Watcher(1))
     folder.path.chmod(0o755)
     assert same(folder.checkpoint(), made, 2)
 
@@ -231,7 +230,7 @@ def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     for resume in (False, True):
         with pytest.raises(RunError, match="holds no run"):
-            fit_logs(settings, [path], tmp_path, Watcher(), print, resume=resume)
+            fit(settings, read_logs([path], settings), tmp_path, resume=resume, progress=Watcher())
     assert content(tmp_path) == {"thesis.tex": b"mine"}
 
 
@@ -239,10 +238,10 @@ def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
     settings, arm, path, _ = made
     folder = RunFolder(tmp_path)
     with locked(tmp_path):
-        folder.begin(settings, [path])
+        folder.begin(settings, read_logs([path], settings))
     (tmp_path / "run.json").unlink()
     (tmp_path / ".config.yaml.abc.part").write_text("half")
-    fit_logs(settings, [path], tmp_path, Watcher(), print, resume=True)
+    fit(settings, read_logs([path], settings), tmp_path, resume=True, progress=Watcher())
     assert folder.identity()["status"] == "done"
     assert not list(tmp_path.rglob(".*.part"))
 
@@ -250,11 +249,11 @@ def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
 @pytest.mark.parametrize("name", ["config.yaml", "arm.yaml", "model/arm.xml"])
 def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, made, name):
     settings, arm, path, _ = made
-    folder.check(settings, [path])
+    folder.check(settings, read_logs([path], settings))
     file = folder.path / name
     file.write_text(file.read_text() + "\n")
     with pytest.raises(RunError, match=f"{name}: has changed since the run began"):
-        folder.check(settings, [path])
+        folder.check(settings, read_logs([path], settings))
 
 
 def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
@@ -263,20 +262,23 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
     with pytest.raises(RunError, match=r"an arm with joints|an arm with .*name"):
         folder.check(
             settings.model_copy(update={"arm": arm.model_copy(update={"joints": (joint, *arm.joints[1:])})}),
-            [path],
+            read_logs([path], settings),
         )
     model = tmp_path / "model.xml"
     text = arm.model.read_text().replace('meshdir="', f'meshdir="{arm.model.parent}/')
     model.write_text(text)
     with pytest.raises(RunError, match="another model"):
-        folder.check(settings.model_copy(update={"arm": arm.model_copy(update={"model": model})}), [path])
+        folder.check(
+            settings.model_copy(update={"arm": arm.model_copy(update={"model": model})}),
+            read_logs([path], settings),
+        )
 
 
 def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
     settings, arm, path, _ = made
     with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
-        fit_logs(settings, [path], tmp_path / "run", Watcher(), print)
-    fit_logs(settings, [path], tmp_path / "run", Watcher(), print)
+        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
+    fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
 
 
 def test_a_killed_process_leaves_no_lock(tmp_path):
@@ -311,8 +313,8 @@ def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):
 def test_a_run_tells_its_course_in_its_log(made, tmp_path):
     settings, arm, path, _ = made
     with pytest.raises(KeyboardInterrupt):
-        fit_logs(settings, [path], tmp_path / "run", Watcher(stop_at=2), print)
-    fit_logs(settings, [path], tmp_path / "run", Watcher(), print, resume=True)
+        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
+    fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
     lines = (tmp_path / "run" / "run.log").read_text().splitlines()
     for words in (
         "mujoco",

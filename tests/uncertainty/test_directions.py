@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from conftest import step_log
 
+from hydroid import load_settings
 from hydroid.hydraulics.solenoid import force_curve
-from hydroid.jobs import load_settings
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.simulating import simulate_log
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.directions import Identifiability, identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag

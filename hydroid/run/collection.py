@@ -1,31 +1,64 @@
-"""`hydroid collect` as a plain function: runs that were made apart, and what they found together."""
+"""Finished runs that were made apart and differ only in their seeds."""
 
 import glob
+import logging
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, NamedEstimate, read_estimate
-from hydroid.parameters import ParameterSet
-from hydroid.problem.stage import Stage
-from hydroid.report.page import write_page
-from hydroid.report.spread import RunEstimate, RunResult, final_spread, spread_page
-from hydroid.report.table import Table
+from hydroid.identified import ARM, CONFIG
+from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.flags import Flag
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class RunEstimate:
+    """One estimate of one run: the run's seed, theta of shape (P,), rms output error [rad]."""
+
+    seed: int
+    theta: Array
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """What one run found.
+
+    path: the run's folder. searched: the search's estimate. best: the final one. refined: whether these two
+    differ. without_effect: parameters without effect on the outputs.
+    """
+
+    path: Path
+    searched: RunEstimate
+    best: RunEstimate
+    refined: bool
+    without_effect: frozenset[str]
+
+    @property
+    def seed(self) -> int:
+        """Of the search."""
+        return self.best.seed
+
+    @property
+    def rms_deg(self) -> float:
+        """Rms output error of the final estimate [deg]."""
+        return math.degrees(self.best.rms)
 
 
 @dataclass(frozen=True)
-class Collected:
-    """The spread over runs, and the runs in the order of their seeds."""
+class Collection:
+    """The parameters of all runs, and the runs in the order of their seeds."""
 
-    table: Table
+    parameters: ParameterSet
     runs: tuple[RunResult, ...]
 
     @property
@@ -38,44 +71,39 @@ class Collected:
 class _Run:
     identity: dict[str, Any]
     settings: FitSettings
-    parameters: ParameterSet
     result: RunResult
 
 
-def collect(names: Sequence[str], out: Path, tell: Callable[[str], None]) -> Collected:
-    """Merge finished runs that differ in nothing but their seeds; nothing of them is copied or changed.
+def read_runs(names: Sequence[str], out: Path) -> Collection:
+    """Read finished runs that differ in nothing but their seeds; those that cannot be used are left out.
 
     Args:
         names: run folders, or patterns of them, in any order.
-        out: folder for the tables and the figure.
-        tell: takes a line for each run that is left out (not finished, damaged, or a seed that another has),
-            and for each that cannot be mixed with the first.
+        out: the folder for what is to be written about them.
 
     Raises:
-        RunError: no run is left, runs differ in more than their seeds, or `out` cannot be written.
+        RunError: no run is left, runs differ in more than their seeds, or `out` is a run itself.
     """
     if RunFolder(out).exists:
-        raise RunError("is a run itself", where=f"--out {out}", hint="name another folder")
+        raise RunError("is a run itself", where=str(out), hint="name another folder")
     runs: list[_Run] = []
     for path in _folders(names):
         try:
             runs.append(_read(path))
         except HydroidError as error:
-            tell(f"left out: {error}")
+            _log.warning("left out: %s", error)
     if not runs:
-        hint = "finish one that was stopped with --resume"
-        raise RunError("no finished run is there", where=" ".join(names), hint=hint)
+        raise RunError(
+            "no finished run is there", where=" ".join(names), hint="resume those that were stopped"
+        )
     runs.sort(key=lambda run: (run.result.seed, run.result.path))
-    _refuse_others(runs, tell)
+    _refuse_others(runs)
     once: dict[int, RunResult] = {}
     for result in (run.result for run in runs):
         kept = once.setdefault(result.seed, result)
         if kept is not result:
-            tell(f"left out: {result.path}: has seed {result.seed}, as {kept.path} has")
-    results = tuple(once.values())
-    page = spread_page(runs[0].parameters, results)
-    write_page(page, out)
-    return Collected(final_spread(page), results)
+            _log.warning("left out: %s: has seed %d, as %s has", result.path, result.seed, kept.path)
+    return Collection(runs[0].settings.parameter_set(), tuple(once.values()))
 
 
 def _folders(names: Sequence[str]) -> list[Path]:
@@ -86,22 +114,20 @@ def _folders(names: Sequence[str]) -> list[Path]:
 
 
 def _read(path: Path) -> _Run:
-    """Read what a finished run was and found.
+    """Read a finished run.
 
     Raises:
-        HydroidError: it is not finished or damaged.
+        HydroidError: it is not finished or is damaged.
     """
     folder = RunFolder(path)
     identity = folder.identity()
     if identity.get("status") != "done":
-        what = f"is not finished ({identity.get('status')})"
-        raise RunError(what, where=str(path), hint="finish it with --resume")
-    for name in ("config.yaml", "arm.yaml"):
+        raise RunError(f"is not finished ({identity.get('status')})", where=str(path), hint="resume it")
+    for name in (CONFIG, ARM):
         if not (path / name).is_file() or file_hash(path / name) != identity.get("files", {}).get(name):
             raise RunError("is gone, or has changed since the run began", where=str(path / name))
     settings = folder.settings()
-    parameters = Stage(settings).parameters
-    return _Run(identity, settings, parameters, _result(path, settings.search.seed, parameters))
+    return _Run(identity, settings, _result(path, settings.search.seed, settings.parameter_set()))
 
 
 def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
@@ -110,25 +136,23 @@ def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
     names = list(summary.estimates)
     if not names or summary.final not in names:
         raise RunError("is not an estimate that a run has written", where=str(file))
-    first, last = (
-        _estimate(summary.estimates[n], seed, parameters, str(file)) for n in (names[0], summary.final)
-    )
-    without = frozenset(name for name, p in summary.estimate.items() if p.flag == Flag.NO_EFFECT)
+
+    def estimate(found: NamedEstimate) -> RunEstimate:
+        if found.rms_deg is None:
+            raise RunError("is the estimate of a simulation that diverged", where=str(file))
+        return RunEstimate(seed, parameters.vector(found.values, str(file)), math.radians(found.rms_deg))
+
+    without = frozenset(name for name, p in summary.estimate.items() if p.flag == "no effect")
+    first, last = (estimate(summary.estimates[name]) for name in (names[0], summary.final))
     return RunResult(path, first, last, summary.final != names[0], without)
 
 
-def _estimate(found: NamedEstimate, seed: int, parameters: ParameterSet, source: str) -> RunEstimate:
-    if found.rms_deg is None:
-        raise RunError("is the estimate of a simulation that diverged", where=source)
-    return RunEstimate(seed, parameters.vector(found.values, source), math.radians(found.rms_deg))
-
-
-def _refuse_others(runs: Sequence[_Run], tell: Callable[[str], None]) -> None:
-    """Tell each run that is not the first with another seed, and raise RunError where there is one."""
+def _refuse_others(runs: Sequence[_Run]) -> None:
+    """Name each run that is not the first with another seed, and raise RunError where there is one."""
     first, *rest = runs
-    differences = [(run.result.path, words) for run in rest if (words := _difference(first, run))]
-    for path, words in differences:
-        tell(f"{path}: {words}")
+    differences = [(run.result.path, text) for run in rest if (text := _difference(first, run))]
+    for path, text in differences:
+        _log.warning("%s: %s", path, text)
     if differences:
         what = f"{len(differences)} of {len(runs)} runs differ from {first.result.path} in more than the seed"
         raise RunError(what, hint="collect them apart")
@@ -154,4 +178,4 @@ def _logs(run: _Run) -> list[tuple[str, str]]:
 
 def _model(run: _Run) -> dict[str, str]:
     """Hashes of the arm, its model and its meshes, by file."""
-    return {name: known for name, known in run.identity.get("files", {}).items() if name != "config.yaml"}
+    return {name: known for name, known in run.identity.get("files", {}).items() if name != CONFIG}

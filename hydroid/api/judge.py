@@ -1,0 +1,173 @@
+"""Judge a fit: `validate` it on other logs; `identifiability`, `sensitivity` and `surface` at its estimate."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hydroid.api.look import read_logs
+from hydroid.api.study import Study
+from hydroid.errors import RunError, SettingsError
+from hydroid.identified import IdentifiedModel
+from hydroid.log import Log
+from hydroid.progress import Progress, no_progress
+
+if TYPE_CHECKING:
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.report.validation_report import Validation
+    from hydroid.uncertainty.surface import Surface
+    from hydroid.uncertainty.sweep import Sweep
+
+
+def validate(
+    models: Sequence[IdentifiedModel], logs: Sequence[str | Path], out: str | Path | None = "runs/validation"
+) -> "Study[list[Validation]]":
+    """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots.
+
+        study = hydroid.validate([hydroid.load_identified("runs/a")], ["b.csv"])
+        print(study.result[0].indices[2].rms)  # of joint 2 [rad]
+
+    Args:
+        models: identified arms, each of which reads the logs with its own settings.
+        logs: CSV files.
+        out: folder for the page, the table and the figures; None: nothing is written.
+
+    Returns:
+        The study, with one result for each fit and log.
+
+    Raises:
+        LogError: a log cannot be used.
+        RunError: a simulation diverged, or the folder cannot be written.
+    """
+    read = [read_logs(logs, model.settings) for model in models]
+    from hydroid.fitting.validation import error_indices
+    from hydroid.prediction import predict
+    from hydroid.report.validation_report import Validation, validation_page
+
+    results: list[Validation] = []
+    for model, each in zip(models, read, strict=True):
+        outputs = model.settings.outputs
+        for log in each:
+            response = predict(model, log, outputs)
+            indices = {
+                joint: error_indices(log.angle[:, joint - 1], response[:, column])
+                for column, joint in enumerate(outputs)
+            }
+            results.append(Validation(model.name, log, response, indices))
+    return Study(results, validation_page(results)).write(out)
+
+
+def identifiability(
+    model: IdentifiedModel,
+    logs: Sequence[Log],
+    out: str | Path | None = "runs/identifiability",
+    *,
+    profile: Sequence[str] = (),
+    bootstrap: tuple[int, int] = (0, 0),
+    progress: Progress = no_progress,
+) -> "Study[UncertaintyStudy]":
+    """Find which combinations of parameters logs determine, at an estimate or at given values.
+
+        model = hydroid.load_identified("runs/a")
+        study = hydroid.identifiability(model, hydroid.read_logs(["a.csv"], model.settings), profile=["K"])
+        print(study.result.uncertainty.interval)
+
+    Args:
+        model: the identified arm (`middle_of_bounds` gives one before any fit).
+        logs: the logs.
+        out: folder for the page, tables and figures; None: nothing is written.
+        profile: names of parameters whose profile likelihood is wanted.
+        bootstrap: number of refits with redrawn residuals, 0 for none, and the seed.
+        progress: called with what is done, how much of it, and how much there is.
+
+    Raises:
+        SettingsError: a name that is no free parameter.
+        RunError: the simulation diverged, or the folder cannot be written.
+    """
+    from hydroid.problem.problem import Problem
+    from hydroid.report.uncertainty_report import UncertaintyStudy, uncertainty_page
+    from hydroid.uncertainty import covariance, directions, intervals
+
+    problem = Problem(model.settings, list(logs))
+    if not np.isfinite(problem.residuals(model.theta[None])).all():
+        raise RunError("the simulation diverged with these parameters", where=model.source)
+    uncertainty = covariance.uncertainty(problem, model.theta)
+    profiles: list[intervals.Profile] = []
+    for done, name in enumerate(profile):
+        progress("profiles", done, len(profile))
+        profiles.append(intervals.profile(problem, uncertainty, name))
+    refits, seed = bootstrap
+    drawn = intervals.bootstrap(problem, uncertainty, refits, seed, progress) if refits else None
+    found = directions.identifiability(problem, uncertainty)
+    study = UncertaintyStudy(problem, model.source, uncertainty, found, tuple(profiles), drawn)
+    return Study(study, uncertainty_page(study)).write(out)
+
+
+def sensitivity(
+    model: IdentifiedModel,
+    logs: Sequence[Log],
+    out: str | Path | None = "runs/sensitivity",
+    *,
+    progress: Progress = no_progress,
+) -> "Study[Sweep]":
+    """Find how every output depends on every free parameter against time (article, figure 10).
+
+        model = hydroid.load_identified("runs/a")
+        study = hydroid.sensitivity(model, hydroid.read_logs(["a.csv"], model.settings))
+
+    Args:
+        model: the identified arm.
+        logs: the logs.
+        out: folder for the page, figures and CSV; None: nothing is written.
+        progress: called with what is done, how much of it, and how much there is.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    from hydroid.problem.problem import Problem
+    from hydroid.report.study_reports import sensitivity_page
+    from hydroid.uncertainty.sweep import sweep
+
+    problem = Problem(model.settings, list(logs))
+    result = sweep(problem, model.theta, progress)
+    return Study(result, sensitivity_page(problem, model.theta, result)).write(out)
+
+
+def surface(
+    model: IdentifiedModel,
+    logs: Sequence[Log],
+    over: Sequence[tuple[str, str]],
+    out: str | Path | None = "runs/surface",
+    *,
+    grid: tuple[int, float | None] = (31, None),
+    progress: Progress = no_progress,
+) -> "Study[list[Surface]]":
+    """Compute the error over two parameters, all others held at the estimate (article, figure 11).
+
+        model = hydroid.load_identified("runs/a")
+        study = hydroid.surface(model, hydroid.read_logs(["a.csv"], model.settings), [("K", "D")])
+
+    Args:
+        model: the identified arm.
+        logs: the logs.
+        over: pairs of parameters.
+        out: folder for the page, figures and CSV; None: nothing is written.
+        grid: points in each direction, and the relative reach around the estimate (0.2 for ±20 %; None: the
+            parameters' bounds).
+        progress: called with what is done, how much of it, and how much there is.
+
+    Raises:
+        SettingsError: a pair that is none, or a parameter that does not exist or is fixed.
+        RunError: the folder cannot be written.
+    """
+    for pair in over:
+        if len(pair) != 2:
+            raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
+    from hydroid.problem.problem import Problem
+    from hydroid.report.study_reports import surface_page
+    from hydroid.uncertainty import surface as surfaces
+
+    problem = Problem(model.settings, list(logs))
+    results = [surfaces.surface(problem, model.theta, pair, *grid, progress) for pair in over]
+    return Study(results, surface_page(results, model.settings.objective)).write(out)

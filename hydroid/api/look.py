@@ -1,0 +1,200 @@
+"""Look at logs, at an actuator and at the arm in motion: `check`, `view`, `plot_actuator`; and read inputs."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hydroid.assets import find_config
+from hydroid.errors import SettingsError
+from hydroid.identified import IdentifiedModel
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load
+
+if TYPE_CHECKING:
+    from hydroid.log import Finding, Log
+
+NOTE = 25
+"""level of the logging module between INFO and WARNING, for notes on a log"""
+logging.addLevelName(NOTE, "NOTE")
+
+_log = logging.getLogger(__name__)
+
+
+def load_settings(config: str | Path, overrides: Mapping[str, Any] | None = None) -> FitSettings:
+    """Read the settings of a fit, and the arm they name.
+
+        settings = hydroid.load_settings("fit-mech", {"search.seed": 3})
+
+    Args:
+        config: a YAML file, or the name of a shipped one.
+        overrides: settings to replace, by dotted key.
+
+    Raises:
+        SettingsError: no such file, or a setting that is not allowed.
+    """
+    return load(find_config(config), FitSettings, dict(overrides or {}))
+
+
+def read_logs(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> "list[Log]":
+    """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
+
+        logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
+
+    Args:
+        logs: CSV files.
+        settings: of the fit; joints that a log does not measure stand in its `start_pose`.
+        repair: fill holes up to `log.repair_s`.
+
+    Raises:
+        LogError: the first fault that keeps a log from being used.
+    """
+    return read_with_findings(logs, settings, repair=repair)[0]
+
+
+def read_with_findings(
+    logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False
+) -> "tuple[list[Log], list[Finding]]":
+    """Do as `read_logs`, and return the warnings and notes too."""
+    from hydroid.log import read_log
+
+    read: list[Log] = []
+    found: list[Finding] = []
+    for path in logs:
+        log, findings = read_log(
+            Path(path), settings.log, _ranges(settings), outputs=settings.outputs, repair=repair
+        )
+        _report(findings)
+        found += findings
+        pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
+        read.append(replace(log, angle=pose))
+    return read, found
+
+
+def read_commands(path: str | Path, settings: FitSettings, pose: str | None = None) -> "Log":
+    """Read a CSV of commands, whose angles may be missing.
+
+    Args:
+        path: the file.
+        settings: which map its columns.
+        pose: pose of the arm's file to start from; None: as logged, or the settings' pose where unmeasured.
+
+    Raises:
+        LogError: a fault that keeps the commands from being used.
+        SettingsError: no such pose.
+    """
+    from hydroid.log import read_log
+
+    start = settings.arm.pose(pose or settings.start_pose)
+    log, findings = read_log(Path(path), settings.log, _ranges(settings), angles_required=False)
+    _report(findings)
+    return replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
+
+
+@dataclass(frozen=True, eq=False)
+class LogCheck:
+    """What `check` found in one file: the log, None where it cannot be used, and all findings, errors first."""
+
+    path: Path
+    log: "Log | None"
+    findings: "list[Finding]"
+
+
+def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> list[LogCheck]:
+    """Find everything that is wrong or odd about logs.
+
+        for result in hydroid.check(["a.csv"], hydroid.load_settings("fit-mech")):
+            print(result.path, *result.findings)
+
+    Args:
+        logs: CSV files.
+        settings: of the fit that is to use them.
+        repair: fill holes up to `log.repair_s`.
+    """
+    from hydroid.log import check_log
+
+    how: dict[str, Any] = {"outputs": settings.outputs, "repair": repair}
+    paths = [Path(path) for path in logs]
+    return [LogCheck(path, *check_log(path, settings.log, _ranges(settings), **how)) for path in paths]
+
+
+def plot_actuator(model: IdentifiedModel, joint: int = 2, out: str | Path = "runs/actuator") -> list[Path]:
+    """Draw the curves of one actuator: calibration, current, force, spool, opening, flow and torque.
+
+        hydroid.plot_actuator(hydroid.load_identified("runs/hyd"), joint=2)
+
+    Args:
+        model: of stage 2.
+        joint: numbered from 1.
+        out: folder for the figures.
+
+    Returns:
+        The files.
+
+    Raises:
+        SettingsError: no such joint, no hydraulics, or no force-stroke curve.
+        RunError: `out` cannot be written.
+    """
+    _require_hydraulics(model)
+    from hydroid.problem.stage import Stage
+    from hydroid.report.actuator_report import actuator_page
+    from hydroid.report.joint_actuator import joint_actuator
+    from hydroid.report.page import write_page
+
+    candidate = Stage(model.settings).candidates(model.theta[None])
+    actuator = joint_actuator(model.settings.arm, candidate, joint, model.source)
+    return write_page(actuator_page(actuator), Path(out))
+
+
+def view(
+    model: IdentifiedModel,
+    log: str | Path | None = None,
+    *,
+    pose: str | None = None,
+    gif: str | Path | None = None,
+) -> None:
+    """Show the arm in MuJoCo's viewer in real time until its window is closed, or write its motion to a GIF.
+
+        hydroid.view(hydroid.load_identified("runs/a"), "a.csv", gif="a.gif")
+
+    Args:
+        model: the identified arm.
+        log: whose commands drive; None: the viewer's sliders.
+        pose: pose of the arm's file to start from; by default the first of the log, or the settings' start pose.
+        gif: a file to write; needs a log and no display.
+
+    Raises:
+        RunError: no window can be opened, or the simulation diverged.
+        SettingsError: a GIF without a log, or no such pose.
+    """
+    if gif is not None and log is None:
+        raise SettingsError("needs a log: a file has no sliders", where=str(gif))
+    if model.nominal:
+        _require_hydraulics(model)
+    commands = None if log is None else read_commands(log, model.settings, pose)
+    from hydroid.viewer import show
+
+    if gif is None or commands is None:
+        show.view(model, commands, pose)
+    else:
+        show.animate(model, commands, Path(gif))
+
+
+def _require_hydraulics(model: IdentifiedModel) -> None:
+    if model.settings.stage != "hyd":
+        hint = "name a fit of stage 2, or use the config fit-hyd"
+        raise SettingsError("stage mech has no actuators", where=model.source, hint=hint)
+
+
+def _ranges(settings: FitSettings) -> np.ndarray:
+    """Ranges of the joints [rad], shape (J, 2)."""
+    return np.stack([settings.arm.lower, settings.arm.upper], axis=1)
+
+
+def _report(findings: "Sequence[Finding]") -> None:
+    for finding in findings:
+        level = logging.WARNING if finding.level == "warning" else NOTE
+        _log.log(level, "%s: %s", finding.level, finding)

@@ -1,0 +1,89 @@
+"""What stage 2 takes from stage 1: its estimate, and the arm and log layout that it was made with."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hydroid.assets import find_config
+from hydroid.errors import SettingsError
+from hydroid.estimate import estimate_file, read_values
+from hydroid.files import is_file
+from hydroid.identified import ARM, CONFIG
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load, read_yaml
+from hydroid.settings.problem import MECHANICAL_UNITS
+
+
+def with_mechanics(
+    mech: str | Path | None, config: str | Path, overrides: Mapping[str, Any], logs: Sequence[str]
+) -> dict[str, Any]:
+    """Return overrides that hold the parameters of stage 1 at its estimate.
+
+    A run folder also gives its arm, log layout, start pose and payloads where `config` has none, and its
+    mechanical parameters where the arm is not the config's.
+
+    Args:
+        mech: a run folder of stage 1, or a YAML file of values by name; None: `config` fixes them.
+        config: settings of stage 2.
+        overrides: settings to replace; they have the last word.
+        logs: names of the logs' files.
+
+    Raises:
+        RunError, SettingsError: no values there, or one that stage 2 needs is missing.
+    """
+    changes = dict(overrides)
+    if mech is None:
+        settings = load(find_config(config), FitSettings, changes)
+        free = [name for name in _mechanical(settings) if settings.parameters[name].fixed is None]
+        if free:
+            hint = "name the run of stage 1 (mech), or fix them in the config"
+            raise SettingsError(f"stage 2 needs stage 1's {', '.join(free)}", hint=hint)
+        return changes
+    values, summary = read_values(Path(mech))
+    folder = estimate_file(Path(mech)).parent
+    if summary is not None and is_file(folder / CONFIG):
+        changes = _inherited(folder, config, logs) | changes
+    settings = load(find_config(config), FitSettings, changes)
+    wanted = _mechanical(settings)
+    missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
+    if missing:
+        raise SettingsError(f"has no value for {', '.join(missing)}", where=str(mech))
+    given = [name for name in wanted if name in values and f"parameters.{name}.fixed" not in changes]
+    return changes | {f"parameters.{name}.fixed": values[name] for name in given}
+
+
+def _inherited(folder: Path, config: str | Path, logs: Sequence[str]) -> dict[str, Any]:
+    """Settings of stage 1's run that stage 2's config leaves open."""
+    first = load(folder / CONFIG, FitSettings)
+    own, _ = read_yaml(find_config(config))
+    layout = own.get("log")
+    taken: dict[str, Any] = {
+        f"log.{key}": value
+        for key, value in first.log.model_dump(mode="json").items()
+        if not isinstance(layout, dict) or key not in layout
+    }
+    if "start_pose" not in own:
+        taken["start_pose"] = first.start_pose
+    if "payloads" not in own:
+        taken["payloads"] = {name: mass for name, mass in first.payloads.items() if name in logs}
+    if "arm" not in own:
+        taken["arm"] = str((folder / ARM).resolve())
+        taken |= _parameters(first, own.get("parameters"))
+    return taken
+
+
+def _parameters(first: FitSettings, own: Any) -> dict[str, Any]:
+    """Mechanical parameters of stage 1's arm, where those of stage 2's config belong to another arm."""
+    known: dict[str, Any] = own if isinstance(own, dict) else {}
+    links = first.arm.link_names
+    fitting = {n: p for n, p in known.items() if not isinstance(p, dict) or p.get("link", links[0]) in links}
+    if len(fitting) == len(known):
+        return {}
+    more = {n: first.parameters[n].model_dump(mode="json") for n in _mechanical(first) if n not in fitting}
+    return {"parameters": fitting | more}
+
+
+def _mechanical(settings: FitSettings) -> list[str]:
+    """Names of the parameters that both stages have."""
+    quantities = [name for name in MECHANICAL_UNITS if name != "gain"]
+    return [name for name, p in settings.parameters.items() if p.quantity in quantities]

@@ -1,0 +1,88 @@
+"""Use a model: `simulate` commands, `build_model` from meshes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hydroid.api.look import read_commands
+from hydroid.errors import SettingsError
+from hydroid.files import write_atomic
+from hydroid.identified import IdentifiedModel
+from hydroid.log import Log, write_log
+from hydroid.settings.arm import load_arm
+
+
+def simulate(
+    model: IdentifiedModel,
+    commands: str | Path | Log,
+    out: str | Path | None = None,
+    *,
+    noise_deg: float = 0.0,
+    seed: int = 0,
+    trace: str | Path | None = None,
+) -> Log:
+    """Simulate commands: a prediction, or data to test a fit with.
+
+        log = hydroid.simulate(hydroid.load_identified("runs/a"), "commands.csv", "predicted.csv")
+
+    Args:
+        model: the identified arm.
+        commands: a CSV of commands, whose first angles are the start pose; or a log (see `read_commands`).
+        out: the log to write; None: none.
+        noise_deg: standard deviation of Gaussian noise on every angle [deg].
+        seed: of the noise.
+        trace: a CSV to write with pressures, flows, spool and force of every driven actuator (stage 2).
+
+    Returns:
+        The log with the simulated angles, noise included.
+
+    Raises:
+        SettingsError: a trace of stage 1, or `out` would overwrite the commands.
+        LogError: the commands cannot be used.
+        RunError: the simulation diverged, or a file cannot be written.
+    """
+    if trace is not None and model.settings.stage != "hyd":
+        raise SettingsError("stage mech has no pressures to trace", where=model.source, hint="set stage: hyd")
+    if not isinstance(commands, Log):
+        if out is not None and Path(out).resolve() == Path(commands).resolve():
+            raise SettingsError("would overwrite the commands", where=str(out), hint="name another file")
+        commands = read_commands(commands, model.settings)
+    from hydroid import prediction
+
+    result = prediction.predict_log(model, commands)
+    noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
+    result = replace(result, angle=result.angle + noise)
+    if out is not None:
+        write_log(Path(out), result, model.settings.log)
+    if trace is not None:
+        write_atomic(Path(trace), prediction.trace(model, commands))
+    return result
+
+
+def build_model(
+    arm: str | Path = "hydrolek", meshes: str | Path | None = None, out: str | Path | None = None
+) -> Path:
+    """Compute centres of mass and inertias from an arm's meshes and write its MJCF.
+
+        hydroid.build_model("my-arm.yaml")
+
+    Args:
+        arm: the arm's YAML file, or the name of a shipped one.
+        meshes: folder of the meshes; by default as the arm's file says.
+        out: the MJCF to write; by default as the arm's file says.
+
+    Returns:
+        The file.
+
+    Raises:
+        SettingsError: no such arm. MeshError: a mesh is missing or has no volume.
+    """
+    settings = load_arm(arm)
+    if meshes is not None:
+        settings = settings.model_copy(update={"meshes": Path(meshes).resolve()})
+    target = Path(out or settings.model)
+    from hydroid.arm.model import write_model
+
+    write_model(settings, target)
+    return target

@@ -1,0 +1,51 @@
+"""Plan the next experiment: `design`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hydroid.api.study import Study
+from hydroid.identified import IdentifiedModel
+from hydroid.log import Log, write_log
+from hydroid.progress import Progress, no_progress
+
+if TYPE_CHECKING:
+    from hydroid.experiment.design import Design
+
+
+def design(
+    model: IdentifiedModel,
+    logs: Sequence[Log] = (),
+    out: str | Path | None = "runs/design",
+    *,
+    seed: int = 1,
+    progress: Progress = no_progress,
+) -> "Study[Design]":
+    """Choose start pose and commands that determine most what is known least.
+
+        model = hydroid.load_identified("runs/a", overrides={"design.duration_s": 30})
+        commands = hydroid.design(model).result.log
+
+    Limits and length are the settings `design`. They are checked on the simulated response only.
+
+    Args:
+        model: at the present estimate.
+        logs: records whose information is there already.
+        out: folder for the report, for commands.csv (every angle in the start pose) and for predicted.csv (the
+            simulated motion, which is no measurement); None: nothing is written.
+        seed: the same seed gives the same experiment.
+        progress: called with what is done, how much of it, and how much there is.
+
+    Raises:
+        SettingsError: limits that no experiment keeps.
+        RunError: the folder cannot be written.
+    """
+    from hydroid.experiment import design as experiment
+    from hydroid.report.study_reports import design_page
+
+    settings = model.settings
+    result = experiment.design(settings, model.theta, list(logs), seed, progress)
+    if out is not None:
+        write_log(Path(out) / "commands.csv", result.log, settings.log)
+        write_log(Path(out) / "predicted.csv", result.predicted, settings.log)
+    return Study(result, design_page(settings.arm, settings.design, result, model.values)).write(out)

@@ -1,0 +1,202 @@
+"""`hydroid validate`, `identifiability`, `sensitivity` and `surface`."""
+
+from enum import Enum
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.cli.options import Estimate, Logs, Output, Set, names, overrides
+from hydroid.cli.output import rows, show
+from hydroid.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from hydroid.identified import IdentifiedModel
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.report.validation_report import Validation
+
+
+class Stage(Enum):
+    """The two stages."""
+
+    MECH = "mech"
+    HYD = "hyd"
+
+
+def validate(
+    logs: Logs,
+    output: Output,
+    fit: Annotated[
+        list[Path],
+        typer.Option("--fit", "--params", metavar="RUN|YAML", help="An estimate; repeat for several."),
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and figures.")] = Path(
+        "runs/validation"
+    ),
+    setting: Set = None,
+) -> None:
+    """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots."""
+    from hydroid.api.judge import validate
+    from hydroid.identified import load_identified
+
+    models = [load_identified(path, overrides=overrides(setting)) for path in fit]
+    study = validate(models, logs, out)
+    found = [row for result in study.result for row in _indices(result)]
+    show(output, lambda: {"results": found}, [study.table, str(out / "validation.html")])
+
+
+def identifiability(
+    logs: Logs,
+    output: Output,
+    fit: Annotated[
+        Path | None,
+        typer.Option(
+            "--fit", "--params", metavar="RUN|YAML", help="An estimate [default: the middle of the bounds]."
+        ),
+    ] = None,
+    config: Annotated[
+        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-STAGE].")
+    ] = None,
+    stage: Annotated[Stage, typer.Option(help="The shipped settings to use without --config.")] = Stage.MECH,
+    profile: Annotated[
+        str, typer.Option(metavar="K,D", help="Profile likelihood of these; costs a refinement per point.")
+    ] = "",
+    bootstrap: Annotated[int, typer.Option(min=0, max=100_000, help="Refits with redrawn residuals.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and figures.")] = Path(
+        "runs/identifiability"
+    ),
+    setting: Set = None,
+) -> None:
+    """Find which combinations of parameters the logs determine, at an estimate or at given values.
+
+    Prints standard deviations and 95 % intervals, and each combination that the logs do not determine.
+    """
+    from hydroid.api.judge import identifiability
+    from hydroid.api.look import load_settings, read_logs
+    from hydroid.identified import load_identified, middle_of_bounds
+    from hydroid.report.phrases import direction_phrases
+
+    default, changes = f"fit-{stage.value}", overrides(setting)
+    if fit is None:
+        model = middle_of_bounds(load_settings(config or default, changes))
+    else:
+        model = load_identified(fit, config, changes, default=default)
+    with Progress(quiet=output.silent) as progress:
+        study = identifiability(
+            model,
+            read_logs(logs, model.settings),
+            out,
+            profile=names(profile),
+            bootstrap=(bootstrap, seed),
+            progress=progress,
+        )
+    phrases = direction_phrases(study.result.problem, study.result.identifiability)
+    content = _uncertainty(study.result, phrases)
+    points = [f"- {phrase}" for phrase in phrases]
+    show(output, lambda: content, [study.table, *points, str(out / "identifiability.html")])
+
+
+def sensitivity(
+    logs: Logs,
+    estimate: Estimate,
+    output: Output,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page, figures and CSV.")] = Path(
+        "runs/sensitivity"
+    ),
+) -> None:
+    """Draw how every output depends on every free parameter against time (article, figure 10).
+
+    For each output: its change per 1 % of each parameter at the estimate, and the response for 20 values of each
+    parameter within its bounds (PNG, SVG, CSV).
+    """
+    from hydroid.api.judge import sensitivity
+    from hydroid.api.look import read_logs
+
+    model = _model(estimate)
+    with Progress(quiet=output.silent) as progress:
+        study = sensitivity(model, read_logs(logs, model.settings), out, progress=progress)
+    found = rows(study.table, "log", "output", "parameter", "rms_per_percent")
+    show(output, lambda: {"results": found}, [study.table, str(out / f"{study.page.name}.html")])
+
+
+def surface(
+    logs: Logs,
+    estimate: Estimate,
+    output: Output,
+    over: Annotated[list[str], typer.Option(metavar="K,D", help="Two parameters; repeat for several pairs.")],
+    points: Annotated[int, typer.Option(min=3, max=301, help="Points of the grid in each direction.")] = 31,
+    around: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001, max=1000, metavar="PCT", help="Grid ±PCT % around the estimate [default: the bounds]."
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page, figures and CSV.")] = Path(
+        "runs/surface"
+    ),
+) -> None:
+    """Draw the error over two parameters, all others held at the estimate (article, figure 11).
+
+    The error is the settings' norm over the whole record; --set objective.norm=2 draws the rms error.
+    """
+    from hydroid.api.judge import surface
+    from hydroid.api.look import read_logs
+
+    pairs = [_pair(text) for text in over]
+    model = _model(estimate)
+    grid = points, None if around is None else around / 100
+    with Progress(quiet=output.silent) as progress:
+        study = surface(model, read_logs(logs, model.settings), pairs, out, grid=grid, progress=progress)
+    error = "error" if model.settings.objective.relative else "error_deg"
+    keys = ("parameters", "first_lowest", "second_lowest", f"lowest_{error}")
+    found = rows(study.table, *keys, "first_estimate", "second_estimate", f"estimate_{error}")
+    show(output, lambda: {"results": found}, [study.table, str(out / f"{study.page.name}.html")])
+
+
+def _model(estimate: Estimate) -> "IdentifiedModel":
+    from hydroid.identified import load_identified
+
+    return load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
+
+
+def _pair(text: str) -> tuple[str, str]:
+    pair = names(text)
+    if len(pair) != 2:
+        raise typer.BadParameter(f"{text!r} is no pair of parameters, such as K,D", param_hint="--over")
+    return pair[0], pair[1]
+
+
+def _indices(result: "Validation") -> list[dict[str, Any]]:
+    from hydroid.estimate import finite
+
+    return [
+        {
+            "fit": result.fit,
+            "log": result.log.source,
+            "joint": joint,
+            "mae_deg": finite(degrees(indices.mean_absolute)),
+            "rms_deg": finite(degrees(indices.rms)),
+            "max_deg": finite(degrees(indices.largest)),
+            "fit_percent": finite(indices.fit),
+        }
+        for joint, indices in result.indices.items()
+    ]
+
+
+def _uncertainty(study: "UncertaintyStudy", phrases: tuple[str, ...]) -> dict[str, Any]:
+    from hydroid.estimate import finite
+    from hydroid.run.summary import parameter_estimates
+
+    profiles = {p.name: [finite(end) for end in p.interval] for p in study.profiles}
+    estimate = parameter_estimates(study.problem, study.uncertainty)
+    return {
+        "at": study.source,
+        "rank": study.identifiability.rank,
+        "unidentifiable_directions": list(phrases),
+        "estimate": {
+            name: parameter.model_dump(mode="json") | {"profile_interval": profiles.get(name)}
+            for name, parameter in estimate.items()
+        },
+    }

@@ -1,0 +1,101 @@
+"""What a model predicts for a log: commands in; angles, pressures and flows out."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hydroid.arm.model import load_model
+from hydroid.errors import RunError
+from hydroid.identified import IdentifiedModel, identified
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.problem.problem import make_simulation
+from hydroid.problem.stage import Stage
+from hydroid.settings.fit import FitSettings
+from hydroid.simulation import HydraulicSimulation, Response
+
+TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool", "mm"), ("force", "N"))
+"""columns of a trace for each joint"""
+
+
+def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
+    """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K).
+
+    Raises:
+        RunError: the simulation diverged.
+    """
+    return _respond(model, log, joints).angle[0]
+
+
+def predict_log(model: IdentifiedModel, log: Log) -> Log:
+    """Return the log with the angles that the model gives for its commands, from its first pose.
+
+    Joints that the simulation locks stay where they start; prescribed ones keep their logged motion. Stage 2 gives
+    the chamber pressures of driven joints too, where `log.pressure` maps columns for them.
+
+    Raises:
+        RunError: the simulation diverged.
+    """
+    settings = model.settings
+    passive = settings.simulation.other_joints == "passive"
+    moving = [j + 1 for j in range(log.joints) if passive or log.driven[j]]
+    angle = log.angle.copy()
+    if settings.simulation.other_joints == "locked":
+        angle[:] = log.start
+    measured: list[int] = []
+    if settings.stage == "hyd":
+        measured = [j for j in range(log.joints) if log.driven[j] and settings.log.pressure_of(j + 1)]
+    response = _respond(model, log, moving, measured)
+    angle[:, [j - 1 for j in moving]] = response.angle[0]
+    pressure = None
+    if response.pressure is not None:
+        pressure = np.zeros((*angle.shape, 2))  # the pressures of an idle cylinder are not simulated
+        pressure[:, measured] = response.pressure[0]
+    return replace(log, angle=angle, pressure=pressure)
+
+
+def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], source: str) -> Log:
+    """Return `predict_log` for parameters by name; `source` is where they came from, for messages.
+
+    Raises:
+        SettingsError: a parameter is missing or unknown.
+        RunError: the simulation diverged.
+    """
+    return predict_log(identified(settings, values, source), log)
+
+
+def trace(model: IdentifiedModel, log: Log) -> str:
+    """Return a CSV of the driven joints' actuators, in bar, L/min, mm and N (N·m of a rotary actuator)."""
+    settings, stage = model.settings, Stage(model.settings)
+    outputs = [int(j) for j in np.flatnonzero(log.driven)]
+    simulation = make_simulation(load_model(settings.arm.model, settings.arm), log, outputs, settings)
+    assert isinstance(simulation, HydraulicSimulation)
+    observed = simulation.trace(stage.candidates(model.theta[None]))
+    names, columns = ["time_s"], [log.time]
+    for k, joint in enumerate(observed.joints):
+        names += [f"{what}{joint}_{unit}" for what, unit in TRACED]
+        columns += [
+            *(observed.pressure[:, k].T / 1e5),
+            *(observed.flow[:, k].T * 6e4),
+            observed.spool[:, k] * 1e3,
+            observed.force[:, k],
+        ]
+    text, header = io.StringIO(), ",".join(names)
+    np.savetxt(text, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments="")
+    return text.getvalue()
+
+
+def _respond(
+    model: IdentifiedModel, log: Log, joints: Sequence[int], pressures: Sequence[int] = ()
+) -> Response:
+    """Simulate the angles of `joints`, 1-based, and the pressures of some joints, 0-based."""
+    settings, stage = model.settings, Stage(model.settings)
+    spec, outputs = load_model(settings.arm.model, settings.arm), [j - 1 for j in joints]
+    simulation = make_simulation(spec, log, outputs, settings, pressures)
+    response = simulation.simulate(stage.candidates(model.theta[None]))
+    if not response.feasible[0]:
+        raise RunError("the simulation diverged with these parameters", where=model.source)
+    return response

@@ -1,0 +1,100 @@
+"""An estimate with its settings is resolved in one way, and `estimate.yaml` comes back as it was written."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydroid.errors import RunError, SettingsError
+from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, read_estimate, write_estimate
+from hydroid.identified import load_identified, middle_of_bounds, write_settings
+from hydroid.problem.stage import Stage
+from hydroid.settings.arm import Arm
+
+VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+def nominal(source: Path | None = None, **overrides: object):
+    model = load_identified(source, None, overrides, default="fit-hyd", nominal=True)
+    return model, Stage(model.settings).candidates(model.theta[None])
+
+
+def run_folder(folder: Path, final: str) -> Path:
+    """A folder as a fit of stage 2 leaves it."""
+    fixed = {f"parameters.{name}.fixed": value for name, value in VALUES.items() if name != "K"}
+    model = middle_of_bounds(load_identified(None, "fit-hyd", fixed, nominal=True).settings)
+    settings = load_identified(None, "fit-hyd", fixed, nominal=True).settings
+    write_settings(folder, settings)
+    estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in VALUES.items() if n != "K"}
+    write_estimate(folder, FitSummary(stage="hyd", estimate=estimate, final=final))
+    assert model.settings.parameters.keys() == estimate.keys()
+    return folder
+
+
+def test_values_are_taken_and_what_is_not_named_is_nominal(tmp_path: Path, arm: Arm):
+    file = tmp_path / "p.yaml"
+    file.write_text("A_A: 900\nM3: 20\n")
+    model, found = nominal(file)
+    _, plain = nominal()
+    assert found.actuators is not None
+    assert plain.actuators is not None
+    assert found.actuators.area_a[0] == pytest.approx([8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4])
+    assert (found.actuators.area_b == plain.actuators.area_b).all()
+    assert found.mass[0] == pytest.approx(np.where(np.arange(8) == 2, 20.0, arm.masses))
+    assert (plain.mass[0] == arm.masses).all()
+    assert "A_B" in model.nominal
+    assert "A_A" not in model.nominal
+    fixed = nominal(None, **{"parameters.A_A.fixed": 700})[1].actuators
+    assert fixed is not None
+    assert fixed.area_a[0, 1] == 7e-4
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("AA: 900\n", "unknown parameter 'AA'"),
+        ("K: 1\n", "'D' is missing"),
+        ("K: -1\n", "a number from 0"),
+        ("parameters: 3\n", "must be a mapping"),
+        ("estimate: {K: 3}\nstage: mech\n", "estimate.K: must be a mapping"),
+    ],
+)
+def test_values_that_cannot_be_used_are_refused(tmp_path: Path, text: str, says: str):
+    (tmp_path / "p.yaml").write_text(text)
+    with pytest.raises(SettingsError, match=says):
+        load_identified(tmp_path / "p.yaml")
+
+
+def test_a_folder_without_an_estimate_is_refused(tmp_path: Path):
+    with pytest.raises(RunError, match="holds no estimate"):
+        load_identified(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(RunError, match="has no estimate yet"):
+        load_identified(tmp_path)
+
+
+@pytest.mark.parametrize(("final", "free"), [("refined", False), ("joint", True)])
+def test_a_joint_refinement_frees_what_was_fixed(tmp_path: Path, final: str, free: bool):
+    folder = run_folder(tmp_path / "run", final)
+    for source in (folder, folder / "estimate.yaml"):
+        model = load_identified(source)
+        assert model.settings.parameter_set().free.all() == free
+        assert model.values["M3"] == 22.5
+        assert model.name == "run"
+
+
+def test_an_estimate_comes_back_as_it_was_written(tmp_path: Path):
+    parameter = ParameterEstimate(
+        value=0.1 + 0.2, unit="N·m/%", sd=None, interval=(1e-7, None), flag="no effect", at_bound="lower"
+    )
+    summary = FitSummary(
+        stage="mech",
+        estimate={"K": parameter},
+        final="best",
+        converged=False,
+        rms_deg=1 / 3,
+        estimates={"best": NamedEstimate(values={"K": 0.1 + 0.2}, rms_deg=None)},
+    )
+    write_estimate(tmp_path, summary)
+    assert read_estimate(tmp_path / "estimate.yaml") == summary
+    assert summary.plain()["schema"] == 1

@@ -26,7 +26,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from hydroid.cli import running  # noqa: F401  # what a run imports, once for all
+from hydroid.api import fit  # noqa: F401  # what a run imports, once for all
 from hydroid.cli.app import main as hydroid
 from hydroid.fitting import search
 from hydroid.report import fit_report, page  # noqa: F401

@@ -15,7 +15,7 @@ import numpy as np
 
 from hydroid.errors import RunError
 from hydroid.fitting.fit import Fit
-from hydroid.log import Finding
+from hydroid.log import Finding, Log
 from hydroid.settings.fit import FitSettings
 
 LINE = logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", datefmt="%Y-%m-%dT%H:%M:%S%z")
@@ -48,7 +48,7 @@ def run_log(file: Path) -> Generator[None]:
         handler.close()
 
 
-def log_start(settings: FitSettings, logs: Sequence[Path], findings: Sequence[Finding]) -> None:
+def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[Finding]) -> None:
     """Log what runs, where, with what."""
     names = ("hydroid", "mujoco", "numpy", "numba")
     versions = ", ".join(f"{name} {version(name)}" for name in names)
@@ -58,7 +58,7 @@ def log_start(settings: FitSettings, logs: Sequence[Path], findings: Sequence[Fi
     _log.info(
         "stage %s, search %s, seed %d; settings in config.yaml", settings.stage, search.name, search.seed
     )
-    _log.info("logs: %s", ", ".join(map(str, logs)))
+    _log.info("logs: %s", ", ".join(log.source for log in logs))
     for finding in findings:
         _log.info("%s: %s", finding.level, finding)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from conftest import step_log
 
-from hydroid import load_settings
+from hydroid import load_settings, read_logs
 from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.fitting.fit import fit
 from hydroid.fitting.validation import error_indices
@@ -52,10 +52,10 @@ def run(folder: RunFolder, settings, arm, log, path, watcher):
     problem = Problem(settings, [log])
     checkpoint = None
     if folder.exists:
-        folder.check(settings, [path])
+        folder.check(settings, read_logs([path], settings))
         checkpoint = folder.checkpoint()
     else:
-        folder.begin(settings, [path])
+        folder.begin(settings, read_logs([path], settings))
     result = fit(problem, folder.save, watcher, checkpoint)
     folder.write_estimate(problem, result)
     return result
@@ -155,14 +155,14 @@ def test_a_folder_of_another_run_is_refused_by_name(tmp_path):
     assert folder.settings().parameters == settings.parameters
     changed = settings.model_copy(update={"outputs": (3,)})
     with pytest.raises(RunError, match="outputs"):
-        folder.check(changed, [path])
+        folder.check(changed, read_logs([path], settings))
     threads = settings.simulation.model_copy(update={"threads": 1})
-    folder.check(settings.model_copy(update={"simulation": threads}), [path])  # changes no result
+    folder.check(settings.model_copy(update={"simulation": threads}), read_logs([path], settings))  # changes no result
     path.write_text(path.read_text() + "# edited\n")
     with pytest.raises(RunError, match="log"):
-        folder.check(settings, [path])
+        folder.check(settings, read_logs([path], settings))
     with pytest.raises(RunError, match="holds no run"):
-        RunFolder(tmp_path).begin(settings, [path])
+        RunFolder(tmp_path).begin(settings, read_logs([path], settings))
     with pytest.raises(RunError, match="no run"):
         RunFolder(tmp_path / "nowhere").settings()
 

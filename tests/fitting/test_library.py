@@ -64,7 +64,7 @@ class Study:
         if folder.exists:
             checkpoint = folder.checkpoint()
         else:
-            folder.begin(self.settings, [self.path])
+            folder.begin(self.settings, read_logs([self.path], self.settings))
         result = fit(self.problem, folder.save, watcher, checkpoint)
         folder.write_estimate(self.problem, result)
         return result

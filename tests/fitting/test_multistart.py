@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydroid import load_settings
+from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import fit
 from hydroid.fitting.multistart import Multistart, random_start
 from hydroid.log import Log, write_log
@@ -150,7 +150,7 @@ def test_a_resumed_run_ends_bit_for_bit_where_it_would_have(tmp_path: Path, simu
     whole = fit(problem, lambda state, memo: None, Watcher())
     folder = RunFolder(tmp_path / "run")
     write_log(tmp_path / "log.csv", log, settings.log)
-    folder.begin(settings, [tmp_path / "log.csv"])
+    folder.begin(settings, read_logs([tmp_path / "log.csv"], settings))
     with pytest.raises(KeyboardInterrupt):
         fit(
             problem,

@@ -157,7 +157,9 @@ def test_a_folder_of_another_run_is_refused_by_name(tmp_path):
     with pytest.raises(RunError, match="outputs"):
         folder.check(changed, read_logs([path], settings))
     threads = settings.simulation.model_copy(update={"threads": 1})
-    folder.check(settings.model_copy(update={"simulation": threads}), read_logs([path], settings))  # changes no result
+    folder.check(
+        settings.model_copy(update={"simulation": threads}), read_logs([path], settings)
+    )  # changes no result
     path.write_text(path.read_text() + "# edited\n")
     with pytest.raises(RunError, match="log"):
         folder.check(settings, read_logs([path], settings))

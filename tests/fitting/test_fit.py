@@ -202,7 +202,7 @@ def test_all_parameters_fixed_is_refused():
     changes = {f"parameters.{name}.fixed": value for name, value in TRUTH.items()}
     settings = load_settings("article-mech", changes)
     with pytest.raises(HydroidError, match="free"):
-        Stage(settings)
+        Problem(settings, [step_log(settings.arm.pose("study"), [60.0])])
 
 
 def test_a_fixed_parameter_stays_and_the_others_move(tmp_path):

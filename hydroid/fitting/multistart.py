@@ -2,9 +2,10 @@
 
 From far off, the response over a whole record says nothing to a local method: it runs to the joints' stops,
 where no parameter has an effect. Over the first seconds it cannot get that far. A start is therefore fitted
-to the first quarter of a second, to the first seconds, and then to all of it (a *progressive horizon*). Each fit
-keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30 starts
-reached the noise this way. One in eight of those fitted to the whole record at once ended at the stops.
+to the first quarter of a second, to the first seconds, and then to all of it (a *progressive horizon*). Each
+fit keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30
+starts reached the noise this way. One in eight of those fitted to the whole record at once ended at the
+stops.
 """
 
 from collections.abc import Callable

@@ -15,8 +15,8 @@ What differs from a textbook:
 - A Jacobian of p simulations is expensive. After a step it is updated from that step (C. G. Broyden, 1965) as
   long as the updated one lowers the logarithm of the cost by as much per simulation as the one before did.
 - Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual
-  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved valleys of
-  problems whose parameters compensate each other.
+  along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved
+  valleys of problems whose parameters compensate each other.
 - A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `derivatives`.
 - Where no step helps, the Jacobian is taken over wider differences: a joint that meets its stop makes small
   jumps in the response, and narrow differences see nothing but the jumps.

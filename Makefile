@@ -48,6 +48,12 @@ article-hyd: setup  ## the same for stage 2
 accuracy: setup  ## the hydraulics against a stiff reference solver, and 1,000 random sets on all joints
 	$(BIN)/python benchmarks/hydraulic_accuracy.py
 
+least-squares: setup  ## our least squares beside scipy's and mujoco.minimize's; ten minutes
+	$(BIN)/python benchmarks/least_squares.py
+
+search-budget: setup  ## generations against the share of seeds that reach the optimum; an hour
+	$(BIN)/python benchmarks/search_budget.py
+
 many-parameters: setup  ## 27 parameters from far-off starts, beside mujoco.sysid; half an hour
 	$(BIN)/pip install --quiet --disable-pip-version-check 'mujoco[sysid]'
 	$(BIN)/python benchmarks/many_parameters.py

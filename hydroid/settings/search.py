@@ -87,7 +87,7 @@ class MultistartSettings(Settings):
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = 10
     """number of start points"""
-    horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0)
+    horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0, 20.0)
     """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
     command on [s]"""
     iterations: Annotated[int, Field(ge=1)] = 100

@@ -61,7 +61,7 @@ class Stopped(KeyboardInterrupt):
     """A fit that Ctrl-C or a signal ended.
 
     Args:
-        kept: what remains of it, a clause.
+        kept: what remains of it, a clause; empty: nothing.
     """
 
     def __init__(self, kept: str) -> None:

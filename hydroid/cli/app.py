@@ -137,6 +137,9 @@ def main() -> None:
 
 
 def _stopped(stop: BaseException) -> int:
+    from hydroid.errors import Stopped
+
     kept = getattr(stop, "kept", "")
-    typer.echo(f"hydroid: stopped; {kept}" if kept else "hydroid: stopped", err=True)
+    more = f"{kept}; the same command with --resume continues" if kept else "nothing was written"
+    typer.echo(f"hydroid: stopped; {more}" if isinstance(stop, Stopped) else "hydroid: stopped", err=True)
     return STOPPED

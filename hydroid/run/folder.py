@@ -136,9 +136,9 @@ class RunFolder:
         self._describe(self.identity() | {"status": word})
 
     def interrupt(self) -> str:
-        """Record the status `interrupted`, and return what is kept."""
+        """Record the status `interrupted`, and return what is kept, empty where nothing was written."""
         if not self.exists:
-            return "nothing was written"
+            return ""
         self.status("interrupted")
         checkpoint = self.checkpoint()
         if checkpoint is None:

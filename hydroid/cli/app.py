@@ -120,26 +120,19 @@ def main() -> None:
     except HydroidError as error:
         show_error(error)
         code = 2
-    except KeyboardInterrupt as stop:
-        code = _stopped(stop)
+    except KeyboardInterrupt:
+        code = STOPPED
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
         code = 0
     except Exception as error:
         if stopping.asked():  # what the interrupt met may have made another error of it
-            code = _stopped(error)
+            code = STOPPED
         elif getattr(error, "show", None) is None:
             raise  # a defect of hydroid
         else:
             show_usage_error(error)
             code = int(getattr(error, "exit_code", 2))
+    if code == STOPPED:
+        typer.echo(f"hydroid: stopped{stopping.kept()}", err=True)
     sys.exit(code or 0)
-
-
-def _stopped(stop: BaseException) -> int:
-    from hydroid.errors import Stopped
-
-    kept = getattr(stop, "kept", "")
-    more = f"{kept}; the same command with --resume continues" if kept else "nothing was written"
-    typer.echo(f"hydroid: stopped; {more}" if isinstance(stop, Stopped) else "hydroid: stopped", err=True)
-    return STOPPED

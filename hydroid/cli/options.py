@@ -8,6 +8,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from hydroid.cli import stopping
 from hydroid.cli.output import log_lines
 
 Logs = Annotated[
@@ -113,7 +114,11 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         }
         output = packed.get("output", Output())
         with log_lines(verbose=output.verbose, quiet=output.quiet):
-            function(**given, **packed)
+            try:
+                function(**given, **packed)
+            except KeyboardInterrupt as stop:
+                stopping.remember(stop)
+                raise
 
     run.__name__, run.__doc__, run.__module__ = function.__name__, function.__doc__, function.__module__
     run.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]

@@ -6,6 +6,7 @@ from types import FrameType
 NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
 
 _asked = False
+_interrupt: KeyboardInterrupt | None = None
 
 
 def listen() -> None:
@@ -21,6 +22,20 @@ def asked() -> bool:
     finalizer. Who asks here between two pieces of work does not miss it.
     """
     return _asked
+
+
+def remember(stop: KeyboardInterrupt) -> None:
+    """Keep what ended a command, which typer turns into an exit status."""
+    global _interrupt
+    _interrupt = stop
+
+
+def kept() -> str:
+    """Return what remains of a stopped fit, to follow the word `stopped`."""
+    kept = getattr(_interrupt, "kept", None)
+    if kept is None:
+        return ""
+    return f"; {kept}; the same command with --resume continues" if kept else "; nothing was written"
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

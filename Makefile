@@ -83,7 +83,7 @@ model: meshes
 	$(BIN)/hydroid build-model
 
 docs: setup  ## the reference of all settings, docs/settings.md
-	$(BIN)/python -m hydroid.settings.reference > docs/settings.md
+	$(BIN)/python docs/settings_reference.py > docs/settings.md
 
 clean:
 	rm -rf .venv runs dist build

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file, write_atomic
-from hydroid.settings.load import Settings, load, read_yaml
+from hydroid.settings.document import read_yaml
+from hydroid.settings.load import Settings, load
 
 NAME = "estimate.yaml"
 """name of the file in a run folder and beside a saved plant"""

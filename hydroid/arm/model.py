@@ -7,6 +7,7 @@ between their pivots and carry no force; torque enters by one motor a joint.
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -19,7 +20,7 @@ from hydroid.arm.quiet import quiet_mujoco
 from hydroid.arm.scene import CHROME, PAINT, STEEL, add_scene
 from hydroid.errors import ModelError
 from hydroid.files import is_file, write_atomic
-from hydroid.settings.arm import Arm, FixedPart, Joint, LinearActuator, Link
+from hydroid.settings.arm import Arm, Joint, LinearActuator, Link
 
 TIMESTEP = 0.01  # [s]; the logs' sample period
 VISUAL_GROUP, COLLISION_GROUP = 2, 3
@@ -54,10 +55,10 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
         _add_joint(spec, child, joint)
         if isinstance(joint.actuator, LinearActuator):
             _add_cylinder(spec, body, child, joint, joint.actuator)
-        _add_part(spec, child, link, folder)
+        _add_part(spec, child, link, folder, STEEL if link is arm.links[-1] else PAINT)
         for part in arm.fixed:
             if part.carried_by == link.name:
-                _add_part(spec, child.add_body(name=part.name, pos=part.at), part, folder)
+                _add_part(spec, child.add_body(name=part.name, pos=part.at), part, folder, STEEL)
         body = child
     for name in arm.poses:
         spec.add_key(name=name, qpos=arm.pose(name))
@@ -136,10 +137,11 @@ def _match(spec: mujoco.MjSpec, arm: Arm, where: str) -> None:
         raise ModelError("has equality constraints, which hydroid does not simulate", where=where)
 
 
-def _add_part(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: Link, folder: Path) -> None:
-    properties = mass_properties(folder / part.mesh)
-    _set_inertial(body, part.mass, properties)
-    _add_shape(spec, body, part.mesh, STEEL if isinstance(part, FixedPart) or not part.parameter else PAINT)
+def _add_part(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, part: Link, folder: Path, colour: Sequence[float]
+) -> None:
+    _set_inertial(body, part.mass, mass_properties(folder / part.mesh))
+    _add_shape(spec, body, part.mesh, colour)
 
 
 def _set_inertial(body: mujoco.MjsBody, mass: float, properties: MassProperties) -> None:

@@ -65,7 +65,7 @@ class Search:
         save: Callable[[SearchState, Memo], None],
         watch: Callable[[Array], None],
     ) -> SearchState:
-        """Run from `state`, or from the seed, to the last generation or the target.
+        """Run from `state`, or from the seed, to the last generation or convergence.
 
         Args:
             state: a state to continue from.

@@ -96,5 +96,5 @@ class Algorithm(Protocol):
         ...
 
     def reached(self, population: Population) -> bool:
-        """Whether the search may stop early: at its target, or converged."""
+        """Whether the search has converged and may stop early."""
         ...

@@ -38,9 +38,8 @@ class SimpleGa(GeneticAlgorithm):
         return population.take(best).join(offspring)
 
     def reached(self, population: Population) -> bool:
-        """Whether the best candidate is as good as the target, where there is one."""
-        target = self.settings.target
-        return target is not None and bool(_objective(population).min() <= target)
+        """Never: it ends after all generations."""
+        return False
 
 
 def _objective(population: Population) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ class Nsga2(GeneticAlgorithm):
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
 
     def reached(self, population: Population) -> bool:
-        """Never: a set of compromises has no one target."""
+        """Never: it ends after all generations."""
         return False
 
 

@@ -13,15 +13,8 @@ from pydantic import Field, Strict, model_validator
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.settings.linkage import (
-    STROKE_TOLERANCE,
-    Direction,
-    LinearActuator,
-    Positive,
-    RotaryActuator,
-    Vector,
-)
-from hydroid.settings.load import Settings, load
+from hydroid.settings.linkage import STROKE_TOLERANCE, Direction, LinearActuator, RotaryActuator, Vector
+from hydroid.settings.load import Positive, Settings, load
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 
@@ -44,8 +37,6 @@ class Link(Settings):
     """STL file in the folder of the meshes"""
     mass: Positive
     """nominal mass [kg]"""
-    parameter: Name | None = None
-    """name of the unknown parameter that this mass is, such as M1; null: the mass is known"""
 
 
 class FixedPart(Link):
@@ -117,24 +108,23 @@ class Arm(Settings):
     def _consistent(self) -> "Arm":
         if len(self.joints) != len(self.links):
             raise ValueError(f"{len(self.links)} links need as many joints, not {len(self.joints)}")
-        for what, names in (
-            ("joint", list(self.joint_names)),
-            ("link", ["base", *self.link_names]),
-            ("mass parameter", [p.parameter for p in self.parts if p.parameter]),
-        ):
+        for what, names in (("joint", self.joint_names), ("link", ("base", *self.link_names))):
             double = next((n for n in names if names.count(n) > 1), None)
             if double:
                 raise ValueError(f"two {what}s are named {double}")
         moving = [link.name for link in self.links]
-        for part in self.fixed:
-            if part.carried_by not in moving:
-                raise ValueError(
-                    f"{part.name} is carried by {part.carried_by!r}, which is not one of: {', '.join(moving)}"
-                )
-        if self.payload is not None and self.payload.carried_by not in moving:
-            raise ValueError(f"payload: {self.payload.carried_by!r} is not one of: {', '.join(moving)}")
+        carried = {part.name: part.carried_by for part in self.fixed}
+        for name, link in (carried | ({"payload": self.payload.carried_by} if self.payload else {})).items():
+            if link not in moving:
+                raise ValueError(f"{name} is carried by {link!r}, which is not one of: {', '.join(moving)}")
         for name, pose in self.poses.items():
-            _check_pose(name, pose, self.joints)
+            if len(pose) != len(self.joints):
+                raise ValueError(f"pose {name} needs {len(self.joints)} angles in deg, not {len(pose)}")
+            for joint, angle in zip(self.joints, pose, strict=True):
+                if not joint.continuous and not joint.range[0] <= angle <= joint.range[1]:
+                    raise ValueError(
+                        f"pose {name}: joint {joint.name} at {angle:g} deg is outside its range {joint.range}"
+                    )
         return self
 
     @property
@@ -158,11 +148,6 @@ class Arm(Settings):
         return np.array([part.mass for part in self.parts])
 
     @property
-    def mass_parameters(self) -> dict[str, str]:
-        """The link that each unknown mass belongs to, by parameter name."""
-        return {part.parameter: part.name for part in self.parts if part.parameter}
-
-    @property
     def lower(self) -> NDArray[np.float64]:
         """Lower joint stops [rad], shape (J,); -inf where there is none."""
         return np.array([-np.inf if j.continuous else math.radians(j.range[0]) for j in self.joints])
@@ -184,11 +169,7 @@ class Arm(Settings):
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML; its `model` and `meshes` become absolute.
-
-    Args:
-        name: a path, or the name of a shipped config.
-        beside: folder in which a relative path is looked up first.
+    """Read an arm's YAML, found as `find_config` does; its `model` and `meshes` become absolute.
 
     Raises:
         SettingsError: no such file, or a setting that is not allowed.
@@ -219,13 +200,3 @@ def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
             f"joint {joint.name}: a stroke of {actuator.stroke:g} mm is too short for the range, "
             f"which needs {needed:.1f} mm"
         )
-
-
-def _check_pose(name: str, pose: tuple[float, ...], joints: tuple[Joint, ...]) -> None:
-    if len(pose) != len(joints):
-        raise ValueError(f"pose {name} needs {len(joints)} angles in deg, not {len(pose)}")
-    for joint, angle in zip(joints, pose, strict=True):
-        if not joint.continuous and not joint.range[0] <= angle <= joint.range[1]:
-            raise ValueError(
-                f"pose {name}: joint {joint.name} at {angle:g} deg is outside its range {joint.range}"
-            )

@@ -5,12 +5,17 @@ and 1e3 as text; here they are 10, text and 1000.
 """
 
 import re
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from hydroid.errors import SettingsError
 
+Lines = dict[tuple[str, ...], int]
+"""line [1-based] of each key or item, by its path"""
+
+MAX_BYTES = 2**18
 MAX_NODES = 20_000
 """aliases count as often as they are used, so that a few lines cannot expand to billions of values"""
 MAX_DEPTH = 40
@@ -35,16 +40,34 @@ for _name, _pattern, _first in (
 _Loader.add_constructor(_TAG + "int", lambda _, node: int(str(node.value)))
 
 
-def read_document(text: str, source: str) -> tuple[Any, dict[tuple[str, ...], int]]:
-    """Read one YAML document.
+def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
+    """Read a file that holds one mapping.
 
-    Returns:
-        Its value, and the line [1-based] of each key or item, by its path.
+    Raises:
+        SettingsError: unreadable, not UTF-8, too large, not a mapping, or as `read_document`.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        text = data.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise SettingsError(f"cannot be read ({reason})", where=str(path)) from None
+    if len(data) > MAX_BYTES:
+        raise SettingsError(f"is larger than {MAX_BYTES >> 10} KiB, too large for settings", where=str(path))
+    values, lines = read_document(text, str(path))
+    if not isinstance(values, dict):
+        raise SettingsError("must be a mapping of settings", where=str(path), hint="write `key: value` lines")
+    return values, lines
+
+
+def read_document(text: str, source: str) -> tuple[Any, Lines]:
+    """Read one YAML document.
 
     Raises:
         SettingsError: not YAML, a key that occurs twice or is not plain text, another type, or too much.
     """
-    lines: dict[tuple[str, ...], int] = {}
+    lines: Lines = {}
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -62,14 +85,8 @@ def read_document(text: str, source: str) -> tuple[Any, dict[tuple[str, ...], in
         raise SettingsError(f"is not YAML ({problem})", where=where) from None
 
 
-def read_value(text: str, source: str) -> Any:
-    """Read one value, such as the one of an override; raises as `read_document`."""
-    return read_document(text, source)[0]
-
-
-def _collect_lines(
-    node: yaml.Node, path: tuple[str, ...], lines: dict[tuple[str, ...], int], source: str
-) -> None:
+def _collect_lines(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> None:
+    """Check a node and what is in it, and note their lines."""
     line = node.start_mark.line + 1
     where = f"{source}, line {line}"
     if len(lines) >= MAX_NODES:
@@ -78,28 +95,20 @@ def _collect_lines(
         raise SettingsError(f"is nested more than {MAX_DEPTH} deep", where=where)
     if node.tag not in _TYPES:
         raise SettingsError(f"a value of type {node.tag.removeprefix(_TAG)!r} is not allowed", where=where)
-    if isinstance(node, yaml.ScalarNode) and not _is_text(node.value):
+    if isinstance(node, yaml.ScalarNode) and not all(c.isprintable() or c in "\t\n" for c in node.value):
         raise SettingsError("a text contains characters that cannot be printed", where=where)
     lines.setdefault(path, line)
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise SettingsError("a key must be plain text or a number", where=f"{source}, line {line}")
-            here = (*path, _spelt(key))
+                raise SettingsError("a key must be plain text or a number", where=where)
+            # 02 and 2 are the same joint
+            here = (*path, str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value))
+            place = key.start_mark.line + 1
             if here in lines:
-                where = f"{source}, line {key.start_mark.line + 1}"
-                raise SettingsError(f"{'.'.join(here)} occurs twice", where=where)
-            lines[here] = key.start_mark.line + 1
+                raise SettingsError(f"{'.'.join(here)} occurs twice", where=f"{source}, line {place}")
+            lines[here] = place
             _collect_lines(value, here, lines, source)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
             _collect_lines(value, (*path, str(index)), lines, source)
-
-
-def _is_text(value: str) -> bool:
-    return all(c.isprintable() or c in "\t\n" for c in value)
-
-
-def _spelt(key: yaml.ScalarNode) -> str:
-    """The key in one spelling, since 02 and 2 are the same joint."""
-    return str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value)

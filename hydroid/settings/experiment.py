@@ -4,9 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hydroid.settings.load import JointNumber, Settings
-
-Positive = Annotated[float, Field(gt=0)]
+from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
 
 
 class DesignSettings(Settings):
@@ -25,13 +23,13 @@ class DesignSettings(Settings):
     """shortest and longest time between two changes of a command [s]; the shortest limits the bandwidth"""
     speed_deg_s: Positive = 30.0
     """largest joint speed in the simulated experiment [deg/s]"""
-    margin_deg: Annotated[float, Field(ge=0)] = 5.0
+    margin_deg: NotNegative = 5.0
     """smallest distance of the simulated motion from the ends of the joints' ranges [deg]"""
     criterion: Literal["D", "E"] = "E"
     """E: make the least precise combination of parameters as precise as possible; D: all on average"""
     noise_deg: Positive = 0.1
     """standard deviation of the angles' noise [deg]"""
-    noise_correlation_s: Annotated[float, Field(ge=0)] = 0.0
+    noise_correlation_s: NotNegative = 0.0
     """time in which the noise's autocorrelation falls to 1/e (first order) [s]; 0: white noise"""
     candidates: Annotated[int, Field(ge=2, le=100_000)] = 40
     """number of random experiments that the search begins with"""

@@ -10,10 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from hydroid.settings.load import Settings
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+from hydroid.settings.load import NotNegative, Positive, Settings
 
 SI_FACTORS = {"mm": 1e-3, "mm²": 1e-6, "cm³": 1e-6, "N/mm": 1e3, "bar": 1e5, "L/min": 1e-3 / 60.0}
 """what one of a unit is in SI; units that are SI already are not listed"""

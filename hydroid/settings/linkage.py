@@ -10,11 +10,10 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
-from hydroid.settings.load import Settings
+from hydroid.settings.load import Positive, Settings
 
-Positive = Annotated[float, Field(gt=0)]
 Vector = tuple[float, float, float]
 
 
@@ -32,12 +31,8 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
 
     The hydraulic kernel compiles this very function.
 
-    Args:
-        angle: of the joint [rad].
-        a: distance of one pivot from the joint's axis [m].
-        b: distance of the other [m].
-        theta0: angle between the pivots at joint angle 0 [rad].
-        shortest: the cylinder's length with the rod fully in [m]; with 0 the travel is the length itself.
+    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0; `shortest`
+    is the cylinder's length with the rod fully in [m], and with 0 the travel is the length itself.
     """
     theta = angle + theta0
     cosine = a * b * np.cos(theta)

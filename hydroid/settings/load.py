@@ -1,13 +1,47 @@
 """YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
 
+import difflib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from hydroid.errors import SettingsError
-from hydroid.settings.document import read_document, read_value
-from hydroid.settings.messages import explain
+from hydroid.settings.document import Lines, read_document, read_yaml
+
+LONGEST = 60
+"""characters of a value in a message"""
+
+FORMER = {
+    "polish": "is now called 'refinement'",
+    "refine": "is now called 'joint_refinement'",
+    "known": "is now called 'priors'",
+    "step_tolerance": "is now called 'gain_tolerance'",
+    "parameter": "was removed: the `parameters` of a fit name the links",
+    "target": "was removed: a search ends after its generations",
+}
+"""settings of earlier versions, and what became of them"""
+
+_PLAIN = {
+    "bool": "must be true or false",
+    "dict": "must be a mapping of settings",
+    "finite_number": "must be a finite number",
+    "float": "must be a number",
+    "int": "must be a whole number",
+    "list": "must be a list in brackets, [a, b]",
+    "model": "must be a mapping of settings",
+    "string_type": "must be text",
+    "tuple": "must be a list in brackets, [a, b]",
+    "literal_error": "must be {expected}",
+    "too_long": "must have at most {max_length} items",
+    "too_short": "must have at least {min_length} items",
+    "greater_than_equal": "must be at least {ge:g}",
+    "greater_than": "must be above {gt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "less_than": "must be below {lt:g}",
+}
+"""what a fault means, by the start of pydantic's name for it, with the limits in its context"""
 
 
 class Settings(BaseModel):
@@ -35,37 +69,13 @@ def _number_of(key: Any) -> Any:
 
 JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
 """of a joint of the arm, from 1"""
-
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
 
 S = TypeVar("S", bound=Settings)
-MAX_BYTES = 2**18
 
 
-def read_yaml(path: Path) -> tuple[dict[str, Any], dict[tuple[str, ...], int]]:
-    """Read a mapping and the lines of its keys.
-
-    Returns:
-        The mapping, and lines [1-based] by key path.
-
-    Raises:
-        SettingsError: unreadable, not UTF-8, not YAML, not a mapping, or a key that occurs twice.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        text = data.decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SettingsError(f"cannot be read ({reason})", where=str(path)) from None
-    if len(data) > MAX_BYTES:
-        raise SettingsError(f"is larger than {MAX_BYTES >> 10} KiB, too large for settings", where=str(path))
-    values, lines = read_document(text, str(path))
-    if not isinstance(values, dict):
-        raise SettingsError("must be a mapping of settings", where=str(path), hint="write `key: value` lines")
-    return values, lines
-
-
-def load(path: Path, kind: type[S], overrides: dict[str, Any] | None = None) -> S:
+def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) -> S:
     """Read one YAML file as settings of type `kind`.
 
     Args:
@@ -79,15 +89,15 @@ def load(path: Path, kind: type[S], overrides: dict[str, Any] | None = None) -> 
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
         _set(values, key, value)
-    return validate(values, kind, str(path), lines, set(overrides or {}), path.parent)
+    return validate(values, kind, str(path), lines, sorted(overrides or ()), path.parent)
 
 
 def validate(
     values: dict[str, Any],
     kind: type[S],
     source: str,
-    lines: dict[tuple[str, ...], int] | None = None,
-    overridden: set[str] | None = None,
+    lines: Lines | None = None,
+    overridden: list[str] | None = None,
     folder: Path | None = None,
 ) -> S:
     """Check a mapping against `kind` and report the first fault with its place.
@@ -100,22 +110,15 @@ def validate(
         # a setting that does not exist may be why another is missing
         first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
         loc = tuple(str(part) for part in first["loc"])
-        more = f"{len(others)} more fault{'s' if len(others) > 1 else ''}"
-        what, hint = explain(".".join(loc), first, kind), f"and {more} in this file" if others else ""
-        where = _where(loc, source, lines, overridden)
-        what = what.removeprefix(f"{where.removeprefix('--set ')}: ")  # the override is named already
-        raise SettingsError(what, where=where, hint=hint) from None
-
-
-def _where(
-    loc: tuple[str, ...], source: str, lines: dict[tuple[str, ...], int] | None, overridden: set[str] | None
-) -> str:
-    key = ".".join(loc)
-    # the fault may lie in the override, below it, or in what it is a part of
-    related = [
-        o for o in sorted(overridden or ()) if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")
-    ]
-    return f"--set {related[0]}" if related else f"{source}{_line(loc, lines or {})}"
+        key = ".".join(loc)
+        what = _explain(key, first, kind)
+        hint = f"and {len(others)} more fault{'s' if len(others) > 1 else ''} in this file" if others else ""
+        # the fault may lie in an override, below it, or in what it is a part of
+        at = next(
+            (o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), ""
+        )
+        where = f"--set {at}" if at else source + _line(loc, lines or {})
+        raise SettingsError(what.removeprefix(f"{at}: "), where=where, hint=hint) from None
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -127,7 +130,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise SettingsError("needs key=value", where=f"--set {text}", hint="for example --set search.seed=3")
-    return key.strip(), read_value(value, f"--set {text}")
+    return key.strip(), read_document(value, f"--set {text}")[0]
 
 
 def _set(values: dict[str, Any], key: str, value: Any) -> None:
@@ -140,9 +143,45 @@ def _set(values: dict[str, Any], key: str, value: Any) -> None:
     values[last] = value
 
 
-def _line(loc: tuple[str, ...], lines: dict[tuple[str, ...], int]) -> str:
+def _line(loc: tuple[str, ...], lines: Lines) -> str:
     """The line of the deepest part of `loc` that the file contains."""
-    for end in range(len(loc), 0, -1):
-        if loc[:end] in lines:
-            return f", line {lines[loc[:end]]}"
-    return ""
+    place = next((lines[loc[:end]] for end in range(len(loc), 0, -1) if loc[:end] in lines), None)
+    return f", line {place}" if place else ""
+
+
+def _explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
+    """What is wrong with the setting `key` (dotted, or empty), from one of pydantic's faults."""
+    if fault["type"] == "extra_forbidden":
+        name = str(fault["loc"][-1])
+        allowed = _allowed(kind, fault["loc"][:-1])
+        near = difflib.get_close_matches(name, allowed, n=1)
+        choice = f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(allowed)}"
+        choice = f"it {FORMER[name]}" if name in FORMER else choice if allowed else ""
+        return f"unknown setting {_shown(key)}" + (f"; {choice}" if choice else "")
+    if fault["type"] == "missing":
+        return f"setting {key!r} is missing"
+    words = next((words for start, words in _PLAIN.items() if fault["type"].startswith(start)), None)
+    message = str(fault["msg"]).removeprefix("Value error, ")
+    problem = words.format(**fault.get("ctx", {})) if words else message[:1].lower() + message[1:]
+    problem = f"{_shown(key)[1:-1]}: {problem}" if key else problem
+    return problem if isinstance(fault["input"], dict) else f"{problem} (given: {_shown(fault['input'])})"
+
+
+def _shown(value: object) -> str:
+    """A value as YAML writes it, shortened where it is long."""
+    if isinstance(value, tuple):
+        text = f"[{', '.join(map(_shown, value))}]"
+    else:
+        text = {"None": "null", "True": "true", "False": "false"}.get(repr(value), repr(value))
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
+
+
+def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
+    """Names of the settings at `loc`, if the path can be followed through nested classes."""
+    for part in loc:
+        field = kind.model_fields.get(str(part))
+        inner = field.annotation if field else None
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            return []
+        kind = inner
+    return list(kind.model_fields)

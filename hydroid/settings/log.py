@@ -8,21 +8,22 @@ log:
     7: null                     # not in the log
 """
 
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
 
-from hydroid.settings.load import JointNumber, Settings
+from hydroid.settings.load import JointNumber, NotNegative, Settings
 
 JOINT = "{joint}"
 
 
 def _as_columns(value: Any) -> Any:
     columns = (value,) if isinstance(value, str) else value
-    ok = isinstance(columns, list | tuple) and all(isinstance(c, str) and c for c in cast(list[Any], columns))
-    if not ok or len(cast(list[Any], columns)) not in (1, 2):
+    if not isinstance(columns, tuple) or not all(isinstance(c, str) and c for c in columns):
+        columns = ()
+    if len(columns) not in (1, 2):
         raise ValueError("must be a column's name, or two: the positive and the negative direction")
-    return tuple(columns)
+    return columns
 
 
 def _nonzero(value: float) -> float:
@@ -32,8 +33,8 @@ def _nonzero(value: float) -> float:
 
 
 Name = Annotated[str, Field(min_length=1)]
-Scale = Annotated[float, Field(ge=-1e12, le=1e12), BeforeValidator(_nonzero)]
 Offset = Annotated[float, Field(ge=-1e12, le=1e12)]
+Scale = Annotated[Offset, BeforeValidator(_nonzero)]
 
 
 class TimeColumn(Settings):
@@ -73,10 +74,7 @@ class AngleColumn(Settings):
 class PressureColumns(Settings):
     """Columns that hold chamber pressures: pressure [unit] = scale · cell + offset."""
 
-    column: Annotated[tuple[str, str], Field(min_length=2, max_length=2)] = (
-        f"pA{JOINT}_bar",
-        f"pB{JOINT}_bar",
-    )
+    column: tuple[Name, Name] = (f"pA{JOINT}_bar", f"pB{JOINT}_bar")
     """names in the header of chamber A, which pushes to positive angles, and chamber B"""
     unit: Literal["bar", "Pa", "MPa"] = "bar"
     """unit of the scaled cells"""
@@ -97,15 +95,16 @@ class JointColumns(Settings):
     """as log.pressure; null: the log holds no pressures of this joint"""
 
 
-Columns = CommandColumns | AngleColumn | PressureColumns
+C = TypeVar("C", CommandColumns, AngleColumn, PressureColumns)
 
 
-def _common(columns: Columns | None) -> Columns | None:
+def _names(columns: CommandColumns | AngleColumn | PressureColumns) -> tuple[str, ...]:
+    return (columns.column,) if isinstance(columns, AngleColumn) else columns.column
+
+
+def _common(columns: C | None) -> C | None:
     """Refuse a common column that does not contain the joint's number."""
-    names = (
-        () if columns is None else (columns.column,) if isinstance(columns.column, str) else columns.column
-    )
-    for name in names:
+    for name in _names(columns) if columns else ():
         if JOINT not in name:
             raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
     return columns
@@ -129,49 +128,48 @@ class LogSettings(Settings):
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
-    angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0
+    angle_margin_deg: NotNegative = 1.0
     """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops"""
-    shortest_s: Annotated[float, Field(ge=0)] = 0.5
+    shortest_s: NotNegative = 0.5
     """duration below which a log is refused [s]"""
 
     @model_validator(mode="before")
     @classmethod
     def _lay_over(cls, values: Any) -> Any:
         """Complete each joint from the common columns, so that written settings read back the same."""
-        if not isinstance(values, dict) or not isinstance(cast(Any, values).get("joints"), dict):
-            return cast(Any, values)
-        given = cast(dict[str, Any], values)
-        return {**given, "joints": {joint: _complete(given, own) for joint, own in given["joints"].items()}}
+        joints = values.get("joints") if isinstance(values, dict) else None
+        if not isinstance(joints, dict):
+            return values
+        return {**values, "joints": {joint: _complete(values, own) for joint, own in joints.items()}}
 
     def command_of(self, joint: int) -> CommandColumns | None:
         """Return the columns of a joint's command, with its number in their names; None: not in the log."""
-        own = self.joints[joint].command if joint in self.joints else self.command
-        return own and own.model_copy(update={"column": tuple(_numbered(c, joint) for c in own.column)})
+        return _numbered(self.joints[joint].command if joint in self.joints else self.command, joint)
 
     def angle_of(self, joint: int) -> AngleColumn | None:
         """Return the column of a joint's angle, with its number in the name; None: not in the log."""
-        own = self.joints[joint].angle if joint in self.joints else self.angle
-        return own and own.model_copy(update={"column": _numbered(own.column, joint)})
+        return _numbered(self.joints[joint].angle if joint in self.joints else self.angle, joint)
 
     def pressure_of(self, joint: int) -> PressureColumns | None:
         """Return the columns of a joint's pressures, with its number in their names; None: not in the log."""
-        own = self.joints[joint].pressure if joint in self.joints else self.pressure
-        return own and own.model_copy(update={"column": tuple(_numbered(c, joint) for c in own.column)})
+        return _numbered(self.joints[joint].pressure if joint in self.joints else self.pressure, joint)
 
 
-def _numbered(column: str, joint: int) -> str:
-    return column.replace(JOINT, str(joint))
+def _numbered(columns: C | None, joint: int) -> C | None:
+    if columns is None:
+        return None
+    names = tuple(name.replace(JOINT, str(joint)) for name in _names(columns))
+    return columns.model_copy(update={"column": names[0] if isinstance(columns, AngleColumn) else names})
 
 
 def _complete(common: dict[str, Any], own: Any) -> Any:
-    if own is None:
-        return {"command": None, "angle": None, "pressure": None}
-    if not isinstance(own, dict):
+    """One joint's columns laid over the common ones; of pressures there are none unless they are named."""
+    if own is not None and not isinstance(own, dict):
         return own
-    entry = dict(cast(dict[str, Any], own))
-    for kind in ("command", "angle", "pressure"):
-        # of pressures there are none unless they are named
-        base = common.get(kind, None if kind == "pressure" else {})
+    entry: dict[str, Any] = {} if own is not None else {"command": None, "angle": None, "pressure": None}
+    entry |= own or {}
+    for kind, default in (("command", {}), ("angle", {}), ("pressure", None)):
+        base = common.get(kind, default)
         base = base.model_dump() if isinstance(base, BaseModel) else base
         mine = entry.setdefault(kind, base)
         if isinstance(mine, dict) and isinstance(base, dict):

@@ -7,9 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.settings.hydraulics import QUANTITIES
-from hydroid.settings.load import JointNumber, Settings
-
-Positive = Annotated[float, Field(gt=0)]
+from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
 
 MECHANICAL_UNITS = {
     "gain": "N·m/%",
@@ -151,7 +149,7 @@ class ObjectiveSettings(Settings):
     segments: SegmentSettings = SegmentSettings(equal=8)
     weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
-    pressure_weight: Annotated[float, Field(ge=0)] = 0.0
+    pressure_weight: NotNegative = 0.0
     """stage 2: factor that turns a chamber pressure's error into an angle's [deg/bar]; 0: angles only"""
     noise_deg: Positive | dict[JointNumber, Positive] | None = None
     """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is

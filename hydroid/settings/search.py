@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from hydroid.settings.load import Settings
 
 Rate = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=1)]
+Generations = Annotated[int, Field(ge=0)]
 
 
 class PopulationSettings(Settings):
@@ -14,7 +16,7 @@ class PopulationSettings(Settings):
 
     population: Annotated[int, Field(ge=2, le=100_000)]
     """number of candidates in a population"""
-    generations: Annotated[int, Field(ge=0)]
+    generations: Generations
     """number of populations after the first one"""
 
 
@@ -29,7 +31,7 @@ class GeneticSettings(PopulationSettings):
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
     """pointwise: cut parents at `points`; uniform: choose each element from either parent"""
-    points: Annotated[int, Field(ge=1)] = 2
+    points: Count = 2
     """number of cuts of the pointwise crossover (ours; the article gives none)"""
 
 
@@ -37,13 +39,11 @@ class GaSettings(GeneticSettings):
     """The simple genetic algorithm, article 4.1."""
 
     population: Annotated[int, Field(ge=2, le=100_000)] = 70
-    generations: Annotated[int, Field(ge=0)] = 40
+    generations: Generations = 40
     crossover_rate: Rate = 0.8
     mutation_rate: Rate = 0.05
     elitism: Annotated[int, Field(ge=0)] = 1
     """number of best candidates that survive unchanged (ours; the article gives none)"""
-    target: float | None = None
-    """the search ends once its best objective is this low; null: after all generations"""
 
     @model_validator(mode="after")
     def _someone_new(self) -> "GaSettings":
@@ -60,7 +60,7 @@ class Nsga2Settings(GeneticSettings):
     """
 
     population: Annotated[int, Field(ge=2, le=100_000)] = 20
-    generations: Annotated[int, Field(ge=0)] = 140
+    generations: Generations = 140
     crossover_rate: Rate = 0.4
     mutation_rate: Rate = 0.2
 
@@ -69,7 +69,7 @@ class CmaesSettings(PopulationSettings):
     """CMA-ES (Hansen) of the library cma; its objective is the error over the whole log."""
 
     population: Annotated[int, Field(ge=6, le=100_000)] = 20
-    generations: Annotated[int, Field(ge=0)] = 140
+    generations: Generations = 140
     """number of populations after the first one; fewer if the search converges earlier"""
 
 
@@ -79,7 +79,7 @@ class PymooSettings(PopulationSettings):
     algorithm: Literal["NSGA3", "MOEAD", "RVEA", "AGEMOEA", "SMSEMOA", "DE", "PSO"] = "NSGA3"
     """its name there; DE and PSO minimise the error over the whole log, the others that of every segment"""
     population: Annotated[int, Field(ge=4, le=100_000)] = 40
-    generations: Annotated[int, Field(ge=0)] = 70
+    generations: Generations = 70
 
 
 class MultistartSettings(Settings):
@@ -90,7 +90,7 @@ class MultistartSettings(Settings):
     horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0, 20.0)
     """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
     command on [s]"""
-    iterations: Annotated[int, Field(ge=1)] = 100
+    iterations: Count = 100
     """largest number of steps of each of these fits"""
     gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
     """as the refinement's; coarser, since the refinement starts from the best result"""
@@ -105,7 +105,7 @@ class RefinementSettings(Settings):
     """The refinement: bounded least squares that start from the search's estimate (ours; not in the
     article)."""
 
-    iterations: Annotated[int, Field(ge=1)] = 300
+    iterations: Count = 300
     """largest number of steps; a step takes one to three simulations, some a Jacobian besides"""
     gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-8
     """the refinement ends where a step promises to lower the sum of squared errors by less than this

@@ -31,16 +31,17 @@ def test_finds_the_bottom_of_a_sphere(coding, cross, seed):
 
 
 def test_solves_one_max():
-    ga = SimpleGa(GaSettings(target=-144.0, mutation_rate=0.03, elitism=2), 9)
-    ones = {}
+    ga = SimpleGa(GaSettings(mutation_rate=0.03, elitism=2), 9)
 
     def count(points):
         return -ga.coding.encode(points).sum(axis=1, dtype=float)[:, None]
 
     rng = np.random.default_rng(4)
-    ones["first"] = advance(ga, count, None, rng, 0).objectives.min()
-    ones["last"] = advance(ga, count, None, rng, 2000).objectives.min()
-    assert ones == {"first": pytest.approx(-92, abs=12), "last": -144}
+    population = advance(ga, count, None, rng, 0)
+    assert population.objectives.min() == pytest.approx(-92, abs=12)
+    for _ in range(20):
+        population = advance(ga, count, population, rng, 100)
+    assert population.objectives.min() == -144
 
 
 @pytest.mark.parametrize("elitism", [1, 3])
@@ -85,14 +86,6 @@ def test_survives_a_population_without_a_feasible_candidate():
     population = advance(ga, lambda x: np.full((len(x), 1), np.nan), None, np.random.default_rng(0), 3)
     assert len(population) == 70
     assert not population.feasible.any()
-
-
-def test_stops_at_the_target():
-    ga = SimpleGa(GaSettings(target=0.05), 2)
-    population = advance(ga, sphere, None, np.random.default_rng(0), 500)
-    assert ga.reached(population)
-    assert not SimpleGa(GaSettings(target=1e-30), 2).reached(population)
-    assert not SimpleGa(GaSettings(), 2).reached(population)
 
 
 def test_more_than_one_objective_is_a_mistake():

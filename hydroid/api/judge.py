@@ -126,7 +126,7 @@ def sensitivity(
         RunError: the folder cannot be written.
     """
     from hydroid.problem.problem import Problem
-    from hydroid.report.study_reports import sensitivity_page
+    from hydroid.report.sensitivity_report import sensitivity_page
     from hydroid.uncertainty.sweep import sweep
 
     problem = Problem(model.settings, list(logs))
@@ -165,7 +165,7 @@ def surface(
         if len(pair) != 2:
             raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
     from hydroid.problem.problem import Problem
-    from hydroid.report.study_reports import surface_page
+    from hydroid.report.objectives import surface_page
     from hydroid.uncertainty import surface as surfaces
 
     problem = Problem(model.settings, list(logs))

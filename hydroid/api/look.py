@@ -140,8 +140,7 @@ def plot_actuator(model: IdentifiedModel, joint: int = 2, out: str | Path = "run
     """
     _require_hydraulics(model)
     from hydroid.problem.stage import Stage
-    from hydroid.report.actuator_report import actuator_page
-    from hydroid.report.joint_actuator import joint_actuator
+    from hydroid.report.actuator_report import actuator_page, joint_actuator
     from hydroid.report.page import write_page
 
     candidate = Stage(model.settings).candidates(model.theta[None])

@@ -41,7 +41,7 @@ def design(
         RunError: the folder cannot be written.
     """
     from hydroid.experiment import design as experiment
-    from hydroid.report.study_reports import design_page
+    from hydroid.report.design_report import design_page
 
     settings = model.settings
     result = experiment.design(settings, model.theta, list(logs), seed, progress)

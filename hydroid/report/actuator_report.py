@@ -1,28 +1,233 @@
 """The report of one actuator: its curves at rest, from the command to the joint's torque."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
-from hydroid.report.joint_actuator import JointActuator
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hydroid.errors import SettingsError
+from hydroid.hydraulics.amplifier import coil_current, side_voltage
+from hydroid.hydraulics.records import coefficients, linkages
+from hydroid.hydraulics.solenoid import coil_force, curve_exists, resting_stroke
+from hydroid.hydraulics.valve import opening, port_flow, spool
+from hydroid.parameters import Array
+from hydroid.report import style
 from hydroid.report.page import Page, Plot, Section
-from hydroid.report.plots.actuator_curves import overview, single
+from hydroid.settings.arm import Arm
+from hydroid.settings.linkage import LinearActuator, RotaryActuator
+from hydroid.simulation import Candidates
 
-_OVERVIEW = "Numbers in brackets are the article's equations."
-_CURVES = {
-    "calibration": "Voltage of each side against the command.",
-    "current": "Coil current of each side against the command.",
-    "force": "Solenoid force and spring against the stroke; dots: where the plunger rests at each current.",
-    "spool": "Spool displacement at rest against the command.",
-    "opening": "Valve opening against the spool displacement.",
-    "flow": "Flow from the pump against the spool displacement for several pressure drops.",
-    "pressure_flow": "Flow from the pump into chamber A against its pressure.",
-    "torque": "Largest static torque against the joint's angle.",
-}
+SIDE_A: dict[str, Any] = {"color": style.SEARCH}
+SIDE_B: dict[str, Any] = {"color": style.REFINED, "linestyle": (0, (5, 2))}
+_SHADES = (style.OTHERS[3], style.OTHERS[0], style.OTHERS[2], style.OTHERS[1])
+_LITRES = 6e4
+"""L/min in a m³/s"""
+_COMMAND = np.linspace(-100.0, 100.0, 2001)
+_DROPS = (10.0, 50.0, 100.0)
+"""pressure drops at which flow is drawn against the spool [bar]"""
+_OPENINGS = (0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class JointActuator:
+    """One joint's actuator: its COEFFICIENTS as one record, its linkage, the joint's range [deg]."""
+
+    title: str
+    parameters: Any
+    linkage: LinearActuator | RotaryActuator
+    range: tuple[float, float]
+
+
+def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> JointActuator:
+    """Return one joint's actuator, joint 1-based, of a candidate with hydraulics.
+
+    Raises:
+        SettingsError: no such joint, or no force-stroke curve runs through its two points.
+    """
+    if not 1 <= joint <= len(arm.joints):
+        raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
+    assert candidate.actuators is not None
+    one = candidate.actuators[:1, [joint - 1]].view(np.recarray)
+    p = coefficients(one, linkages(arm, [joint - 1], [joint - 1])).view(np.recarray)[0, 0]
+    if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
+        raise SettingsError(
+            f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
+            f"and {p.force_2:g} N at {1e3 * p.stroke_2:g} mm",
+            where=source,
+            hint="it needs F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
+        )
+    settings = arm.joints[joint - 1]
+    return JointActuator(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)
 
 
 def actuator_page(actuator: JointActuator) -> Page:
     """Return the page of an actuator: all curves as one figure and each as its own."""
-    everything = Plot("actuator", _OVERVIEW, partial(overview, actuator))
-    single_ones = tuple(Plot(name, text, partial(single, actuator, name)) for name, text in _CURVES.items())
+    everything = Plot(
+        "actuator", "Numbers in brackets are the article's equations.", partial(overview, actuator)
+    )
+    single_ones = tuple(Plot(n, text, partial(single, actuator, n)) for n, (_, text) in PANELS.items())
     sections = Section("All curves", plots=(everything,)), Section("One by one", plots=single_ones)
     lead = "What its parameters mean at rest, from the command to the torque at the joint."
     return Page("actuator", f"Actuator of {actuator.title.lower()}", lead, sections)
+
+
+def overview(actuator: JointActuator) -> Figure:
+    """Draw all panels of an actuator on one page."""
+    drawing = style.figure(11.0, 7.6, left=0.65, top=0.75, bottom=0.5)
+    style.headline(drawing, actuator.title)
+    axes = drawing.subplots(4, 2, gridspec_kw={"hspace": 0.45, "wspace": 0.25})
+    for each, (panel, _) in zip(axes.flat, PANELS.values(), strict=True):
+        panel(each, actuator)
+    return drawing
+
+
+def single(actuator: JointActuator, name: str) -> Figure:
+    """Draw one panel, by its name in `PANELS`."""
+    drawing = style.figure(3.8)
+    axes = drawing.subplots()
+    PANELS[name][0](axes, actuator)
+    axes.set_title(f"{actuator.title}: {axes.get_title(loc='left').lower()}")
+    return drawing
+
+
+def _calibration(axes: Axes, actuator: JointActuator) -> None:
+    a, b = _voltages(actuator.parameters, _COMMAND)
+    _sides(axes, _COMMAND, a, b)
+    _name(axes, "Calibration, (2) and (3)", "command [%]", "voltage [V]")
+
+
+def _current(axes: Axes, actuator: JointActuator) -> None:
+    _sides(axes, _COMMAND, *_currents(actuator.parameters, _COMMAND))
+    axes.set_ylim(0, 1.1 * float(actuator.parameters.current_max))
+    _name(axes, "Coil current, (4)", "command [%]", "current [A]")
+
+
+def _force(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    coil, gap = float(p.coil), float(p.gap)
+    stroke = np.linspace(0.0, 1.08 * p.stroke_2, 400)
+    currents = {float(i) for i in (p.current_min, 0.5 * (p.current_min + p.current_max), p.current_max)}
+    for shade, current in zip(_SHADES, sorted(currents | {float(p.rated_current)}), strict=False):
+        drive = coil * current**2
+        axes.plot(1e3 * stroke, coil_force(drive, stroke, gap), color=shade, label=f"{current:.3g} A")
+        rest = resting_stroke(drive, gap, p.plunger_stiffness)
+        axes.plot(1e3 * rest, p.plunger_stiffness * rest, "o", color=shade, markeredgecolor="white", zorder=4)
+    axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=style.MEASURED, linewidth=1.0, label="spring")
+    points = 1e3 * np.array([p.stroke_1, p.stroke_2]), np.array([p.force_1, p.force_2])
+    axes.plot(*points, "D", color=style.REFINED, markeredgecolor="white", label="F1, F2 (rated)")
+    axes.plot([], [], "o", color=style.GREY, label="at rest")
+    steepest = float(coil_force(coil * max(currents) ** 2, 0.0, gap))
+    axes.set_ylim(0, min(1.6 * float(p.force_1), 1.1 * steepest))
+    _name(axes, "Solenoid force, (5)", "stroke [mm]", "force [N]", "upper right")
+
+
+def _spool(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    axes.plot(_COMMAND, 1e3 * _displacement(p, _COMMAND), **SIDE_A)
+    for edge, label in ((0.0, "opens"), (p.slot_width, "fully open")):
+        for sign, overlap in ((1.0, p.overlap_a), (-1.0, p.overlap_b)):
+            at = 1e3 * sign * (overlap + edge)
+            dashes, once = ":" if edge else "--", label if sign > 0 else None
+            axes.axhline(float(at), color=style.GREY, linestyle=dashes, linewidth=1.0, label=once)
+    axes.set_ylim(*(1.2 * limit for limit in axes.get_ylim()))
+    _name(axes, "Spool at rest, (6)", "command [%]", "displacement [mm]", "upper left", 2)
+
+
+def _opening(axes: Axes, actuator: JointActuator) -> None:
+    at = _spool_range(actuator.parameters)
+    area = 1e6 * opening(at, actuator.parameters)
+    _sides(axes, 1e3 * at, np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan))
+    _name(axes, "Valve opening", "spool displacement [mm]", "opening [mm²]")
+
+
+def _flow(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    at = _spool_range(p)
+    for shade, drop in zip(_SHADES, _DROPS, strict=False):
+        axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, opening(at, p)), color=shade, label=f"{drop:g} bar")
+    axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
+    _name(axes, "Flow from the pump, (7)", "spool displacement [mm]", "flow [L/min]", "upper center", 3)
+
+
+def _pressure_flow(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    pressure = np.linspace(p.tank_pressure, p.supply_pressure, 400)
+    for shade, share in zip(_SHADES, _OPENINGS, strict=True):
+        flow = _pump_flow(p, p.supply_pressure - pressure, share * p.opening_a)
+        axes.plot(1e-5 * pressure, flow, color=shade, label=f"{100 * share:g} % open")
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
+    across = "pressure in chamber A [bar]"
+    _name(axes, "Flow from the pump into A, (7)", across, "flow [L/min]", "upper right", 2)
+
+
+def _torque(axes: Axes, actuator: JointActuator) -> None:
+    p = actuator.parameters
+    angle = np.linspace(*actuator.range, 400)
+    # a rotary actuator's areas are its displacement
+    linkage = actuator.linkage if isinstance(actuator.linkage, LinearActuator) else None
+    arm = linkage.moment_arm(np.radians(angle)) if linkage else np.ones_like(angle)
+    most, least = p.supply_pressure, p.tank_pressure
+    axes.plot(angle, arm * (p.area_a * most - p.area_b * least), label="A at supply", **SIDE_A)
+    axes.plot(angle, arm * (p.area_a * least - p.area_b * most), label="B at supply", **SIDE_B)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.8)
+    lever = f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm" if linkage else ""
+    _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
+
+
+PANELS: dict[str, tuple[Callable[[Axes, JointActuator], None], str]] = {
+    "calibration": (_calibration, "Voltage of each side against the command."),
+    "current": (_current, "Coil current of each side against the command."),
+    "force": (
+        _force,
+        "Solenoid force and spring against the stroke; dots: where the plunger rests at each current.",
+    ),
+    "spool": (_spool, "Spool displacement at rest against the command."),
+    "opening": (_opening, "Valve opening against the spool displacement."),
+    "flow": (_flow, "Flow from the pump against the spool displacement for several pressure drops."),
+    "pressure_flow": (_pressure_flow, "Flow from the pump into chamber A against its pressure."),
+    "torque": (_torque, "Largest static torque against the joint's angle."),
+}
+"""the panels by name, in the order of the chain, and what each shows"""
+
+
+def _voltages(p: Any, command: Array) -> tuple[Array, Array]:
+    return side_voltage(command, p.onset_a, p.full_a), side_voltage(-command, p.onset_b, p.full_b)
+
+
+def _currents(p: Any, command: Array) -> tuple[Array, Array]:
+    a, b = (coil_current(voltage, p.current_max, p.current_min) for voltage in _voltages(p, command))
+    return a, b
+
+
+def _displacement(p: Any, command: Array) -> Array:
+    """Where the spool comes to rest [m]."""
+    a, b = (resting_stroke(p.coil * i**2, p.gap, p.plunger_stiffness) for i in _currents(p, command))
+    return spool(a, b)
+
+
+def _spool_range(p: Any) -> Array:
+    """A little more than from full opening to full opening [m]."""
+    return np.linspace(-1.15 * (p.overlap_b + p.slot_width), 1.15 * (p.overlap_a + p.slot_width), 2001)
+
+
+def _pump_flow(p: Any, drop: Array | float, area: Array | float) -> Array:
+    """Flow [L/min] from the pump over a pressure drop [Pa] through an edge of area [m²] and its leakage."""
+    flow, _ = port_flow(p.supply_pressure - drop, area + p.leakage, 0.0, p)
+    return _LITRES * flow
+
+
+def _sides(axes: Axes, at: Array, a: Array, b: Array) -> None:
+    axes.plot(at, a, label="side A", **SIDE_A)
+    axes.plot(at, b, label="side B", **SIDE_B)
+
+
+def _name(axes: Axes, title: str, across: str, up: str, place: Any = "best", columns: int = 1) -> None:
+    axes.set_title(title)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc=place, fontsize=8, ncols=columns, frameon=True, framealpha=0.8, edgecolor="none")

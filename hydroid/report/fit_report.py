@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.fitting.fit import Estimate, Fit
+from hydroid.fitting.fit import Fit
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.problem.problem import Problem
-from hydroid.report.joint_record import joint_records
-from hydroid.report.page import Page, Plot, Section
+from hydroid.report import style
+from hydroid.report.estimates import estimates as draw_estimates
+from hydroid.report.objectives import learning, pareto
+from hydroid.report.page import Page, Plot, Section, log_names
 from hydroid.report.phrases import (
     ALGORITHMS,
     STAGES,
@@ -27,64 +29,60 @@ from hydroid.report.phrases import (
     rank_phrase,
     status_phrase,
 )
-from hydroid.report.plots.estimates import estimates as draw_estimates
-from hydroid.report.plots.objectives import learning as draw_learning
-from hydroid.report.plots.objectives import pareto as draw_pareto
-from hydroid.report.plots.responses import fit_response
-from hydroid.report.table import Cell, Given, Table, number, unless_nan
+from hydroid.report.responses import joint_responses, response_plots
+from hydroid.report.table import Cell, Given, Table, number, numbers_csv, unless_nan
 from hydroid.report.uncertainty_report import determined_section
 
-MOST_RESPONSES = 12
-"""responses drawn at most, those with the largest errors"""
 INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
 INDICES_NOTE = (
     "fit: 100 % for a perfect response, 0 % for the mean of the measured angle, – for a joint at rest."
 )
+_ESTIMATES = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
+_LEARNING = "Best candidate so far, and the median of each population."
+_PARETO = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
 _SINGLE = (
     "The search minimises the error over the whole record and does not look for the Pareto set. Shown are "
-    "the candidates of its last population that no other beats in every segment."
+    "those candidates of its last population to which no other is better in every segment."
 )
-_SEVERAL = "No candidate beats one of these in every segment: a better fit of one segment costs another."
+_SEVERAL = "Among these candidates, a better fit of one segment goes with a worse fit of another."
 
 
 def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
-    """Return the page of a fit.
-
-    Args:
-        identity: the run's versions, seed and log hashes.
-        problem: the problem.
-        fit: the fit.
-    """
-    objective, arm = problem.settings.objective, problem.settings.arm.name
-    responses, more = _responses(problem, fit)
-    determined = determined_section(problem, fit.uncertainty, fit.identifiability)
-    estimates = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
-    learning = "Best candidate so far, and the median of each population."
-    pareto = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
+    """Return the page of a fit; `identity` holds the run's versions and log hashes."""
+    objective = problem.settings.objective
+    responses = joint_responses(problem, fit)
+    outputs = len(problem.outputs)
+    names = [
+        "response" if len(responses) == 1 else f"response_{i // outputs + 1}_joint_{r.joint}"
+        for i, r in enumerate(responses)
+    ]
+    final_errors = [response.mean_squares()[0] for response in responses]
+    colors = [color for color, _ in style.estimate_looks(fit).values()]
+    drawn, more = response_plots(dict(zip(names, responses, strict=True)), final_errors, colors)
     sections = (
         Section(
             "How well it predicts the fitted logs",
             f"Judge a fit also on a log that it was not fitted on, with hydroid validate.{more}",
             tables={"errors": objective_table(problem, fit)},
-            plots=responses,
+            plots=drawn,
         ),
         Section(
             "Parameters",
             rank_phrase(fit.identifiability),
             points=parameter_advice(problem, fit),
             tables={"parameters": parameter_table(problem, fit)},
-            plots=(Plot("estimates", estimates, partial(draw_estimates, problem, fit)),),
+            plots=(Plot("estimates", _ESTIMATES, partial(draw_estimates, problem, fit)),),
         ),
-        determined,
+        determined_section(problem, fit.uncertainty, fit.identifiability),
         Section(
             "How the search went",
-            facts=_effort(fit),
-            plots=(Plot("learning", learning, partial(draw_learning, fit, objective)),),
+            facts=_effort(problem, fit),
+            plots=(Plot("learning", _LEARNING, partial(learning, fit, objective)),),
         ),
         Section(
             "Pareto set",
             _SEVERAL if _has_segment_objectives(problem, fit) else _SINGLE,
-            plots=(Plot("pareto", pareto, partial(draw_pareto, fit, objective)),),
+            plots=(Plot("pareto", _PARETO, partial(pareto, fit, objective)),),
         ),
         Section("What was fitted", facts=_facts(identity, problem)),
     )
@@ -93,9 +91,9 @@ def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
         "history.csv": _history(fit),
         "pareto.csv": _pareto(problem, fit),
     }
-    known = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
-    title = f"Parameters of {arm}"
-    return Page("report", title, fit_summary(fit), sections, fit_warnings(problem, fit), known, data)
+    versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
+    title = f"Parameters of {problem.settings.arm.name}"
+    return Page("report", title, fit_summary(fit), sections, fit_warnings(problem, fit), versions, data)
 
 
 def parameter_table(problem: Problem, fit: Fit) -> Table:
@@ -116,25 +114,26 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     others = [label for label in labels[1:] if label != final]
     optional = (*others, "effect [deg]", *(labels[:1] if labels[0] != final else ()), "lower", "upper")
     note = (
-        f"{estimate_meanings(fit)} ±: half of the 95 % interval of {final}, for noise as the logs show it"
-        ", as far as the model holds; – if it is not identifiable. effect: rms change of the output for "
-        "1 % of the value."
+        f"{estimate_meanings(fit)} ±: half of the 95 % interval of {final}, from the noise that the "
+        "logs show and for a model that is right; – if the parameter is not identifiable. effect: rms change "
+        "of the output when the parameter changes by 1 %."
     )
     return Table("Parameters", header, tuple(rows), note, optional)
 
 
 def objective_table(problem: Problem, fit: Fit) -> Table:
     """Return the output error of each estimate on the fitted logs, and the norm that the search minimised."""
-    records = joint_records(problem)
-    several = len(records) > 1
+    responses = joint_responses(problem, fit)
+    several = len(responses) > 1
     objective = problem.settings.objective
     rows: list[tuple[Cell, ...]] = []
     for name, estimate in fit.estimates.items():
-        label, overall = estimate_label(fit, name), _overall(problem, estimate)
-        pairs = [(record.measured, record.simulated(estimate.responses)) for record in records]
-        for record, pair in zip(records, pairs, strict=True):
+        label = estimate_label(fit, name)
+        overall = float(in_reader_units(objective, np.array(estimate.overall)))
+        pairs = [(response.measured, response.simulated[label]) for response in responses]
+        for response, pair in zip(responses, pairs, strict=True):
             indices = index_cells(error_indices(*pair))
-            rows.append((label, record.log, record.joint, *indices, None if several else overall))
+            rows.append((label, response.log, response.joint, *indices, None if several else overall))
         if several:
             rows.append((label, "all", None, *index_cells(pooled_indices(pairs)), overall))
     pooled = " all: every joint about its own mean." if several else ""
@@ -162,36 +161,15 @@ def index_cells(indices: ErrorIndices) -> tuple[float, ...]:
     return (degrees(indices.mean_absolute), degrees(indices.rms), degrees(indices.largest), indices.fit)
 
 
-def _responses(problem: Problem, fit: Fit) -> tuple[tuple[Plot, ...], str]:
-    """Return plots of the records with the largest errors, and a sentence about those not drawn."""
-    records = joint_records(problem)
-    errors = [np.mean((r.measured - r.simulated(fit.best.responses)) ** 2) for r in records]
-    worst = sorted(np.argsort(np.nan_to_num(errors, nan=np.inf))[::-1][:MOST_RESPONSES])
-    caption = (
-        "Top: measured and simulated angle, segments numbered. Middle: their difference. Bottom: command."
-    )
-    plots: list[Plot] = []
-    for record in (records[i] for i in worst):
-        name = "response" if len(records) == 1 else f"response_{record.index[0] + 1}_joint_{record.joint}"
-        plots.append(Plot(name, caption, partial(fit_response, fit, record)))
-    left_out = len(records) - len(plots)
-    noun = "response is" if left_out == 1 else "responses are"
-    return tuple(
-        plots
-    ), f" {left_out} further {noun} not drawn; the table has all errors." if left_out else ""
-
-
 def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, str], ...]:
     settings = problem.settings
     hashes = list(identity.get("logs", {}).values())
     logs: list[tuple[str, str]] = []
-    for record in joint_records(problem):
-        i, k = record.index
-        if k == 0:
-            seconds, samples = len(record.time) * problem.logs[i].period, len(record.time)
-            digest = f", SHA-256 {hashes[i][:12]}…" if i < len(hashes) else ""
-            label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
-            logs.append((label, f"{record.log}, {number(seconds)} s, {samples} samples{digest}"))
+    for i, (log, name) in enumerate(zip(problem.logs, log_names(problem.logs), strict=True)):
+        seconds, samples = len(log.time) * log.period, len(log.time)
+        digest = f", SHA-256 {hashes[i][:12]}…" if i < len(hashes) else ""
+        label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
+        logs.append((label, f"{name}, {number(seconds)} s, {samples} samples{digest}"))
     return (
         ("arm", f"{settings.arm.name}; its geometry is taken as configured in arm.yaml"),
         ("stage", STAGES[settings.stage]),
@@ -199,7 +177,7 @@ def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, st
         *((f"payload in {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
         *((f"prior {name}", prior_phrase(prior)) for name, prior in settings.priors.items()),
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
-        ("other joints", settings.simulation.other_joints),
+        ("joints not compared or driven", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
         ("search", ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
         ("seed", str(settings.search.seed)),
@@ -212,12 +190,13 @@ def _has_segment_objectives(problem: Problem, fit: Fit) -> bool:
     return "average" in fit.estimates if algorithm == "pymoo" else algorithm == "nsga2"
 
 
-def _effort(fit: Fit) -> tuple[tuple[str, str], ...]:
+def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
     facts: list[tuple[str, str]] = []
     if len(fit.history):
-        generations, evaluations, simulated, diverged = (int(v) for v in fit.history[-1, :4])
+        multistart = problem.settings.search.algorithm == "multistart"
+        rounds, evaluations, simulated, diverged = (int(v) for v in fit.history[-1, :4])
         facts += [
-            ("generations", f"{generations}"),
+            ("starts" if multistart else "populations", str(rounds)),
             ("candidates", f"{evaluations:,} evaluated, {simulated:,} of them simulated"),
             ("diverged", f"{diverged:,} of {simulated:,} simulated candidates; ranked behind all others"),
         ]
@@ -225,10 +204,6 @@ def _effort(fit: Fit) -> tuple[tuple[str, str], ...]:
         effort = f"{one.iterations} iterations, {one.evaluations:,} simulations"
         facts.append((f"refinement to {name}", f"{effort}; {one.ending.value}"))
     return tuple(facts)
-
-
-def _overall(problem: Problem, estimate: Estimate) -> float:
-    return float(in_reader_units(problem.settings.objective, np.array(estimate.overall)))
 
 
 def _history(fit: Fit) -> str:
@@ -244,5 +219,4 @@ def _pareto(problem: Problem, fit: Fit) -> str:
     unit = "" if problem.settings.objective.relative else "_rad"
     segments = (f"segment_{s}{unit}" for s in range(1, evaluation.segments.shape[1] + 1))
     header = (*problem.parameters.names, *segments, f"overall{unit}")
-    rows = np.column_stack([theta, evaluation.segments, evaluation.overall])
-    return Table("", header, tuple(tuple(map(float, row)) for row in rows)).csv()
+    return numbers_csv(header, np.column_stack([theta, evaluation.segments, evaluation.overall]))

@@ -6,17 +6,22 @@ elsewhere, so that it can be mailed and printed. Figures are drawn one after ano
 """
 
 import base64
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
+from itertools import count
 from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
 
 from hydroid.files import write_atomic
-from hydroid.report.plots.style import rendered, style
+from hydroid.log import Log
+from hydroid.report.style import rendered, style
 from hydroid.report.table import Table, shown
+
+_LONGEST_NAME = 40
 
 
 @dataclass(frozen=True)
@@ -104,3 +109,36 @@ def page_html(page: Page, figures: Mapping[str, bytes]) -> str:
     environment.filters["shown"] = shown
     source = files("hydroid.report").joinpath("template.html.j2").read_text(encoding="utf-8")
     return environment.from_string(source).render(page=page, address=address)
+
+
+def log_names(logs: Sequence[Log]) -> list[str]:
+    """Return short names of logs, all different."""
+    names: list[str] = []
+    for log in logs:
+        names.append(unique(short_name(Path(log.source).name or log.source), names))
+    return names
+
+
+def unique(name: str, taken: Collection[str]) -> str:
+    """Return the name, numbered where it is taken."""
+    candidates = (f"{name} ({n})" if n > 1 else name for n in count(1))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def file_name(text: str, taken: set[str]) -> str:
+    """Return a name of letters, digits, dot, dash and underscore, and add it to `taken`.
+
+    It is numbered where a name that differs only in case is taken.
+    """
+    safe = re.sub(r"[^A-Za-z0-9._-]+", "_", text)
+    candidates = (f"{safe}_{n}" if n > 1 else safe for n in count(1))
+    name = next(candidate for candidate in candidates if candidate.lower() not in taken)
+    taken.add(name.lower())
+    return name
+
+
+def short_name(name: str) -> str:
+    """Return a name with unprintable characters replaced and the middle of a long one left out."""
+    text = "".join(c if c.isprintable() else "?" for c in name)
+    half = _LONGEST_NAME // 2
+    return text if len(text) <= _LONGEST_NAME else f"{text[: half - 1]}…{text[-half:]}"

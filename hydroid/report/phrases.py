@@ -23,16 +23,16 @@ ALGORITHMS = {
     "multistart": "bounded least squares from random starts",
 }
 STAGES = {
-    "mech": "1, the arm: a gain stands for the hydraulics",
+    "mech": "1, the arm, with a gain in place of the hydraulics",
     "hyd": "2, the hydraulic actuator",
 }
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
     "average": "mean of the best candidate of each segment, as in the article",
-    "utopia": "candidate closest to the best of every segment at once",
+    "utopia": "candidate whose errors come closest to the lowest error of every segment",
     "best": "candidate with the lowest error over the whole record",
-    "refined": "least squares from the best of the search's estimates",
-    "joint": "least squares over the parameters of both stages, from there",
+    "refined": "least squares, started from the search's estimate with the lowest rms error",
+    "joint": "least squares over the parameters of both stages, started from refined",
 }
 _UNEQUAL = 0.1
 """relative changes that differ by more than this do not scale by one factor"""
@@ -106,11 +106,11 @@ def _direction_name(problem: Problem, direction: Direction) -> str:
         case DirectionKind.NO_EFFECT:
             return f"{names[0]} has no effect on {outputs_phrase(problem)}"
         case DirectionKind.SINGLE:
-            return f"{names[0]} by itself"
+            return f"{names[0]} alone"
         case DirectionKind.COMMON_SCALE:
             unequal = np.ptp(changes) > _UNEQUAL
             note = " (the masses unequally, to make up for what is fixed)" if unequal else ""
-            return f"{listed(names)} scale together{note}"
+            return f"a common factor of {listed(names)}{note}"
         case DirectionKind.SOLENOID:
             values = f"δ = {numbers['delta']:.3g} mm and k·i0² = {numbers['k_i0']:.3g} N·mm²"
             return f"{listed(names)} act through two combinations only, {values}"
@@ -182,8 +182,9 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
         ]
         if at_bound:
             said.append(
-                f"At the {side} bound: {listed(at_bound)}. The fit would go beyond it, so the bound is too "
-                "narrow or the model lacks something. Such an estimate has no interval."
+                f"At the {side} bound: {listed(at_bound)}. The error would fall further beyond the bound. "
+                "Widen it if such values are possible; otherwise the model lacks something. Such an estimate "
+                "has no interval."
             )
     said += [
         f"The estimate {name} diverged when it was simulated and was not used."
@@ -214,7 +215,7 @@ def rank_phrase(result: Identifiability) -> str:
     plural = "" if result.rank == 1 else "s"
     return (
         f"These logs determine {result.rank} independent combination{plural} of the {len(result.names)} free "
-        f"parameters to {100 * WEAK_ABOVE:.0f} % or better."
+        f"parameters with a relative standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )
 
 
@@ -229,7 +230,8 @@ def parameter_advice(problem: Problem, fit: Fit) -> tuple[str, ...]:
         for flag in (Flag.NO_EFFECT, Flag.UNIDENTIFIABLE, Flag.WEAK)
     }
     advice = {
-        Flag.NO_EFFECT: "Any value within the bounds fits as well. Fix it, or measure a joint that it moves.",
+        Flag.NO_EFFECT: "Any value within the bounds gives the same response. Fix it, or compare a joint "
+        "that it moves.",
         Flag.UNIDENTIFIABLE: "A small output error does not confirm such a value. Fix what is known from "
         "elsewhere or give it as a prior, compare more joints, or add logs in other poses.",
         Flag.WEAK: "A prior, more joints or logs in other poses help.",

@@ -8,9 +8,9 @@ import numpy as np
 
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
+from hydroid.report import estimates as plots
 from hydroid.report.page import Page, Plot, Section
 from hydroid.report.phrases import listed, runs_phrase
-from hydroid.report.plots import estimates as plots
 from hydroid.report.table import Cell, Table
 from hydroid.run.collection import RunEstimate, RunResult
 
@@ -66,11 +66,7 @@ def spread_table(
 ) -> Table:
     """Return median and spread over runs of each parameter and of the output error.
 
-    Args:
-        parameters: the parameters.
-        runs: one estimate per run.
-        without_effect: parameters without effect in any run.
-        name: of the estimate: search or refined.
+    `name` is the estimate's: search or refined. `without_effect` names parameters without effect in any run.
     """
     theta = np.array([run.theta for run in runs])
     rows: list[tuple[Cell, ...]] = [

@@ -4,9 +4,12 @@ import csv
 import io
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
+
+from hydroid.parameters import Array
 
 if TYPE_CHECKING:
     import rich.table
@@ -46,7 +49,10 @@ class Table:
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(self.header)
-        writer.writerows([exact(cell) for cell in row] for row in self.rows)
+        # a Given is a float: its repr would be its class's
+        writer.writerows(
+            [repr(float(cell)) if isinstance(cell, float) else cell for cell in row] for row in self.rows
+        )
         return buffer.getvalue()
 
     def markdown(self) -> str:
@@ -151,6 +157,11 @@ class Table:
         return max(map(len, (*texts, *numbers)), default=0)
 
 
+def numbers_csv(header: Sequence[str], rows: Array) -> str:
+    """Return an array of shape (n, m) as CSV with every bit of the numbers."""
+    return Table("", tuple(header), tuple(tuple(map(float, row)) for row in rows)).csv()
+
+
 def shown(cell: Cell) -> str:
     """Return the text of a cell for a reader."""
     if cell is None:
@@ -158,13 +169,6 @@ def shown(cell: Cell) -> str:
     if isinstance(cell, Given):
         return plain(cell)
     return number(cell) if isinstance(cell, float) else str(cell)
-
-
-def exact(cell: Cell) -> str:
-    """Return the text of a cell from which the same number is read back."""
-    if cell is None:
-        return ""
-    return repr(float(cell)) if isinstance(cell, float) else str(cell)
 
 
 def unless_nan(value: float) -> float | None:

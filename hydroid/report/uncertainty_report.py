@@ -1,32 +1,43 @@
 """What logs determine at some parameters: intervals, directions, noise; a page and a section of a fit's."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
+from numpy.typing import NDArray
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.report.names import log_names
-from hydroid.report.page import Page, Plot, Section
+from hydroid.report import style
+from hydroid.report.page import Page, Plot, Section, log_names
 from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
-from hydroid.report.plots import uncertainty as plots
-from hydroid.report.table import Cell, Table, unless_nan
+from hydroid.report.table import Cell, Table, plain, unless_nan
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.directions import Identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE
-from hydroid.uncertainty.intervals import Profile
+from hydroid.uncertainty.intervals import THRESHOLD, Profile
 
 _SHOWN = 0.1
 """parts of a direction below this are left out of its row"""
 _FEW_REFITS = 40
 """refits below which a 2.5 % quantile lies between the two lowest"""
+_CELL = 0.36  # [in]
+_MOST_NUMBERS = 14
+"""parameters up to which the cells of a map carry their numbers"""
+_LEAST_DRAWN = 1e-6
+"""singular values below this part of the largest are drawn at the foot"""
+_PROFILE_MARGIN = 0.3
+"""part of a profile's interval that is drawn beyond each end"""
 _CAPTIONS = {
-    "singular_values": "The inverse of the relative standard deviation of each combination, for noise as the "
-    f"logs show it. Below the dashed line it is known to worse than {100 * WEAK_ABOVE:.0f} %; a hollow mark "
-    "at the foot: the logs do not depend on it.",
+    "singular_values": "The inverse of the relative standard deviation of each combination, from the noise "
+    f"that the logs show. Below the dashed line the standard deviation is above {100 * WEAK_ABOVE:.0f} %. A "
+    "hollow mark at the foot: the combination has no effect on the logs.",
     "directions": "Each column is one combination of relative changes, best determined first.",
-    "correlation": "Near ±1 only a combination of the two parameters is known. Blank: not identifiable.",
+    "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
+    "identifiable are left out.",
     "profiles": "The error, in units of the noise, with one parameter held and the others fitted again. "
     "The interval is where it stays below the threshold; dashed: the linear approximation.",
 }
@@ -55,12 +66,9 @@ class UncertaintyStudy:
 
 def uncertainty_page(study: UncertaintyStudy) -> Page:
     """Return the page of a study; its tables are `intervals`, `directions` and `noise`."""
-    names = study.problem.parameters.names
-    drawn: tuple[Plot, ...] = ()
-    if study.profiles:
-        draw = partial(plots.profiles, study.profiles, study.uncertainty, names)
-        drawn = (Plot("profiles", _CAPTIONS["profiles"], draw),)
-    intervals = Section("Intervals", tables={"intervals": interval_table(study)}, plots=drawn)
+    drawn = Plot("profiles", _CAPTIONS["profiles"], partial(draw_profiles, study))
+    plots = (drawn,) if study.profiles else ()
+    intervals = Section("Intervals", tables={"intervals": interval_table(study)}, plots=plots)
     determined = determined_section(study.problem, study.uncertainty, study.identifiability)
     lead = rank_phrase(study.identifiability)
     warnings = profile_warnings(study.profiles)
@@ -75,11 +83,16 @@ def determined_section(problem: Problem, uncertainty: Uncertainty, result: Ident
         tables={"directions": direction_table(result), "noise": noise_table(problem, uncertainty)},
         plots=tuple(
             Plot(name, _CAPTIONS[name], draw)
-            for name, draw in (
-                ("singular_values", partial(plots.singular_values, result)),
-                ("directions", partial(plots.directions, result)),
-                ("correlation", partial(plots.correlation, uncertainty, result.names)),
+            for name, draw, shown in (
+                ("singular_values", partial(singular_values, result), True),
+                ("directions", partial(directions, result), True),
+                (
+                    "correlation",
+                    partial(correlation, uncertainty, result.names),
+                    _correlated(uncertainty).sum() > 1,
+                ),
             )
+            if shown
         ),
     )
 
@@ -103,9 +116,9 @@ def interval_table(study: UncertaintyStudy) -> Table:
             row += [unless_nan(v) for v in ends] if found.free[i] else [None, None]
         rows.append((*row, status_phrase(found.status[i])))
     note = (
-        f"At {study.source}. 95 % intervals for noise as the logs show it there, as far as the model holds."
-        " –: no limit. A parameter at a bound has none. Away from a fit the residual does not measure the "
-        "noise: set objective.noise_deg."
+        f"At {study.source}. 95 % intervals, from the noise that the logs show there and for a model that is "
+        "right. –: no limit. A parameter at a bound has none. Away from a fit the residual does not measure "
+        "the noise: set objective.noise_deg."
     )
     if refits is not None:
         few = ", too few for 95 %: about their lowest and highest" if len(refits) < _FEW_REFITS else ""
@@ -121,8 +134,8 @@ def direction_table(result: Identifiability) -> Table:
         parts = ", ".join(f"{result.names[i]} {axis[i]:+.2f}".replace("-", "−") for i in order)
         rows.append((float(value), 100 / value if value > 0 else np.inf, parts))
     note = (
-        f"Relative changes of unit length. {result.rank} of {len(result.names)} directions have a standard "
-        f"deviation of {100 * WEAK_ABOVE:.0f} % or less."
+        f"A direction is a set of relative changes made together. {result.rank} of {len(result.names)} "
+        f"directions have a relative standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )
     header = ("singular value", "standard deviation [%]", "relative changes")
     return Table("Directions", header, tuple(rows), note, header[:1])
@@ -130,7 +143,7 @@ def direction_table(result: Identifiability) -> Table:
 
 def noise_table(problem: Problem, uncertainty: Uncertainty) -> Table:
     """Return the noise of every channel, and where it was taken from."""
-    names = log_names([log.source for log in problem.logs])
+    names = log_names(problem.logs)
     rows: list[tuple[Cell, ...]] = []
     for channel, noise in zip(problem.channels, uncertainty.noise, strict=True):
         angle = channel.quantity == "angle"
@@ -142,7 +155,117 @@ def noise_table(problem: Problem, uncertainty: Uncertainty) -> Table:
         rows.append((names[channel.log], channel.joint, signal, *found))
     found = "rms residual", "noise", "correlation time [s]", "effective sample size", "source"
     note = (
-        "correlation time: after it the noise's autocorrelation is below 1/e. effective sample size: number "
-        "of independent samples that would determine its level as well."
+        "correlation time: after it the noise's autocorrelation is below 1/e. effective sample size: so "
+        "many independent samples would determine the noise's level equally well."
     )
     return Table("Noise", ("log", "joint", "signal", *found), tuple(rows), note, ("rms residual", "source"))
+
+
+def singular_values(result: Identifiability) -> Figure:
+    """Draw how well each combination is determined, and which are not determined to WEAK_ABOVE."""
+    values, limit = result.singular, 1 / WEAK_ABOVE
+    top = max(float(values.max(initial=0.0)), limit)
+    foot = top * _LEAST_DRAWN
+    drawing = style.figure(3.0, left=0.9)
+    axes = drawing.subplots()
+    axes.set_yscale("log")
+    axes.set_ylim(foot / 3, 3 * top)
+    at, height = np.arange(1, len(values) + 1), np.maximum(values, foot)
+    for chosen, color, mark in ((values >= limit, style.SEARCH, "o"), (values < limit, style.REFINED, "D")):
+        axes.vlines(at[chosen], foot / 3, height[chosen], color=color, linewidth=1.0, alpha=0.5)
+        for fill, part in ((color, chosen & (values > foot)), ("white", chosen & (values <= foot))):
+            axes.plot(at[part], height[part], mark, color=color, markerfacecolor=fill, markersize=6)
+    axes.axhline(limit, color=style.GREY, linestyle="--", linewidth=1.0)
+    note = f"standard deviation {100 * WEAK_ABOVE:.0f} %"
+    axes.text(len(values) + 0.45, 1.2 * limit, note, color=style.GREY, fontsize=8, ha="right", va="bottom")
+    axes.set_xlim(0.5, len(values) + 0.5)
+    axes.set_xticks(at)
+    axes.grid(axis="x", visible=False)
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(style.tick))
+    axes.set_title("How well the logs determine each combination")
+    axes.set_xlabel("direction, best determined first")
+    axes.set_ylabel("1 / relative standard deviation")
+    return drawing
+
+
+def directions(result: Identifiability) -> Figure:
+    """Draw the directions as a map, one per column, with their standard deviations below."""
+    deviations = [f"{plain(float(f'{100 / v:.2g}'))} %" if v > 0.1 else "∞" for v in result.singular]
+    drawing = _map(result.axes.T, result.names, deviations)
+    axes = drawing.axes[0]
+    axes.set_title("Share of each parameter in each direction")
+    axes.set_xlabel("relative standard deviation along the direction")
+    for label, value in zip(axes.get_xticklabels(), result.singular, strict=True):
+        label.set_color(style.MEASURED if value >= 1 / WEAK_ABOVE else style.REFINED)
+    return drawing
+
+
+def correlation(uncertainty: Uncertainty, names: Sequence[str]) -> Figure:
+    """Draw the correlation of the estimates that are identifiable."""
+    shown = _correlated(uncertainty)
+    names = [name for name, each in zip(names, shown, strict=True) if each]
+    drawing = _map(uncertainty.correlation[np.ix_(shown, shown)], names, names)
+    drawing.axes[0].set_title("Correlation of the estimates")
+    return drawing
+
+
+def _correlated(uncertainty: Uncertainty) -> NDArray[np.bool_]:
+    """Return the free parameters that are identifiable: the others have no correlation."""
+    return np.isfinite(np.diag(uncertainty.correlation))
+
+
+def draw_profiles(study: UncertaintyStudy) -> Figure:
+    """Draw the deviance around each profiled parameter's interval, with the linear approximation."""
+    results, uncertainty, parameters = study.profiles, study.uncertainty, study.problem.parameters
+    drawing = style.figure(2.3 * len(results) + 0.9)
+    panels = np.atleast_1d(drawing.subplots(len(results), 1, gridspec_kw={"hspace": 0.45}))
+    for axes, profile in zip(panels, results, strict=True):
+        i = parameters.names.index(profile.name)
+        centre, deviation = uncertainty.theta[i], uncertainty.standard_deviation[i]
+        low, high = np.clip(profile.interval, profile.values[0], profile.values[-1])
+        margin = _PROFILE_MARGIN * (high - low)
+        ends = max(low - margin, profile.values[0]), min(high + margin, profile.values[-1])
+        fine = np.union1d(np.linspace(*ends, 201), profile.values)
+        # between its points the square root is taken for linear, as in the interval
+        root = np.sqrt(np.maximum(profile.deviance, 0.0)) * np.sign(profile.values - centre)
+        axes.axvspan(low, high, color="#DCE9F3", zorder=0.5, label="95 % interval")
+        axes.plot(fine, np.interp(fine, profile.values, root) ** 2, color=style.SEARCH, label="profile")
+        axes.plot(profile.values, profile.deviance, "o", color=style.SEARCH, markersize=4)
+        if np.isfinite(deviation) and deviation > 0:
+            parabola = ((fine - centre) / deviation) ** 2
+            axes.plot(fine, parabola, "--", color=style.GREY, linewidth=1.0, label="linear approximation")
+        axes.axhline(THRESHOLD, color=style.REFINED, linewidth=1.0, label="threshold of 95 %")
+        axes.set_xlim(*ends)
+        axes.set_ylim(min(-0.2, 1.2 * float(profile.deviance.min())), 2.5 * THRESHOLD)
+        unit = parameters.parameters[i].unit
+        axes.set_xlabel(f"{profile.name} [{unit}]" if unit else profile.name)
+        axes.set_ylabel("deviance")
+    panels[0].set_title("Error with one parameter held and the others fitted again")
+    style.legend_below(drawing, panels[0], columns=4)
+    return drawing
+
+
+def _map(values: Array, rows: Sequence[str], columns: Sequence[str]) -> Figure:
+    """Draw numbers from -1 to 1 as colours, with the numbers where there is room."""
+    drawing = style.figure(
+        1.5 + _CELL * len(rows),
+        left=style.room_for(rows),
+        right=0.1,
+        bottom=0.5 + 0.7 * style.room_for(columns, 8),
+    )
+    axes = drawing.subplots()
+    image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    if max(values.shape) <= _MOST_NUMBERS:
+        for (i, j), value in np.ndenumerate(values):
+            if np.isfinite(value):
+                color = "white" if abs(value) > 0.6 else style.MEASURED
+                text = f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
+                axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
+    drawing.colorbar(image, ax=axes, shrink=0.8, pad=0.02)
+    return drawing

@@ -2,19 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from hydroid.fitting.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.report.fit_report import INDICES, INDICES_NOTE, MOST_RESPONSES, index_cells
-from hydroid.report.joint_record import JointRecord, joint_record
-from hydroid.report.names import file_name, log_names, short_name, unique
-from hydroid.report.page import Page, Plot, Section
-from hydroid.report.plots.responses import overlay
+from hydroid.report.fit_report import INDICES, INDICES_NOTE, index_cells
+from hydroid.report.page import Page, Section, file_name, log_names, short_name, unique
+from hydroid.report.responses import JointResponse, response_plots
 from hydroid.report.table import Cell, Table
 
 
@@ -30,44 +25,36 @@ class Validation:
 
 def validation_page(results: Sequence[Validation]) -> Page:
     """Return the page of several fits on several logs; its table is `validation` (article, table 9)."""
-    sources = list(dict.fromkeys(result.log.source for result in results))
-    names = dict(zip(sources, log_names(sources), strict=True))
+    logs = {result.log.source: result.log for result in results}
+    names = dict(zip(logs, log_names(list(logs.values())), strict=True))
     rows: list[tuple[Cell, ...]] = []
-    overlays: dict[object, tuple[JointRecord, dict[str, Array]]] = {}
+    records: dict[object, tuple[JointResponse, dict[str, Array]]] = {}
     for result in results:
+        log, name = result.log, names[result.log.source]
         for column, (joint, indices) in enumerate(result.indices.items()):
-            record = joint_record(result.log, joint, names[result.log.source])
+            command, measured = log.command[:, joint - 1], log.angle[:, joint - 1]
+            simulated: dict[str, Array] = {}
+            response = JointResponse(name, joint, log.time, command, measured, simulated)
             # fits that read the log with another delay or period were not compared with the same record
-            key = (record.log, joint, record.measured.tobytes(), record.command.tobytes())
-            _, responses = overlays.setdefault(key, (record, {}))
-            name = unique(short_name(result.fit), responses)
-            responses[name] = result.response[:, column]
-            rows.append((name, record.log, joint, *index_cells(indices)))
-    header = ("fit", "log", "joint", *INDICES)
-    table = Table("Output error on given logs", header, tuple(rows), INDICES_NOTE, (INDICES[0], INDICES[2]))
-    plots = _plots(list(overlays.values()))
-    left_out = len(overlays) - len(plots)
-    more = f" {left_out} further responses are not drawn; the table has all errors." if left_out else ""
+            key = name, joint, measured.tobytes(), command.tobytes()
+            _, simulated = records.setdefault(key, (response, simulated))
+            fit = unique(short_name(result.fit), simulated)
+            simulated[fit] = result.response[:, column]
+            rows.append((fit, name, joint, *index_cells(indices)))
+    table = Table(
+        "Output error on given logs",
+        ("fit", "log", "joint", *INDICES),
+        tuple(rows),
+        INDICES_NOTE,
+        INDICES[:3:2],
+    )
+    taken: set[str] = set()
+    responses = {
+        file_name(f"validation_{Path(each.log).stem}_joint_{each.joint}", taken): each
+        for each, _ in records.values()
+    }
+    plots, more = response_plots(responses, [max(each.mean_squares()) for each in responses.values()])
     fits, count = len({row[0] for row in rows}), len(names)
     lead = f"{fits} fit{'s' * (fits != 1)} on {count} log{'s' * (count != 1)}.{more}"
     section = Section("Output error", tables={"validation": table}, plots=plots)
     return Page("validation", "Validation", lead, (section,))
-
-
-def _plots(overlays: Sequence[tuple[JointRecord, Mapping[str, Array]]]) -> tuple[Plot, ...]:
-    """Return plots of the records with the largest errors, MOST_RESPONSES at most."""
-    worst = [
-        max(
-            float(np.nan_to_num(np.mean((record.measured - response) ** 2), nan=np.inf))
-            for response in each.values()
-        )
-        for record, each in overlays
-    ]
-    taken: set[str] = set()
-    plots: list[Plot] = []
-    for i in sorted(np.argsort(worst, kind="stable")[::-1][:MOST_RESPONSES]):
-        record, responses = overlays[i]
-        name = file_name(f"validation_{Path(record.log).stem}_joint_{record.joint}", taken)
-        caption = f"Joint {record.joint} in {record.log}: angle, residual and command."
-        plots.append(Plot(name, caption, partial(overlay, record, responses)))
-    return tuple(plots)

@@ -14,9 +14,10 @@ from hydroid.experiment.trial import Bench, violation
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
+from hydroid.report.design_report import design_table
+from hydroid.report.objectives import contours
 from hydroid.report.page import write_page
-from hydroid.report.plots.contours import contours
-from hydroid.report.study_reports import design_table, sensitivity_page
+from hydroid.report.sensitivity_report import sensitivity_page
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings

@@ -9,10 +9,15 @@ from matplotlib.axes import Axes
 from hydroid.errors import SettingsError
 from hydroid.identified import load_identified
 from hydroid.problem.stage import Stage
-from hydroid.report.actuator_report import actuator_page
-from hydroid.report.joint_actuator import JointActuator, joint_actuator
+from hydroid.report.actuator_report import (
+    PANELS,
+    JointActuator,
+    actuator_page,
+    joint_actuator,
+    overview,
+    single,
+)
 from hydroid.report.page import write_page
-from hydroid.report.plots.actuator_curves import PANELS, overview, single
 from hydroid.settings.arm import Arm
 from hydroid.simulation import Candidates
 

@@ -8,9 +8,9 @@ from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.fitting.validation import error_indices
 from hydroid.report.fit_report import objective_table, parameter_table, pareto_table
-from hydroid.report.joint_record import joint_records
-from hydroid.report.names import log_names
+from hydroid.report.page import log_names
 from hydroid.report.phrases import fit_warnings, parameter_advice
+from hydroid.report.responses import joint_responses
 from hydroid.report.spread import spread_table
 from hydroid.report.table import Table
 from hydroid.report.uncertainty_report import UncertaintyStudy, interval_table
@@ -76,9 +76,9 @@ def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
     fit = make_fit(problem, names=("best",))
     *_, everything = objective_table(problem, fit).rows
     error = spread = 0.0
-    for record in joint_records(problem):
-        error += np.sum((record.measured - record.simulated(fit.best.responses)) ** 2)
-        spread += np.sum((record.measured - np.mean(record.measured)) ** 2)
+    for response in joint_responses(problem, fit):
+        error += np.sum((response.measured - response.simulated["search (best)"]) ** 2)
+        spread += np.sum((response.measured - np.mean(response.measured)) ** 2)
     assert everything[6] == pytest.approx(100 * (1 - np.sqrt(error / spread)))
 
 
@@ -108,9 +108,9 @@ def test_pareto_table_holds_the_front_best_first():
     assert {row[0] for row in table.rows} == set(fit.front[0][:, 0])
 
 
-def test_joint_records_cut_the_long_row_apart_again():
+def test_joint_responses_cut_the_long_row_apart_again():
     problem = make_problem(("a.csv", "b.csv", "c.csv"), outputs=(2, 5))
-    records = joint_records(problem)
+    records = joint_responses(problem, make_fit(problem))
     assert np.array_equal(np.concatenate([r.measured for r in records]), problem.measured)
     numbers = [number for r in records for number, _, _ in r.segments]
     assert numbers == list(range(1, len(problem.bounds) + 1))
@@ -122,7 +122,8 @@ def test_joint_records_cut_the_long_row_apart_again():
     [["x/a.csv", "y/a.csv", "a.csv"], ["a.csv (2)", "b/a.csv", "a.csv"], ["n\n\x01.csv"], ["W" * 300]],
 )
 def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
-    names = log_names(sources)
+    log = make_problem().logs[0]
+    names = log_names([replace(log, source=source) for source in sources])
     assert len(set(names)) == len(sources)
     assert all(name.isprintable() and len(name) <= 50 for name in names)
 

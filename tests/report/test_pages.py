@@ -16,8 +16,9 @@ from report_fits import MODEL, make_fit, make_problem
 from hydroid.errors import RunError
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import error_indices
-from hydroid.report.fit_report import MOST_RESPONSES, fit_page
+from hydroid.report.fit_report import fit_page
 from hydroid.report.page import Page, Plot, Section, write_page
+from hydroid.report.responses import MOST_RESPONSES
 from hydroid.report.spread import run_result, spread_page
 from hydroid.report.validation_report import Validation, validation_page
 

@@ -13,14 +13,13 @@ from matplotlib.text import Text
 from report_fits import make_fit, make_problem, make_uncertainty
 
 from hydroid.problem.problem import Evaluation
-from hydroid.report.joint_record import joint_records
-from hydroid.report.plots.contours import contours
-from hydroid.report.plots.estimates import estimates, spread
-from hydroid.report.plots.objectives import learning, pareto
-from hydroid.report.plots.responses import fit_response, overlay
-from hydroid.report.plots.style import MAX_BINS, decimated, rendered, style
-from hydroid.report.plots.uncertainty import profiles
+from hydroid.report.estimates import estimates, spread
+from hydroid.report.objectives import contours, learning, pareto
+from hydroid.report.responses import JointResponse, draw, joint_responses
+from hydroid.report.style import MAX_BINS, decimated, rendered, style
+from hydroid.report.uncertainty_report import UncertaintyStudy, draw_profiles
 from hydroid.settings.problem import ObjectiveSettings
+from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.intervals import THRESHOLD, Profile
 from hydroid.uncertainty.surface import Surface
 
@@ -36,11 +35,15 @@ def _styled():
 def draw_all(problem, fit) -> list[Figure]:
     objective = problem.settings.objective
     return [
-        *(fit_response(fit, record) for record in joint_records(problem)),
+        *(draw(response) for response in joint_responses(problem, fit)),
         learning(fit, objective),
         pareto(fit, objective),
         estimates(problem, fit),
     ]
+
+
+def draw_with(response: JointResponse, simulated: dict[str, np.ndarray]) -> Figure:
+    return draw(replace(response, simulated=simulated))
 
 
 def check(figure: Figure) -> None:
@@ -104,8 +107,8 @@ def test_what_is_not_finite_is_left_out():
 def test_the_response_shows_measured_angle_every_estimate_residual_and_command():
     problem = make_problem()
     fit = make_fit(problem)
-    (record,) = joint_records(problem)
-    upper, middle, lower = fit_response(fit, record).axes
+    (record,) = joint_responses(problem, fit)
+    upper, middle, lower = draw(record).axes
     named = {line.get_label(): line.get_ydata() for line in upper.lines}
     measured = np.degrees(record.measured)
     assert named["measured"] == pytest.approx(measured)
@@ -128,7 +131,7 @@ def test_a_response_that_runs_away_does_not_flatten_the_others():
     fit = make_fit(problem)
     away = replace(fit.estimates["utopia"], responses=(np.linspace(0, 1e6, 120)[:, None],))
     fit = replace(fit, estimates=fit.estimates | {"utopia": away})
-    upper, middle, _ = fit_response(fit, joint_records(problem)[0]).axes
+    upper, middle, _ = draw(joint_responses(problem, fit)[0]).axes
     for axes, line in ((upper, upper.lines[0]), (middle, middle.lines[0])):
         low, high = axes.get_ylim()
         assert np.ptp(line.get_ydata()) > 0.1 * (high - low)
@@ -193,7 +196,7 @@ def test_no_text_lies_over_another(count: int):
 
 def test_segment_numbers_keep_apart():
     problem = make_problem(segments=60)
-    upper = fit_response(make_fit(problem), joint_records(problem)[0]).axes[0]
+    upper = draw(joint_responses(problem, make_fit(problem))[0]).axes[0]
     upper.figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in upper.texts]
     assert len(boxes) > 8
@@ -202,11 +205,11 @@ def test_segment_numbers_keep_apart():
 
 def test_validation_overlays_every_fit():
     problem = make_problem()
-    record = replace(joint_records(problem)[0], segments=())
+    record = replace(joint_responses(problem, make_fit(problem))[0], segments=())
     simulated = {f"fit {i} $x$": record.measured + 0.01 * i for i in range(9)} | {
         "gone": record.measured * np.nan
     }
-    figure = overlay(record, simulated)
+    figure = draw_with(record, simulated)
     check(figure)
     labels = [line.get_label() for line in figure.axes[0].lines]
     assert len(labels) == 11
@@ -217,9 +220,9 @@ def test_validation_overlays_every_fit():
 
 def test_responses_that_coincide_are_all_seen():
     problem = make_problem()
-    record = joint_records(problem)[0]
+    record = joint_responses(problem, make_fit(problem))[0]
     shown = record.measured + 0.01
-    figure = overlay(record, {"ga": shown, "nsga2": shown, "again": shown})
+    figure = draw_with(record, {"ga": shown, "nsga2": shown, "again": shown})
     middle = figure.axes[1]
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -234,13 +237,13 @@ def test_responses_that_coincide_are_all_seen():
 @pytest.mark.parametrize("worst", [1e-8, 1e-3, 1.0, 40.0])
 def test_panels_hold_every_response_that_does_not_run_away(worst: float):
     problem = make_problem()
-    record = joint_records(problem)[0]
+    record = joint_responses(problem, make_fit(problem))[0]
     wave = np.sin(record.time * 5)
     simulated = {
         "good": record.measured + np.radians(1e-9) * wave,
         "bad": record.measured + np.radians(worst) * wave,
     }
-    upper, middle, _ = overlay(record, simulated).axes
+    upper, middle, _ = draw_with(record, simulated).axes
     for axes in (upper, middle):
         low, high = axes.get_ylim()
         drawn = np.concatenate([line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2])
@@ -251,12 +254,12 @@ def test_panels_hold_every_response_that_does_not_run_away(worst: float):
 
 def test_a_joint_at_rest_is_drawn_without_its_rounding():
     problem = make_problem()
-    record = joint_records(problem)[0]
+    record = joint_responses(problem, make_fit(problem))[0]
     rest = replace(record, measured=0.5 + 1e-16 * np.sin(record.time))
-    figure = overlay(rest, {"rests": rest.measured, "moves": rest.measured + 0.01 * record.time})
+    figure = draw_with(rest, {"rests": rest.measured, "moves": rest.measured + 0.01 * record.time})
     check(figure)
     assert all(np.ptp(axes.get_ylim()) > 0.5 for axes in figure.axes[:2])
-    alone = overlay(rest, {"rests": rest.measured})
+    alone = draw_with(rest, {"rests": rest.measured})
     check(alone)
     assert np.ptp(alone.axes[0].get_ylim()) > 0.01
 
@@ -302,7 +305,7 @@ def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
 
 def test_a_dollar_in_a_name_is_a_dollar():
     problem = make_problem(("a$x^2$.csv",))
-    figure = fit_response(make_fit(problem), joint_records(problem)[0])
+    figure = draw(joint_responses(problem, make_fit(problem))[0])
     named = [text for text in figure.findobj(Text) if "$" in text.get_text()]
     assert named
     assert not any(text.get_parse_math() for text in named)
@@ -346,7 +349,8 @@ def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_e
     deviance = ((values - centre) / deviation) ** 2
     half = deviation * np.sqrt(THRESHOLD)
     profile = Profile("K", values, deviance, (centre - half, centre + half), uncertainty.theta)
-    figure = profiles([profile], uncertainty, problem.parameters.names)
+    shown = identifiability(problem, uncertainty)
+    figure = draw_profiles(UncertaintyStudy(problem, "test", uncertainty, shown, (profile,)))
     check(figure)
     (axes,) = figure.axes
     assert np.ptp(axes.get_xlim()) < 4 * half

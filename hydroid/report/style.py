@@ -96,20 +96,26 @@ def set_margins(drawing: Figure, **margins: float) -> None:
     drawing.subplots_adjust(**{s: 1 - v if s in ("right", "top") else v for s, v in share.items()})
 
 
+def headline(drawing: Figure, title: str) -> None:
+    """Write a title above all axes of a figure."""
+    at = {"x": 0.02, "y": 1 - 0.1 / drawing.get_figheight(), "ha": "left", "va": "top"}
+    drawing.suptitle(title, **at, fontsize=11, fontweight="bold")
+
+
 def room_for(names: Sequence[str], size: float = 10.0) -> float:
-    """Return the width [in] of the longest of some labels, about."""
-    return _LETTER * size / 10 * max(map(len, names), default=0) + 0.1
+    """Return the width [in] of the longest of some labels beside an axis, about."""
+    return _LETTER * size / 10 * max(map(len, names), default=0) + 0.2
 
 
-def legend_below(drawing: Figure, handles: Sequence[Artist], columns: int = 3, axis: float = 0.55) -> None:
-    """Put a legend under all axes of a figure and make room for it.
+def legend_below(
+    drawing: Figure, axes: Axes, columns: int = 3, axis: float = 0.55, extra: Sequence[Artist] = ()
+) -> None:
+    """Put what has a label in `axes`, and `extra`, in a legend under all axes of a figure.
 
-    Args:
-        drawing: the figure.
-        handles: artists with their labels.
-        columns: at most, fewer where labels are long.
-        axis: room between the axes and the legend [in], for ticks and a label.
+    It has at most `columns` columns, fewer where labels are long. `axis` is the room [in] between the axes
+    and the legend, for ticks and a label.
     """
+    handles = [*axes.get_legend_handles_labels()[0], *extra]
     if not handles:
         return
     longest = max(len(str(handle.get_label())) for handle in handles)
@@ -117,13 +123,8 @@ def legend_below(drawing: Figure, handles: Sequence[Artist], columns: int = 3, a
     rows = math.ceil(len(handles) / fitting)
     set_margins(drawing, bottom=axis + _LEGEND_ROW * rows + 0.05)
     drawing.legend(
-        handles=list(handles), loc="lower center", ncols=fitting, bbox_to_anchor=(0.5, 0.0), borderaxespad=0.1
+        handles=handles, loc="lower center", ncols=fitting, bbox_to_anchor=(0.5, 0.0), borderaxespad=0.1
     )
-
-
-def labelled(axes: Axes) -> list[Artist]:
-    """Return the artists of an axes that have a label, for a legend."""
-    return list(axes.get_legend_handles_labels()[0])
 
 
 def estimate_looks(fit: Fit) -> dict[str, tuple[str, str]]:
@@ -158,16 +159,20 @@ def decimated(time: Array, values: Array) -> tuple[Array, Array]:
 def value_axis(axis: Axis, values: Array) -> None:
     """Scale an axis: logarithmic where positive values span more than a decade, else from 0."""
     known = values[np.isfinite(values)]
-    vertical = isinstance(axis, YAxis)
     if known.size and known.min() > 0 and known.max() > 10 * known.min():
-        (axis.axes.set_yscale if vertical else axis.axes.set_xscale)("log")
-        few = known.max() < 1000 * known.min()
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-        axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(FuncFormatter(tick))
+        logarithmic(axis, (1, 2, 5) if known.max() < 1000 * known.min() else (1,))
     elif known.size:
         top = 1.05 * float(known.max()) if known.max() > 0 else 1.0
-        (axis.axes.set_ylim if vertical else axis.axes.set_xlim)(min(0.0, 1.05 * float(known.min())), top)
+        set_limits = axis.axes.set_ylim if isinstance(axis, YAxis) else axis.axes.set_xlim
+        set_limits(min(0.0, 1.05 * float(known.min())), top)
+
+
+def logarithmic(axis: Axis, subs: tuple[int, ...] = (1, 2, 5)) -> None:
+    """Make an axis logarithmic, with ticks at these multiples of the powers of ten."""
+    (axis.axes.set_yscale if isinstance(axis, YAxis) else axis.axes.set_xscale)("log")
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(tick))
 
 
 def tick(value: float, _: int | None) -> str:

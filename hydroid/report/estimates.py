@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.problem.problem import Problem
+from hydroid.report import style
 from hydroid.report.phrases import estimate_label, runs_phrase, status_phrase
-from hydroid.report.plots import style
 from hydroid.report.table import number, plain
 from hydroid.uncertainty.flags import Flag
 
@@ -35,13 +35,17 @@ def estimates(problem: Problem, fit: Fit) -> Figure:
                 main = depth == 0 or color == style.SEARCH
                 lane, size = (0.0, 6.5 if depth else 8.5) if main else (next(beside), 5.0)
                 at = _normal(parameter, fit.estimates[name].theta[row])
-                look = {"color": style.GREY if grey else color, "markersize": size, "zorder": 4 - depth / 10}
+                look: dict[str, Any] = {
+                    "color": style.GREY if grey else color,
+                    "markersize": size,
+                    "zorder": 4 - depth / 10,
+                }
                 axes.plot(at, row + lane, mark, markeredgecolor="white", markeredgewidth=0.8, **look)
         _text(axes, row, f"{number(float(fit.best.theta[row]))} {parameter.unit}", status_phrase(status))
     for name, (color, mark) in looks.items():  # in full colour, though every row may be grey
         label = estimate_label(fit, name)
         axes.plot([], [], mark, color=color, markeredgecolor="white", markersize=8, label=label)
-    style.legend_below(drawing, style.labelled(axes), columns=5, axis=0.1)
+    style.legend_below(drawing, axes, columns=5, axis=0.1)
     return drawing
 
 
@@ -52,15 +56,13 @@ def spread(
 ) -> Figure:
     """Draw the spread over several runs: parameters within their bounds and output error, a dot per run.
 
-    Args:
-        parameters: the parameters.
-        results: by the estimate's name, such as `search` and `refined`: theta of N runs, shape (N, P),
-            and their rms output errors [rad], shape (N,).
-        without_effect: parameters without effect in any run, drawn grey.
+    `results` has, by the estimate's name, theta of N runs, shape (N, P), and their rms output errors [rad],
+    shape (N,). Parameters without effect in any run are grey.
     """
     rows = parameters.parameters
     lanes = len(results)
-    drawing, upper = _frame(1.9 + _ROW * len(rows) + 0.25 * lanes, rows, below=0.8 + 0.6 * lanes)
+    height = 1.9 + _ROW * len(rows) + 0.25 * lanes
+    drawing, upper = _frame(height, rows, below=0.8 + 0.6 * lanes, names=list(results))
     *_, (final, _) = results.values()
     upper.set_title(f"Spread over {len(final)} runs with different seeds", x=0.0)
     looks = dict(zip(results, ((style.SEARCH, "o"), (style.REFINED, "D"), *style.OTHER_LOOKS), strict=False))
@@ -87,14 +89,16 @@ def spread(
     lower.spines["left"].set_visible(False)
     lower.tick_params(axis="y", length=0)
     style.value_axis(lower.xaxis, np.degrees(np.concatenate([rms for _, rms in results.values()])))
-    style.legend_below(drawing, style.labelled(upper))
+    style.legend_below(drawing, upper)
     return drawing
 
 
-def _frame(height: float, parameters: Sequence[Parameter], below: float = 0.0) -> tuple[Figure, Axes]:
-    """Return a figure with one row per parameter from the top, and a second panel of `below` rows if any."""
-    names = [p.name for p in parameters]
-    drawing = style.figure(height, left=style.room_for(names), right=0.1)
+def _frame(
+    height: float, parameters: Sequence[Parameter], below: float = 0.0, names: Sequence[str] = ()
+) -> tuple[Figure, Axes]:
+    """Return a figure with one row per parameter, and a second panel of `below` rows for `names` if any."""
+    labels = [p.name for p in parameters]
+    drawing = style.figure(height, left=style.room_for([*labels, *names]), right=0.1)
     ratios = (len(parameters) + 0.5, below) if below else (1,)
     panels = drawing.subplots(
         len(ratios), 1, squeeze=False, gridspec_kw={"height_ratios": ratios, "hspace": 0.12}
@@ -102,7 +106,7 @@ def _frame(height: float, parameters: Sequence[Parameter], below: float = 0.0) -
     axes: Axes = panels[0, 0]
     axes.set_xlim(-0.36, 2.15)
     axes.set_ylim(len(parameters) - 0.4, -0.7)
-    axes.set_yticks(range(len(parameters)), names)
+    axes.set_yticks(range(len(parameters)), labels)
     axes.tick_params(length=0, axis="both")
     axes.set_xticks([])
     axes.grid(False)

@@ -1,1 +1,0 @@
-"""Figures of reports. Each function returns a matplotlib `Figure`; `style.rendered` makes files of it."""

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model docs clean
+.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -16,7 +16,7 @@ check: setup  ## formatter, linter, type checker
 	$(BIN)/pyright
 
 test: setup  ## the fast tests: four minutes on two cores
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: setup  ## killed processes, clusters, thousands of files
 	$(BIN)/pytest -m slow

@@ -29,18 +29,6 @@ Set = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Replace a setting, such as search.ga.generations=80."),
 ]
 Repair = Annotated[bool, typer.Option("--repair", help="Fill short gaps of the logs, and say how many.")]
-FLAGS = {
-    "search.algorithm": "--algorithm",
-    "search.pymoo.algorithm": "--algorithm",
-    "search.seed": "--seed",
-    "simulation.threads": "--threads",
-    "refinement": "--no-refinement",
-    "joint_refinement": "--joint",
-    "design.duration_s": "--duration",
-    "design.joints": "--joints",
-    "design.criterion": "--criterion",
-}
-"""settings that have an option of their own"""
 
 
 @dataclass(kw_only=True)

@@ -14,6 +14,19 @@ if TYPE_CHECKING:
     from hydroid.errors import HydroidError
     from hydroid.report.table import Table
 
+FLAGS = {
+    "search.algorithm": "--algorithm",
+    "search.pymoo.algorithm": "--algorithm",
+    "search.seed": "--seed",
+    "simulation.threads": "--threads",
+    "refinement": "--no-refinement",
+    "joint_refinement": "--joint",
+    "design.duration_s": "--duration",
+    "design.joints": "--joints",
+    "design.criterion": "--criterion",
+}
+"""settings that have an option of their own"""
+
 SCHEMA = 1
 """version of the JSON (docs/json.md)"""
 
@@ -77,8 +90,6 @@ def _show_json_error(kind: str, what: str, where: str, hint: str) -> None:
 
 def _in_flags(error: "HydroidError") -> tuple[str, str]:
     """Return where and what is wrong, with the option's name where a setting came from one."""
-    from hydroid.cli.options import FLAGS
-
     key = error.where.removeprefix("--set ")
     flag = FLAGS.get(key, "")
     if flag and any(a == flag or a.startswith(f"{flag}=") for a in sys.argv[1:]):

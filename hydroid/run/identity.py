@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-import hydroid
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.files import is_file
@@ -25,7 +24,7 @@ FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
 def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
     """Return versions, seed, and hashes of the logs."""
     return {
-        "hydroid": hydroid.__version__,
+        "hydroid": version("hydroid"),
         "mujoco": version("mujoco"),
         "numpy": version("numpy"),
         "python": platform.python_version(),

@@ -23,10 +23,9 @@ import numpy as np
 
 from hydroid import load_settings
 from hydroid.estimate import read_values
-from hydroid.experiment.commands import Draw
+from hydroid.experiment.commands import RandomExperiments, violation
 from hydroid.experiment.design import design
-from hydroid.experiment.information import prior_information
-from hydroid.experiment.trial import Bench, violation
+from hydroid.experiment.information import ExperimentSimulator, prior_information
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
@@ -60,14 +59,15 @@ def make_settings(values: dict, arguments: argparse.Namespace):
     return settings, settings.arm
 
 
-def random_experiments(settings, bench: Bench, count: int) -> list:
+def random_experiments(settings, simulator: ExperimentSimulator, count: int) -> list:
     """Single draws that drive all joints and keep the limits at the estimate."""
-    draw = Draw(settings, np.random.default_rng(SEED + 1))
+    experiments = RandomExperiments(settings, np.random.default_rng(SEED + 1))
     found = []
     while len(found) < count:
-        experiment = draw.new()
-        if len(experiment.inputs) == len(settings.outputs) and (kept := bench.kept(experiment)) is not None:
-            found.append(kept[0])
+        experiment = experiments.draw()
+        if len(experiment.inputs) == len(settings.outputs):
+            kept = simulator.within_limits(experiment)
+            found += [] if kept is None else [kept[0]]
     return found
 
 
@@ -104,7 +104,7 @@ def main() -> None:
     found = design(settings, estimate, [], SEED, lambda what, done, of: None)
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
     period, samples = settings.log.period_s, len(found.best.angle)
-    blind, seeing = (Bench(settings, theta, period, samples) for theta in (estimate, truth))
+    blind, seeing = (ExperimentSimulator(settings, theta) for theta in (estimate, truth))
     randoms = random_experiments(settings, blind, arguments.random)
     stage = Problem(settings, [found.log])
     known = prior_information(stage.priors, stage.parameters, truth)

@@ -20,9 +20,10 @@ from hydroid import load_settings
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Search
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"

@@ -16,8 +16,7 @@ from hydroid.progress import Progress, no_progress
 if TYPE_CHECKING:
     from hydroid.report.uncertainty_report import UncertaintyStudy
     from hydroid.report.validation_report import Validation
-    from hydroid.uncertainty.surface import Surface
-    from hydroid.uncertainty.sweep import Sweep
+    from hydroid.uncertainty.sweep import Surface, Sweep
 
 
 def validate(
@@ -166,8 +165,8 @@ def surface(
             raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
     from hydroid.problem.problem import Problem
     from hydroid.report.objectives import surface_page
-    from hydroid.uncertainty import surface as surfaces
+    from hydroid.uncertainty import sweep as sweeps
 
     problem = Problem(model.settings, list(logs))
-    results = [surfaces.surface(problem, model.theta, pair, *grid, progress) for pair in over]
+    results = [sweeps.surface(problem, model.theta, pair, *grid, progress) for pair in over]
     return Study(results, surface_page(results, model.settings.objective)).write(out)

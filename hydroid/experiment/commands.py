@@ -1,10 +1,12 @@
-"""Experiments: a start pose and pseudo-random commands, drawn and changed at random.
+"""Experiments: a start pose and pseudo-random commands, drawn, changed at random, kept within the limits.
 
 A command is a sequence of levels, each held for a random time, as in the article's figure 17.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +16,15 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
+from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
 Ints = NDArray[np.int64]
+
+RANGE_FACTORS = (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+"""factors tried in turn on a level that leads out of a joint's range"""
+SPEED_FACTORS = (0.7, 0.5, 0.35, 0.2, 0.0)
+"""factors tried in turn on a level that makes a joint too fast"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +33,6 @@ class Input:
 
     start: Ints
     level: Array
-
-    def command(self, samples: int) -> Array:
-        """Return the command at every sample [%], shape (samples,)."""
-        return np.repeat(self.level, np.diff(np.append(self.start, samples)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,55 +46,55 @@ class Experiment:
         """Return commands without motion: every angle stays in the start pose."""
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
-            command[:, joint] = signal.command(samples)
+            command[:, joint] = np.repeat(signal.level, np.diff(np.append(signal.start, samples)))
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
+
+    def with_level(self, joint: int, segment: int, level: float) -> "Experiment":
+        """Return the experiment with one level [%] of one joint replaced."""
+        levels = self.inputs[joint].level.copy()
+        levels[segment] = round(level, 1)
+        return self.with_input(joint, replace(self.inputs[joint], level=levels))
+
+    def with_input(self, joint: int, signal: Input) -> "Experiment":
+        """Return the experiment with another input of one joint."""
+        return replace(self, inputs={**self.inputs, joint: signal})
 
     def scaled(self, factor: float) -> "Experiment":
         """Return the experiment with all commands times a factor."""
         inputs = {j: replace(i, level=np.round(factor * i.level, 1)) for j, i in self.inputs.items()}
         return replace(self, inputs=inputs)
 
-    def with_level(self, joint: int, segment: int, level: float) -> "Experiment":
-        """Return the experiment with one level [%] of one joint replaced."""
-        levels = self.inputs[joint].level.copy()
-        levels[segment] = round(level, 1)
-        changed = replace(self.inputs[joint], level=levels)
-        return replace(self, inputs={**self.inputs, joint: changed})
+
+def experiment_samples(settings: FitSettings) -> int:
+    """Return the number of samples of an experiment."""
+    return round(settings.design.duration_s / settings.log.period_s) + 1
 
 
-class Draw:
-    """Draws experiments, and changes them, from one random stream.
-
-    Args:
-        settings: the joints that may be driven, their commands, the start poses.
-        rng: the stream.
+class RandomExperiments:
+    """Draws experiments, and random changes of them, that the settings allow.
 
     Raises:
-        SettingsError: joints or poses that cannot be.
+        SettingsError: joints or poses that cannot be used.
     """
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
-        self._settings, self._rng = settings.design, rng
-        self._joints, self._poses = driven_joints(settings), start_poses(settings)
-        self._lower, self._upper = pose_limits(settings.arm, np.radians(settings.design.margin_deg))
-        self._any_pose = settings.design.poses == "any"
-        self.period = settings.log.period_s
-        """of the commands [s]"""
-        self.samples = round(settings.design.duration_s / self.period) + 1
-        self._dwell = tuple(max(1, round(t / self.period)) for t in settings.design.dwell_s)
+        limits, arm = settings.design, settings.arm
+        self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
+        self._joints, self._poses = _driven_joints(settings), _start_poses(settings)
+        ranges = np.radians([joint.range for joint in arm.joints])
+        inward = np.minimum(np.radians(limits.margin_deg), 0.5 * np.ptp(ranges, axis=1))
+        self._lower, self._upper = ranges[:, 0] + inward, ranges[:, 1] - inward
+        self._samples = experiment_samples(settings)
+        self._dwell = tuple(max(1, round(t / settings.log.period_s)) for t in limits.dwell_s)
 
-    def new(self) -> Experiment:
+    def draw(self) -> Experiment:
         """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
         some = self._rng.random(len(self._joints)) < 0.5
         driven = self._joints if self._rng.random() < 0.5 or not some.any() else np.array(self._joints)[some]
         return Experiment(self._pose(), {int(j): self._input() for j in driven})
 
-    def integer(self, below: int) -> int:
-        """Draw an integer from 0 to below - 1."""
-        return int(self._rng.integers(below))
-
-    def changed(self, experiment: Experiment) -> Experiment:
+    def change(self, experiment: Experiment) -> Experiment:
         """Change an experiment in one to three places."""
         for _ in range(int(self._rng.integers(1, 4))):
             kind = self._rng.random()
@@ -99,42 +103,41 @@ class Draw:
             else:
                 joint = int(self._rng.choice(self._joints))
                 old = experiment.inputs.get(joint)
-                new = self._input() if old is None or kind < 0.15 else self._varied(old)
-                experiment = replace(experiment, inputs={**experiment.inputs, joint: new})
+                new = self._input() if old is None or kind < 0.15 else self._changed(old)
+                experiment = experiment.with_input(joint, new)
         return experiment
 
     def _input(self) -> Input:
         starts = [0]
         while (begin := starts[-1] + int(self._rng.integers(self._dwell[0], self._dwell[1] + 1))) < (
-            self.samples - self._dwell[0]
+            self._samples - self._dwell[0]
         ):
             starts.append(begin)
-        return Input(np.array(starts), self._level(len(starts)))
+        return Input(np.array(starts), self._levels(len(starts)))
 
-    def _level(self, count: int) -> Array:
-        limit = self._settings.command_pct
-        return np.round(self._rng.uniform(-limit, limit, count), 1)
+    def _levels(self, count: int) -> Array:
+        return np.round(self._rng.uniform(-self._limit, self._limit, count), 1)
 
-    def _varied(self, old: Input) -> Input:
-        """One level redrawn or moved, one switch moved, or a stretch drawn anew."""
-        rng, count = self._rng, len(old.level)
+    def _changed(self, old: Input) -> Input:
+        """Redraw or move one level, move one switching time, or redraw up to four levels in a row."""
+        rng, count, limit = self._rng, len(old.level), self._limit
         at, kind = int(rng.integers(count)), int(rng.integers(4))
-        level, limit = old.level.copy(), self._settings.command_pct
+        level = old.level.copy()
         if kind == 0:
-            level[at] = self._level(1)[0]
+            level[at] = self._levels(1)[0]
         elif kind == 1:
             level[at] = np.clip(level[at] + rng.normal(0.0, 0.25 * limit), -limit, limit).round(1)
         elif kind == 2 and at > 0:
             return replace(old, start=self._shifted(old.start, at))
         else:
             end = min(count, at + 1 + int(rng.integers(4)))
-            level[at:end] = self._level(end - at)
+            level[at:end] = self._levels(end - at)
         return replace(old, level=level)
 
     def _shifted(self, start: Ints, at: int) -> Ints:
-        """Switch times with one moved between its neighbours, each level held for an allowed time."""
+        """Switching times with one moved between its neighbours, each level held for an allowed time."""
         shortest, longest = self._dwell
-        before, after = int(start[at - 1]), int(np.append(start, self.samples)[at + 1])
+        before, after = int(start[at - 1]), int(np.append(start, self._samples)[at + 1])
         low, high = max(before + shortest, after - longest), min(after - shortest, before + longest)
         moved = start.copy()
         if low <= high:
@@ -153,19 +156,8 @@ class Draw:
         return np.clip(pose + step, self._lower, self._upper)
 
 
-def pose_limits(arm: Arm, margin: float) -> tuple[Array, Array]:
-    """Lower and upper start angles [rad], shape (J,), `margin` [rad] inside the joints' ranges."""
-    ranges = np.radians([joint.range for joint in arm.joints])
-    inward = np.minimum(margin, 0.5 * np.ptp(ranges, axis=1))
-    return ranges[:, 0] + inward, ranges[:, 1] - inward
-
-
-def driven_joints(settings: FitSettings) -> list[int]:
-    """Joints that may be driven, 0-based.
-
-    Raises:
-        SettingsError: one that the arm lacks, or that stage 1 has no gain for.
-    """
+def _driven_joints(settings: FitSettings) -> list[int]:
+    """Joints that may be driven, 0-based; refuse one that the arm lacks, or that stage 1 has no gain for."""
     joints = sorted(settings.design.joints or settings.outputs)
     if joints[-1] > len(settings.arm.joints):
         raise SettingsError(f"the arm has joints 1 to {len(settings.arm.joints)}", where="design.joints")
@@ -174,18 +166,14 @@ def driven_joints(settings: FitSettings) -> list[int]:
     return [j - 1 for j in joints]
 
 
-def start_poses(settings: FitSettings) -> Array:
-    """Named start poses [rad], shape (N, J), in which the joints that move are within their limits.
-
-    Raises:
-        SettingsError: a name that does not exist, or none is left.
-    """
-    design = settings.design
-    names = tuple(settings.arm.poses) if design.poses is None or design.poses == "any" else design.poses
-    poses = np.array([settings.arm.pose(name) for name in names])
+def _start_poses(settings: FitSettings) -> Array:
+    """Named start poses [rad], shape (N, J), in which the joints that move are within their limits."""
+    design, arm = settings.design, settings.arm
+    names = tuple(arm.poses) if design.poses is None or design.poses == "any" else design.poses
+    poses = np.array([arm.pose(name) for name in names])
     moving = [j - 1 for j in {*(design.joints or ()), *settings.outputs}]
     margin = np.radians(design.margin_deg)
-    inside = (poses >= settings.arm.lower + margin) & (poses <= settings.arm.upper - margin)
+    inside = (poses >= arm.lower + margin) & (poses <= arm.upper - margin)
     poses = poses[inside[:, moving].all(axis=1)]
     if not len(poses) and design.poses != "any":
         raise SettingsError(
@@ -194,3 +182,41 @@ def start_poses(settings: FitSettings) -> Array:
             hint="add one to the arm's file, reduce design.margin_deg, or set design.poses=any",
         )
     return poses
+
+
+class Violation(NamedTuple):
+    """The first sample at which a joint (0-based) leaves its range, or is too fast."""
+
+    sample: int
+    joint: int
+    fast: bool
+
+
+def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> Violation | None:
+    """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
+    margin = np.radians(limits.margin_deg)
+    speed = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / period
+    out = (angle < arm.lower + margin) | (angle > arm.upper - margin)
+    # a joint that stands at the end of its range, and never moves, breaks no limit
+    out &= np.ptp(angle, axis=0) > 0
+    at = np.argwhere(out | (speed > np.radians(limits.speed_deg_s)))
+    if not len(at):
+        return None
+    sample, joint = map(int, at[0])
+    return Violation(sample, joint, not out[sample, joint])
+
+
+def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[int, int]]) -> Experiment:
+    """Change the level before a violation, or an earlier one where all factors of it have been tried."""
+    signal = experiment.inputs.get(first.joint)
+    if signal is not None:
+        factors = SPEED_FACTORS if first.fast else RANGE_FACTORS
+        last = int(np.searchsorted(signal.start, first.sample - 1, side="right")) - 1
+        for segment in range(last, -1, -1):
+            tries = changes[first.joint, segment]
+            if signal.level[segment] != 0.0 and tries < len(factors):
+                # factors are of the level as drawn: undo the one before
+                factor = factors[tries] / (factors[tries - 1] if tries else 1.0)
+                changes[first.joint, segment] += 1
+                return experiment.with_level(first.joint, segment, factor * signal.level[segment])
+    return experiment.scaled(0.7)

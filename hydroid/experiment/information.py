@@ -1,35 +1,38 @@
-"""Fisher information of experiments about the parameters, and the precision that follows from it.
+"""What an experiment measures: its motion within the limits, its Fisher information, the precision after it.
 
-All matrices are in relative changes of the free parameters, x = d theta / theta. Units do not matter, and a
+Information is in relative changes of the free parameters, x = d theta / theta: units do not matter, and a
 standard deviation of 0.1 means 10 %.
+
+Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
+Collisions of the arm with itself or with its surroundings are not checked.
 """
 
+from collections import Counter
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from hydroid.arm.model import load_model
+from hydroid.experiment.commands import Experiment, experiment_samples, repaired, violation
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem
+from hydroid.problem.problem import Problem, make_simulation
+from hydroid.problem.stage import Stage
 from hydroid.settings.experiment import DesignSettings
+from hydroid.settings.fit import FitSettings
 from hydroid.uncertainty.jacobian import STEP, jacobian, relative_scale
 from hydroid.uncertainty.noise import Noise, channel_noise
 
 PRIOR_SD = 1.0
 """relative standard deviation of every parameter before any log or prior (ours)"""
+MAX_REPAIRS = 60
+"""changes after which an experiment that still breaks a limit is given up"""
 
 
 def information(slopes: Array, noise: Noise) -> Array:
-    """Fisher information of F parameters in one channel with Gaussian noise.
-
-    Args:
-        slopes: its derivatives per relative change of each, shape (F, T).
-        noise: of the channel, in the same unit.
-
-    Returns:
-        Shape (F, F).
-    """
+    """Fisher information in one channel, (F, F), from its derivatives per relative change, shape (F, T)."""
     white = noise.whitened(slopes)
     return white @ white.T
 
@@ -43,14 +46,11 @@ def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise
 
 def log_information(problem: Problem, theta: Array) -> Array:
     """Information of logs about the free parameters, for the noise that they show, shape (F, F)."""
-    at = jacobian(problem, theta)
+    at, objective = jacobian(problem, theta), problem.settings.objective
     slopes = np.nan_to_num(at.slopes[problem.parameters.free])
     parts = [
-        information(
-            slopes[:, channel.rows],
-            channel_noise(channel, at.residual[channel.rows], problem.settings.objective),
-        )
-        for channel in problem.channels
+        information(slopes[:, c.rows], channel_noise(c, at.residual[c.rows], objective))
+        for c in problem.channels
     ]
     return np.sum(parts, axis=0)
 
@@ -64,11 +64,11 @@ def prior_information(priors: Priors, parameters: ParameterSet, theta: Array) ->
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
-    """Says how good an experiment is, beside the information that is there already.
+class Precision:
+    """How precisely the parameters are known, with and without one more experiment.
 
-    Every parameter has a weak prior of PRIOR_SD. A direction without any information then stays at 100 % and
-    does not make the covariance infinite. It must not hide the others either, so the E criterion looks at
+    Every parameter has a weak prior of PRIOR_SD. A direction without any information then stays at 100 %,
+    and the covariance stays finite. Such a direction must not hide the others, so the E criterion looks at
     `directions` only.
 
     Attributes:
@@ -80,37 +80,110 @@ class Judge:
     directions: Array
 
     @staticmethod
-    def of(known: Array, typical: Array) -> "Judge":
-        """Return the judge for experiments of which `typical`, shape (F, F), is a mean information."""
+    def of(known: Array, typical: Array) -> "Precision":
+        """Return the precision for experiments whose mean information is `typical`, shape (F, F)."""
         values, vectors = np.linalg.eigh(known + typical)
         improved = values > 1 / PRIOR_SD**2
-        improved[-1] = True  # one direction at least, to compare experiments by
-        return Judge(known, vectors[:, improved])
+        improved[-1] = True  # at least one direction to compare experiments by
+        return Precision(known, vectors[:, improved])
 
-    def covariance(self, information: Array | None = None) -> Array:
-        """Covariance of relative errors after an experiment, or without one, shape (F, F)."""
-        total = self.known + np.eye(len(self.known)) / PRIOR_SD**2
-        if information is not None:
-            total = total + information
-        # exact statements leave a matrix of very unequal scales: unit diagonal first
-        scale = 1 / np.sqrt(np.diag(total))
-        inverse = cho_solve(cho_factor(total * np.outer(scale, scale)), np.eye(len(total)))
-        return inverse * np.outer(scale, scale)
+    def deviations(self, information: Array | float = 0.0) -> Array:
+        """Relative standard deviation of each free parameter, (F,), after an experiment's information."""
+        return np.sqrt(np.diag(self._covariance(information)))
 
-    def deviations(self, information: Array | None = None) -> Array:
-        """Relative standard deviation of each free parameter, shape (F,)."""
-        return np.sqrt(np.diag(self.covariance(information)))
-
-    def weakest(self, information: Array | None = None) -> tuple[float, Array]:
+    def weakest(self, information: Array | float = 0.0) -> tuple[float, Array]:
         """Relative standard deviation and unit vector (F,) of the least known of `directions`."""
         basis = self.directions
-        values, vectors = np.linalg.eigh(basis.T @ self.covariance(information) @ basis)
+        values, vectors = np.linalg.eigh(basis.T @ self._covariance(information) @ basis)
         return float(np.sqrt(values[-1])), basis @ vectors[:, -1]
 
     def score(self, information: Array, criterion: str) -> float:
         """Merit, higher is better: minus the log of the weakest deviation (E), half a log determinant (D)."""
         if criterion == "E":
             return -float(np.log(self.weakest(information)[0]))
-        return 0.5 * float(
-            np.linalg.slogdet(self.known + information + np.eye(len(information)) / PRIOR_SD**2)[1]
-        )
+        return 0.5 * float(np.linalg.slogdet(self._total(information))[1])
+
+    def _total(self, information: Array | float) -> Array:
+        return self.known + information + np.eye(len(self.known)) / PRIOR_SD**2
+
+    def _covariance(self, information: Array | float) -> Array:
+        total = self._total(information)
+        # constraints leave a matrix of very unequal scales: unit diagonal first
+        scale = 1 / np.sqrt(np.diag(total))
+        inverse = cho_solve(cho_factor(total * np.outer(scale, scale)), np.eye(len(total)))
+        return inverse * np.outer(scale, scale)
+
+
+class Trial(NamedTuple):
+    """A simulated experiment that keeps the limits.
+
+    experiment: its commands. information: about relative changes of the free parameters, shape (F, F).
+    angle: simulated [rad], shape (T, J).
+    """
+
+    experiment: Experiment
+    information: Array
+    angle: Array
+
+
+class ExperimentSimulator:
+    """Simulates experiments at the present estimate theta, shape (P,), within the limits of the settings."""
+
+    def __init__(self, settings: FitSettings, theta: Array) -> None:
+        self._spec = load_model(settings.arm.model, settings.arm)
+        if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
+            simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
+            settings = settings.model_copy(update={"simulation": simulation})
+        self._settings, self._outputs = settings, [j - 1 for j in settings.outputs]
+        self._samples, self._period = experiment_samples(settings), settings.log.period_s
+        self._noise = sensor_noise(settings.design, self._samples, self._period)
+        stage = Stage(settings)
+        # one-sided differences take a quarter of the simulations of `jacobian` and agree to 0.1 %
+        moved = theta + STEP * np.diag(relative_scale(stage.parameters, theta))[stage.parameters.free]
+        self._candidates = stage.candidates(np.vstack([theta, moved]))
+
+    def trial(self, experiment: Experiment) -> Trial | None:
+        """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
+        if (kept := self.within_limits(experiment)) is None:
+            return None
+        gained = self.information(kept[0])
+        return None if gained is None else Trial(kept[0], gained, kept[1])
+
+    def within_limits(self, experiment: Experiment) -> tuple[Experiment, Array] | None:
+        """Reverse or reduce levels until the experiment keeps the limits; return it and its motion.
+
+        None where it still breaks them, or its simulation diverges.
+        """
+        changes: Counter[tuple[int, int]] = Counter()
+        for _ in range(MAX_REPAIRS):
+            angle = self._simulate(experiment, 1)
+            if angle is None:
+                return None
+            first = violation(angle[0], self._period, self._settings.arm, self._settings.design)
+            if first is None:
+                return experiment, angle[0]
+            if first.sample == 0:
+                return None  # the start pose itself
+            experiment = repaired(experiment, first, changes)
+        return None
+
+    def information(self, experiment: Experiment) -> Array | None:
+        """Return the information of an experiment as it is, shape (F, F); None where it diverges."""
+        rows = self._simulate(experiment, len(self._candidates))
+        if rows is None:
+            return None
+        slopes = (rows[1:] - rows[0])[:, :, self._outputs] / STEP
+        return np.sum([information(slopes[:, :, k], self._noise) for k in range(len(self._outputs))], axis=0)
+
+    def _simulate(self, experiment: Experiment, count: int) -> Array | None:
+        """All joints' angles [rad], (count, T, J), of the first candidates; None where one diverged."""
+        log = experiment.log(self._samples, self._period)
+        passive = self._settings.simulation.other_joints == "passive"
+        moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
+        simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
+        response = simulation.simulate(self._candidates[:count])
+        if not response.feasible.all():
+            return None
+        angle = np.tile(log.angle, (count, 1, 1))
+        angle[:, :, moving] = response.angle
+        return angle

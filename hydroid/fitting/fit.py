@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Checkpoint as RefinementCheckpoint
 from hydroid.fitting.refinement import NoCheckpoint, Refinement, refine
 from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
-from hydroid.problem.norms import overall_objective
-from hydroid.problem.problem import Evaluation, Memo, Problem
-from hydroid.problem.segments import segment_objectives
+from hydroid.problem.objectives import overall_objective, segment_objectives
+from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search import compromise
 from hydroid.search.pareto import non_dominated
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty

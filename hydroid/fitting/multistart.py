@@ -12,10 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.refinement import Checkpoint, NoCheckpoint, refine
 from hydroid.fitting.search import HISTORY, SearchState
 from hydroid.parameters import Array
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.search.algorithm import Population
 from hydroid.settings.search import RefinementSettings, SearchSettings
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import RunError, SettingsError
+from hydroid.fitting.memo import Memo
 from hydroid.parameters import Array
-from hydroid.problem.problem import Evaluation, Memo, Problem
+from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search.algorithm import Algorithm, Population
 from hydroid.search.cmaes import cmaes
 from hydroid.search.ga import SimpleGa

@@ -11,6 +11,9 @@ from hydroid.parameters import Array
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.simulation import Response
 
+Quantity = Literal["angle", "pressure_a", "pressure_b"]
+SIDES: tuple[Quantity, Quantity] = ("pressure_a", "pressure_b")
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -19,7 +22,6 @@ class Channel:
     Attributes:
         log: index of the log.
         joint: number, from 1.
-        quantity: what is measured.
         column: of the signal in the response's angles, or of its joint in the response's pressures.
         measured: [rad] or [Pa], shape (T,).
         weight: error times weight is the residual [rad]: no unit for an angle, rad/Pa for a pressure.
@@ -28,7 +30,7 @@ class Channel:
 
     log: int
     joint: int
-    quantity: Literal["angle", "pressure_a", "pressure_b"]
+    quantity: Quantity
     column: int
     measured: Array
     weight: float
@@ -53,29 +55,21 @@ def make_channels(
 ) -> tuple[Channel, ...]:
     """List the channels log by log, angles first.
 
-    Args:
-        logs: the logs.
-        outputs: joints whose angles are compared, 0-based.
-        pressures: for each log the joints whose pressures are compared, 0-based.
-        objective: weights.
+    Compared are the angles of the joints `outputs`, and in log i the pressures of `pressures[i]`, 0-based.
     """
-    channels: list[Channel] = []
-    at = 0
+    signals: list[tuple[int, int, Quantity, int, Array, float]] = []
     for i, log in enumerate(logs):
-        count = len(log.time)
         for column, joint in enumerate(outputs):
             weight = objective.weights.get(joint + 1, 1.0)
-            rows = slice(at, at + count)
-            channels.append(Channel(i, joint + 1, "angle", column, log.angle[:, joint], weight, rows))
-            at += count
+            signals.append((i, joint + 1, "angle", column, log.angle[:, joint], weight))
         for column, joint in enumerate(pressures[i]):
             assert log.pressure is not None
-            for side, quantity in enumerate(("pressure_a", "pressure_b")):
+            weight = float(np.deg2rad(objective.pressure_weight)) / 1e5  # deg/bar -> rad/Pa
+            for side, quantity in enumerate(SIDES):
                 measured = log.pressure[:, joint, side]
-                if np.isnan(measured[0]):
-                    continue
-                weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
-                rows = slice(at, at + count)
-                channels.append(Channel(i, joint + 1, quantity, column, measured, weight, rows))  # pyright: ignore[reportArgumentType]
-                at += count
-    return tuple(channels)
+                if not np.isnan(measured[0]):
+                    signals.append((i, joint + 1, quantity, column, measured, weight))
+    ends = np.cumsum([len(measured) for *_, measured, _ in signals]).tolist()
+    return tuple(
+        Channel(*signal, slice(end - len(signal[4]), end)) for signal, end in zip(signals, ends, strict=True)
+    )

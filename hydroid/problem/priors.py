@@ -21,14 +21,7 @@ MAX_SWEEPS = 200
 
 
 class Priors:
-    """M priors about P parameters; those about fixed parameters only are left out.
-
-    Args:
-        settings: the priors by name.
-        parameters: the parameters.
-
-    Attributes:
-        names: of the M priors.
+    """M priors about P parameters, named `names`; those about fixed parameters only are left out.
 
     Raises:
         SettingsError: a parameter that does not exist, or priors that the bounds contradict.
@@ -39,7 +32,7 @@ class Priors:
         for name, prior in settings.items():
             for parameter in prior.factors:
                 if parameter not in parameters.names:
-                    hint = f"known: {', '.join(parameters.names)}"
+                    hint = f"parameters: {', '.join(parameters.names)}"
                     raise SettingsError(f"no parameter {parameter!r}", where=f"priors.{name}", hint=hint)
         free = {n for n, is_free in zip(parameters.names, parameters.free, strict=True) if is_free}
         active = {name: s for name, s in settings.items() if free & set(s.factors)}
@@ -109,7 +102,7 @@ class Priors:
         worst = int(np.argmax(off))
         if off[worst] > 1.5 * REACH:
             raise SettingsError(
-                "cannot hold within the bounds and beside the other priors",
+                "cannot hold within the bounds together with the other priors",
                 where=f"priors.{self.names[worst]}",
                 hint="widen the bounds, correct the value, or give it a larger sd",
             )

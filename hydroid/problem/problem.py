@@ -4,7 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,9 +20,8 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.norms import overall_objective
+from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
-from hydroid.problem.segments import segment_bounds, segment_objectives
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import SegmentSettings
@@ -53,7 +52,7 @@ class Spread(Protocol):
 
 
 class Problem:
-    """Logs, the model that should reproduce them, and how the difference is measured.
+    """Logs, the model that should reproduce them, and the measure of the difference.
 
     Args:
         settings: the fit's settings.
@@ -62,8 +61,7 @@ class Problem:
             threads, one where that is 0.
 
     Attributes:
-        channels: what is compared, in the order of a row of residuals.
-        priors: about the parameters, from the settings.
+        channels: the compared signals, in the order of a row of residuals.
         measured: all channels in a row, times their weights, shape (R,).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
@@ -103,7 +101,7 @@ class Problem:
         return self.priors.project(self.parameters.from_unit(unit))
 
     def evaluate(self, theta: Array) -> Evaluation:
-        """Simulate theta, shape (n, P), and measure it; memory does not grow with n beyond the result."""
+        """Evaluate theta, shape (n, P); memory does not grow with n beyond the result."""
         if self._spread is None:
             values = self.objectives(theta)
         else:
@@ -113,12 +111,14 @@ class Problem:
 
     def objectives(self, theta: Array) -> Array:
         """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""
-        how = self.settings.objective
+        objective = self.settings.objective
         values = np.empty((len(theta), len(self.bounds) + 1))
-        for rows in self._chunks(len(theta)):
+        size = min(simulation.scenario.chunk for simulation in self._simulations)
+        for start in range(0, len(theta), size):
+            rows = slice(start, start + size)
             error = self.output_errors(theta[rows])
-            values[rows, :-1] = segment_objectives(error, self.measured, self.bounds, how)
-            values[rows, -1] = overall_objective(error, self.measured, how)
+            values[rows, :-1] = segment_objectives(error, self.measured, self.bounds, objective)
+            values[rows, -1] = overall_objective(error, self.measured, objective)
         return values
 
     def residuals(self, theta: Array) -> Array:
@@ -153,12 +153,8 @@ class Problem:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""
         if channel.quantity != "angle":
             return np.array([[channel.rows.start, channel.rows.stop]])
-        period, how = self.logs[channel.log].period, self.settings.objective.segments
-        return segment_bounds(channel.measured, period, how) + channel.rows.start
-
-    def _chunks(self, n: int) -> Iterator[slice]:
-        size = min(simulation.scenario.chunk for simulation in self._simulations)
-        return (slice(i, min(i + size, n)) for i in range(0, n, size))
+        period, segments = self.logs[channel.log].period, self.settings.objective.segments
+        return segment_bounds(channel.measured, period, segments) + channel.rows.start
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:
@@ -177,12 +173,7 @@ def make_simulation(
 ) -> MechanicalSimulation | HydraulicSimulation:
     """Return the simulation of one log in the settings' stage.
 
-    Args:
-        spec: the arm's MJCF.
-        log: the record.
-        outputs: joints whose angles are wanted, 0-based.
-        settings: the fit's settings.
-        pressures: joints whose chamber pressures are wanted, 0-based.
+    Its response has the angles of the joints `outputs` and the chamber pressures of `pressures`, 0-based.
     """
     payload = settings.payloads.get(Path(log.source).name)
     if payload:
@@ -191,53 +182,3 @@ def make_simulation(
     if settings.stage == "mech":
         return MechanicalSimulation(scenario, settings.simulation)
     return HydraulicSimulation(scenario, settings.arm, settings.hydraulics, settings.simulation, pressures)
-
-
-class Memo:
-    """Evaluates each candidate once: identical chromosomes are not simulated again."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self._known: dict[bytes, tuple[Array, float]] = {}
-        self.infeasible = 0
-        """candidates whose simulation diverged"""
-
-    @property
-    def simulated(self) -> int:
-        """Candidates simulated so far."""
-        return len(self._known)
-
-    @property
-    def best(self) -> Array:
-        """The candidate with the lowest overall objective, shape (P,)."""
-        return np.frombuffer(min(self._known, key=lambda key: self._known[key][1]))
-
-    def evaluate(self, theta: Array) -> Evaluation:
-        """Evaluate theta, shape (n, P), simulating what is new in it."""
-        new = {row.tobytes(): row for row in theta if row.tobytes() not in self._known}
-        if new:
-            self._keep(np.array(list(new.values())))
-        known = [self._known[row.tobytes()] for row in theta]
-        return Evaluation(np.array([s for s, _ in known]), np.array([o for _, o in known]))
-
-    def _keep(self, theta: Array) -> None:
-        result = self.problem.evaluate(theta)
-        # a candidate with one infinite objective is infeasible: none of its objectives may win
-        finite = np.isfinite(np.column_stack([result.segments, result.overall]))
-        failed = np.logical_not(np.all(finite, axis=1))
-        self.infeasible += int(failed.sum())
-        all_segments = np.where(failed[:, None], np.inf, result.segments)
-        all_overall = np.where(failed, np.inf, result.overall)
-        for row, segments, overall in zip(theta, all_segments, all_overall, strict=True):
-            self._known[row.tobytes()] = (segments, float(overall))
-
-    def arrays(self) -> tuple[Array, Array]:
-        """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
-        theta = np.array([np.frombuffer(key) for key in self._known])
-        values = np.array([np.append(segments, overall) for segments, overall in self._known.values()])
-        return theta, values
-
-    def restore(self, theta: Array, values: Array) -> None:
-        """Restore what `arrays` returned."""
-        self._known = {t.tobytes(): (v[:-1].copy(), float(v[-1])) for t, v in zip(theta, values, strict=True)}
-        self.infeasible = int(np.sum(~np.isfinite(values[:, -1])))

@@ -18,12 +18,9 @@ from hydroid.simulation import Candidates
 class Stage:
     """Spreads a parameter vector over joints, links and actuators.
 
-    Of the arm: gain, dampers, springs, dry friction, link masses. What no parameter names is 0, a mass that
-    none names its nominal one. Of the actuators (stage hyd): any quantity; what none names is as the settings
-    and the arm's file have it.
-
-    Args:
-        settings: the fit's settings, whose `parameters` say what is estimated.
+    Parameters of the arm are gains, dampers, springs, dry friction and link masses. Those that the settings
+    do not name are 0; such a mass has its nominal value. Parameters of the actuators (stage hyd) may be any
+    of their quantities; the others keep the values of the settings and the arm's file.
 
     Raises:
         SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
@@ -54,15 +51,7 @@ class Stage:
         return Candidates(**arm, actuators=actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
-        """Refuse commands that nothing turns into torque: stage 1 needs gain and damping of active joints.
-
-        Args:
-            driven: joints that a log drives, shape (J,).
-            outputs: joints that are compared, 0-based.
-
-        Raises:
-            SettingsError: a joint without one.
-        """
+        """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
         if self._hydraulics is not None:
             return
         for quantity in ("gain", "damping"):

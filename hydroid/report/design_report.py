@@ -63,14 +63,14 @@ def design_table(settings: DesignSettings, design: Design, theta: Mapping[str, f
 
 def _design_note(settings: DesignSettings, design: Design) -> str:
     information = design.best.information
-    before, _ = design.judge.weakest()
-    weakest, direction = design.judge.weakest(information)
+    before, _ = design.precision.weakest()
+    weakest, direction = design.precision.weakest(information)
     order = [
         i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= _SHOWN * np.abs(direction).max()
     ]
     sign = np.sign(direction[order[0]])
     parts = " ".join(f"{sign * direction[i]:+.2f} {design.names[i]}" for i in order).replace("-", "−")
-    total, some = len(design.names), design.judge.directions.shape[1]
+    total, some = len(design.names), design.precision.directions.shape[1]
     lost = "" if some == total else f" (of the {some} of {total} that random experiments depend on)"
     time = settings.noise_correlation_s
     correlation = f" with a correlation time of {time:g} s" if time else ", white"
@@ -84,8 +84,8 @@ def _design_note(settings: DesignSettings, design: Design) -> str:
 
 def _deviations(design: Design) -> tuple[Array, Array, Array]:
     """Return standard deviations before, after a random and after the designed experiment, each (F,)."""
-    judge = design.judge
-    return judge.deviations(), design.random_deviations, judge.deviations(design.best.information)
+    known = design.precision
+    return known.deviations(), design.random_deviations, known.deviations(design.best.information)
 
 
 def motion(log: Log, names: tuple[str, ...], limits: Array) -> Figure:

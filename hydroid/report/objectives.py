@@ -18,7 +18,7 @@ from hydroid.report.page import Page, Plot, Section
 from hydroid.report.phrases import estimate_label, in_reader_units, norm_label
 from hydroid.report.table import Cell, Table, number, numbers_csv
 from hydroid.settings.problem import ObjectiveSettings
-from hydroid.uncertainty.surface import WIDE, Surface
+from hydroid.uncertainty.sweep import WIDE, Surface
 
 _MOST_SEGMENT_LABELS = 24
 _LEVELS = 14

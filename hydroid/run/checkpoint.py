@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from hydroid.errors import RunError
 from hydroid.files import undisturbed, write_atomic
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState
-from hydroid.problem.problem import Memo
 from hydroid.search.algorithm import Population
 
 PREVIOUS, DAMAGED = "checkpoint.previous.npz", "checkpoint.damaged.npz"

@@ -17,11 +17,12 @@ from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.identified import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import RefinementCheckpoints, read_checkpoint, write_checkpoint
 from hydroid.run.identity import identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked

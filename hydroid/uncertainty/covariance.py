@@ -1,4 +1,4 @@
-"""Covariance of an estimate, the intervals that follow from it, and how well each parameter is determined.
+"""Covariance of an estimate, and the intervals and flags that follow from it.
 
 The estimate minimises the weighted sum of squares of the residuals and of the priors' scores. The noise need
 not be white, and the weights need not match it. Let J, shape (p, R), be the derivatives of all these
@@ -11,9 +11,9 @@ For white noise of one level this is the usual s² (J J')^-1. It is computed fro
 decomposition J = V D U as C^-1 = G' G with G = (U S U')^-1/2 D V'. No product J J' is formed, and a direction
 that the residuals do not depend on keeps a singular value of exactly zero.
 
-The covariance is a local, first-order approximation, and it assumes that the model is right: an interval does
-not contain the shift of an estimate that a wrong model causes. At a bound the covariance is computed as if
-there were none, and the parameter gets no interval.
+The covariance is a local, first-order approximation. It assumes that the model is right: a wrong model shifts
+the estimate by more than an interval says. At a bound the covariance is computed as if there were none, and
+the parameter gets no interval.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ DOUBT_ABOVE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How well the data determine P parameters, p of them free, at an estimate.
+    """How precisely the data determine P parameters, p of them free, at an estimate.
 
     Attributes:
         theta: the estimate, shape (P,).
@@ -79,12 +79,10 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
-    """Return how well the problem's data determine theta, shape (P,), for the noise that they show there."""
+    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show."""
     derivatives = jacobian(problem, theta)
-    noise = tuple(
-        channel_noise(channel, derivatives.residual[channel.rows], problem.settings.objective)
-        for channel in problem.channels
-    )
+    residual, objective = derivatives.residual, problem.settings.objective
+    noise = tuple(channel_noise(c, residual[c.rows], objective) for c in problem.channels)
     return uncertainty_from(problem, theta, derivatives, noise)
 
 
@@ -102,18 +100,21 @@ def uncertainty_from(
     widened = relative * quantile / float(normal.ppf(0.5 + COVERAGE / 2))
     unidentifiable = widened > UNIDENTIFIABLE_ABOVE
     relative[unidentifiable] = np.inf
-    bounds = [_bound(*pair) for pair in zip(parameters, theta, strict=True)]
     half = quantile * relative * derivatives.scale
     interval = np.stack([theta - half, theta + half], axis=1)
-    interval[[bound is not None for bound in bounds] & ~unidentifiable] = np.nan
-    status = tuple(
-        _status(float(widened[i]), derivatives, i, bounds[i]) if free[i] else ParameterStatus(Flag.FIXED)
-        for i in range(len(theta))
-    )
+    status: list[ParameterStatus] = []
+    for i, parameter in enumerate(parameters):
+        bound = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
+        if bound is not None and not unidentifiable[i]:
+            interval[i] = np.nan
+        doubt, diverges = float(derivatives.doubt[i]), not np.isfinite(derivatives.slopes[i]).all()
+        flag = Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(float(widened[i]))
+        known = ParameterStatus(flag, bound, doubt if doubt > DOUBT_ABOVE else None, diverges)
+        status.append(known if free[i] else ParameterStatus(Flag.FIXED))
     deviation = np.where(unidentifiable[free], np.nan, relative[free])
     correlation = covariance / np.outer(deviation, deviation)
     return Uncertainty(
-        theta, derivatives, noise, free, root, relative, interval, correlation, freedom, status
+        theta, derivatives, noise, free, root, relative, interval, correlation, freedom, tuple(status)
     )
 
 
@@ -171,16 +172,3 @@ def _root(
     # the level of slow noise is known as from half its effective samples: AR(1), delta method at 0 Hz
     freedom = 0.5 * sum(process.effective_sample_size for process in noise) - np.count_nonzero(values)
     return inverse @ (values[:, None] * directions.T), noise, max(freedom, 1.0)
-
-
-def _bound(parameter: Parameter, value: float) -> Side | None:
-    return next((side for side, at in at_bounds(parameter, value) if at), None)
-
-
-def _status(relative: float, derivatives: Jacobian, i: int, at_bound: Side | None) -> ParameterStatus:
-    return ParameterStatus(
-        Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(relative),
-        at_bound,
-        float(derivatives.doubt[i]) if derivatives.doubt[i] > DOUBT_ABOVE else None,
-        diverges=not np.isfinite(derivatives.slopes[i]).all(),
-    )

@@ -1,4 +1,4 @@
-"""What is to be known about one parameter's estimate, as data; the report puts it into words."""
+"""How well one parameter is known, as data; the report puts it into words."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -24,19 +24,14 @@ class Flag(StrEnum):
 
 @dataclass(frozen=True)
 class ParameterStatus:
-    """What is to be known about one parameter's estimate.
-
-    Attributes:
-        flag: how well it is determined.
-        at_bound: the bound that it lies at.
-        derivative_doubt: relative difference between the derivatives of two step sizes, where it is large.
-        diverges: whether its effect is unknown because simulations diverge where it is changed.
-    """
+    """How well one parameter is known."""
 
     flag: Flag
     at_bound: Side | None = None
     derivative_doubt: float | None = None
+    """relative difference between the derivatives of two step sizes, where it is large"""
     diverges: bool = False
+    """whether its effect is unknown because simulations diverge where it is changed"""
 
 
 def flag_of(relative_sd: float) -> Flag:

@@ -19,13 +19,13 @@ THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 STEPS_PER_REACH = 6
 """points of a profile on each side, if the deviance is the parabola of the linear approximation"""
 REACH = 3.0
-"""standard deviations that these points would reach; of an unidentifiable parameter, up to its bound"""
+"""standard deviations that these points then reach; they reach the bound of an unidentifiable parameter"""
 MAX_POINTS = 12
 """points on each side at most; the steps grow after STEPS_PER_REACH"""
 ZOOMS = 4
 """times that steps are made smaller because the interval ends within the first two"""
 BETTER_BELOW = -0.1
-"""deviance below which a profile has found a better optimum, and not only the estimate's rounding"""
+"""deviance below which a profile has reached a better optimum; above it, only rounding"""
 QUICK = RefinementSettings(iterations=50, gain_tolerance=1e-6)
 BOOTSTRAP_STEPS = 4
 """Gauss-Newton steps of a refit"""
@@ -33,6 +33,7 @@ BATCH = 50
 """refits that are simulated together"""
 
 Residuals = Callable[[Array], Array]
+"""(n, P) -> (n, R + M): residuals with the priors' weighted scores behind them, as in a refinement"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +42,9 @@ class Profile:
 
     Attributes:
         name: of the parameter.
-        values: it was held at, increasing, the estimate among them, shape (n,). They end where the interval
-            has ended.
+        values: it was held at, increasing, the estimate among them, shape (n,); they end beyond the interval.
         deviance: rise of the cost in units of the noise, (n,): about ((value - estimate) / sd)² near it.
-        interval: where the deviance stays below THRESHOLD; a side on which it does so throughout is infinite.
+        interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
         lowest: all parameters at the point of the lowest deviance, shape (P,).
     """
 
@@ -100,10 +100,10 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 def bootstrap(
     problem: Problem, uncertainty: Uncertainty, count: int, seed: int, progress: Progress = no_progress
 ) -> Array:
-    """Refit `count` times after the residual was redrawn in blocks; return the estimates, shape (count, P).
+    """Redraw the residual in blocks and refit, `count` times; return the estimates, shape (count, P).
 
-    Blocks are ten correlation times long, drawn with wrap-around from the log's residuals, the same for all
-    channels of a log (H. R. Künsch, 1989). They are scaled up by the noise that the fit absorbed. A refit
+    Blocks are ten correlation times long. They are drawn with wrap-around from the log's residuals, the same
+    for all channels of a log (H. R. Künsch, 1989), and scaled up by the noise that the fit absorbed. A refit
     takes Gauss-Newton steps with the derivatives of the estimate, along the directions that are measured.
     """
     rng, rows = np.random.default_rng(seed), uncertainty.jacobian.residual
@@ -125,10 +125,10 @@ def bootstrap(
 def _walk(
     point: Callable[[Array, float], tuple[float, Array]], theta: Array, i: int, bound: float, step: float
 ) -> list[tuple[float, Array]]:
-    """Deviances and refitted parameters at values further and further from the estimate.
+    """Deviances and refitted parameters at values ever further from the estimate.
 
-    Ends beyond THRESHOLD or at the bound. Where that takes fewer than three steps they were too long, and
-    shorter ones are taken.
+    The walk ends beyond THRESHOLD or at the bound. Where fewer than three steps lead there, shorter ones are
+    taken.
     """
     points: list[tuple[float, Array]] = []
     for _ in range(ZOOMS if step else 0):
@@ -164,7 +164,6 @@ def _redrawn(problem: Problem, uncertainty: Uncertainty, count: int, rng: np.ran
 
 
 def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
-    """Residuals with the priors' weighted scores behind them, as in a refinement: (n, P) -> (n, R + M)."""
     weight = uncertainty.jacobian.prior_weight
     return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
 
@@ -173,8 +172,7 @@ def _fit_others(
     problem: Problem, residuals: Residuals, start: Array, i: int, value: float
 ) -> tuple[Array, float]:
     """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
-    parameters = problem.parameters
-    column = int(np.sum(parameters.free[:i]))
+    parameters, column = problem.parameters, int(np.sum(problem.parameters.free[:i]))
 
     def full(unit: Array) -> Array:
         theta = parameters.from_unit(np.insert(unit, column, 0.5, axis=1))

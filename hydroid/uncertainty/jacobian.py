@@ -32,7 +32,7 @@ class Jacobian:
         prior_slopes: derivatives of the M priors' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
         error: difference between two steps' derivatives, shape (P, R).
-        prior_weight: what a score of 1 counts beside the residuals [rad] (`noise.prior_weight`).
+        prior_weight: weight of a score of 1 beside the residuals [rad] (`noise.prior_weight`).
     """
 
     residual: Array

@@ -1,9 +1,8 @@
 """The noise of a channel: its level and its autocorrelation, from a residual or from the settings.
 
-A residual at 100 Hz is rarely white. A sensor's filter, a quantised signal and the errors of the model leave
-deviations that last for many samples. They are described by an autoregressive (AR) process, fitted by Burg's
-method (J. P. Burg, "Maximum entropy spectral analysis", 1967), of the order with the lowest AIC (H. Akaike,
-1974).
+A residual at 100 Hz is rarely white: sensor filters, quantisation and errors of the model leave deviations
+that last for many samples. An autoregressive (AR) process describes them. It is fitted by Burg's method
+(J. P. Burg, "Maximum entropy spectral analysis", 1967), its order by the lowest AIC (H. Akaike, 1974).
 """
 
 from collections.abc import Sequence
@@ -36,7 +35,7 @@ class Noise:
         samples: T.
         level: standard deviation, in units of the channel's residual [rad].
         reflection: coefficients k_1..k_p of its Levinson recursion, shape (p,), each within (-1, 1).
-        source: where the level was taken from; "smallest" is MIN_LEVEL.
+        source: of the level; "smallest" is MIN_LEVEL.
     """
 
     samples: int
@@ -88,20 +87,17 @@ class Noise:
 
     def _predictors(self) -> list[tuple[Array, float]]:
         """Prediction-error filters of order 0 to p, each with the variance of its prediction error."""
-        polynomial, variance = np.ones(1), self.level**2
-        predictors = [(polynomial, variance)]
+        predictors = [(np.ones(1), self.level**2)]
         for k in self.reflection:
-            longer = np.append(polynomial, 0.0)
-            polynomial, variance = longer + k * longer[::-1], variance * (1 - k**2)
-            predictors.append((polynomial, variance))
+            predictors.append(_next_predictor(*predictors[-1], float(k)))
         return predictors
 
 
 def prior_weight(channels: Sequence[Channel], residual: Array, objective: ObjectiveSettings) -> float:
-    """Return what a prior's score of one standard deviation counts beside a row of residuals, (R,) [rad].
+    """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
-    Residuals with autocorrelated noise hold less information than their number says, so a score counts the
-    noise's level times the root of the number of samples per effective one.
+    Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
+    level times the root of the number of samples per effective sample.
     """
     noise = [channel_noise(channel, residual[channel.rows], objective) for channel in channels]
     square = sum(n.samples * n.level**2 for n in noise)
@@ -147,14 +143,10 @@ def fit_noise(residual: Array, max_order: int = MAX_AR_ORDER) -> Noise:
 def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
     """Return the noise before a least-squares fit absorbed a part of it.
 
-    A fit absorbs the part of the noise that resembles its derivatives, slow noise above all. With U the
-    orthonormal rows that span them, the covariance of the residual is (1 - U'U) S (1 - U'U). The
-    autocovariances are raised by the difference to S, in a few rounds since S is not known beforehand.
-
-    Args:
-        noise: as fitted to a channel's residual.
-        effects: the channel's part of U, shape (p, T).
-        spread: U S U' of all channels, shape (p, p).
+    A fit absorbs the part of the noise that resembles its derivatives, slow noise above all. Let U be the
+    orthonormal rows that span them, `effects`, (p, T), the channel's part of U, and `spread`, (p, p), U S U'
+    of all channels. The covariance of the residual is (1 - U'U) S (1 - U'U). The autocovariances of `noise`
+    are raised by the difference to S, in a few rounds because S is not known beforehand.
     """
     samples, order = noise.samples, len(noise.reflection)
     left, whole = noise.autocovariance[: order + 1], noise
@@ -177,12 +169,17 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
 
 def _levinson(autocovariance: Array) -> Array | None:
     """Reflection coefficients from lags 0 to p; None where no AR process has these autocovariances."""
-    polynomial, variance, reflection = np.ones(1), autocovariance[0], np.empty(0)
+    polynomial, variance, reflection = np.ones(1), float(autocovariance[0]), np.empty(0)
     for m in range(1, len(autocovariance)):
-        k = -(polynomial @ autocovariance[m:0:-1]) / variance
+        k = float(-(polynomial @ autocovariance[m:0:-1]) / variance)
         if not abs(k) < 1:
             return None
-        longer = np.append(polynomial, 0.0)
-        polynomial, variance = longer + k * longer[::-1], variance * (1 - k**2)
+        polynomial, variance = _next_predictor(polynomial, variance, k)
         reflection = np.append(reflection, k)
     return reflection
+
+
+def _next_predictor(polynomial: Array, variance: float, k: float) -> tuple[Array, float]:
+    """Prediction-error filter of the next order and the variance of its error (Levinson)."""
+    longer = np.append(polynomial, 0.0)
+    return longer + k * longer[::-1], variance * (1 - k**2)

@@ -7,8 +7,9 @@ from conftest import step_log
 from hydroid import load_settings
 from hydroid.errors import HydroidError
 from hydroid.fitting.fit import fit
+from hydroid.fitting.memo import Memo
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Evaluation, Memo, Problem
+from hydroid.problem.problem import Evaluation, Problem
 from hydroid.report.fit_report import fit_page, objective_table, parameter_table
 from hydroid.report.phrases import fit_warnings
 

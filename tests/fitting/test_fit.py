@@ -8,11 +8,12 @@ from conftest import step_log
 from hydroid import load_settings, read_logs
 from hydroid.errors import HydroidError, RunError, SettingsError
 from hydroid.fitting.fit import fit
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.validation import error_indices
 from hydroid.log import write_log
 from hydroid.parameters import relative_error
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.problem.stage import Stage
 from hydroid.run.folder import RunFolder
 

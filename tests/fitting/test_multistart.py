@@ -6,10 +6,11 @@ import pytest
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import fit
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.multistart import Multistart, random_start
 from hydroid.log import Log, write_log
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
 
 TRUTH = {"K2": 0.2, "D2": 231.8, "S2": 53.4, "K3": 0.3, "D3": 150.0, "S3": 40.0, "M3": 22.5}

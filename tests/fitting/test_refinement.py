@@ -8,10 +8,11 @@ from conftest import step_log
 
 from hydroid import load_settings
 from hydroid.errors import RunError
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Refinement, refine
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import RefinementCheckpoints
 from hydroid.settings.search import RefinementSettings
 

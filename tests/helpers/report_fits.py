@@ -9,10 +9,9 @@ from hydroid.fitting.refinement import Refinement
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.problem.channels import make_channels
-from hydroid.problem.norms import overall_objective
+from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.problem.segments import segment_objectives
 from hydroid.search.least_squares import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings

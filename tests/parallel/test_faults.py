@@ -18,10 +18,11 @@ from spread_problem import arguments, assert_same, random_candidates
 from worker_targets import DEADLY, Deadly, Rows
 
 from hydroid.errors import RunError
+from hydroid.fitting.memo import Memo
 from hydroid.parallel import cluster
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.settings.simulation import ClusterSettings
 
 dask = pytest.importorskip("dask")

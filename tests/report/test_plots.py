@@ -21,7 +21,7 @@ from hydroid.report.uncertainty_report import UncertaintyStudy, draw_profiles
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.uncertainty.directions import identifiability
 from hydroid.uncertainty.intervals import THRESHOLD, Profile
-from hydroid.uncertainty.surface import Surface
+from hydroid.uncertainty.sweep import Surface
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
 

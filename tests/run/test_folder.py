@@ -17,10 +17,11 @@ from conftest import step_log
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import SearchState
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 from hydroid.run import lock
 from hydroid.run.checkpoint import DAMAGED, PREVIOUS
 from hydroid.run.folder import RunFolder

@@ -4,15 +4,31 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hydroid.log.finding import Finding, numbered
-from hydroid.log.log import Floats
-from hydroid.log.signals import Recording, Signal
+from hydroid.log.log import Finding, Floats, numbered
+from hydroid.log.signals import Recording
 from hydroid.settings.log import LogSettings
 
 GAP = 1.5  # in sample periods: a longer step is a gap
 JITTER = 0.25  # in sample periods: a larger variation of the steps is a warning
 SLOWEST = 10  # largest ratio of the file's period to log.period_s: held commands would not explain the motion
 ROUNDING = 1e-6  # [%], of a scaled command
+FRACTION = 1.0  # [%]: no valve of a manipulator opens at smaller commands
+MOVES = 3.0  # [deg], of the mean over WINDOW: more than noise and settling
+WINDOW = 0.5  # [s]
+HALF_TURN = 3.2  # just above pi: few joints turn further, in rad
+STRONG = 30.0  # [%], past the dead band of a valve
+LEAST = 300.0  # [% s] of strong commands before their effect is judged
+SLUGGISH = 0.015  # [deg/(% s)]: 1.5 deg/s at full command; the rig's slowest joint turns 16 times as fast
+PRESENTED = {
+    "command": (1.0, "%", "correct the cells, or log.command's scale and offset"),
+    "angle": (
+        180 / np.pi,
+        "deg",
+        "correct the cells, log.angle's unit, scale and offset, or the joint's range",
+    ),
+    "pressure": (1e-5, "bar", "correct the cells, or log.pressure's unit, scale and offset"),
+}
+"""of values outside their limits: factor to the unit they are shown in, this unit, and the hint"""
 
 
 def check_recording(
@@ -26,6 +42,7 @@ def check_recording(
         *_outside(recording),
         *_jumps(recording),
         *_constant(recording, outputs),
+        *_units(recording),
     ]
 
 
@@ -86,22 +103,17 @@ def _steps(
     """Gaps, and steps that vary; a row without a time counts as a sample, since it is reported elsewhere."""
     signal, per_row = recording.signals[0], steps / np.diff(rows)
     gaps = np.flatnonzero(steps > (np.diff(rows) - 1 + GAP) * period)
-    if len(gaps):
-        worst = steps[gaps].max()
-        what = f"{steps[gaps[0]]:.6g} s without a sample, the usual step is {period:.6g} s"
-        hint = (
-            "fill it with --repair"
-            if worst <= longest * (1 + 1e-9) + period
-            else f"cut the log into two files there (--repair fills gaps up to log.repair_s: {longest:g} s)"
-        )
-        yield recording.finding("error", what, hint, rows[1:][gaps], signal)
-        return
     uneven = np.flatnonzero(np.abs(per_row - period) > JITTER * period)
-    if len(uneven):
+    if len(gaps):
+        what = f"{steps[gaps[0]]:.6g} s without a sample, the usual step is {period:.6g} s"
+        hint = f"cut the log into two files there (--repair fills gaps up to log.repair_s: {longest:g} s)"
+        if steps[gaps].max() <= longest * (1 + 1e-9) + period:
+            hint = "fill it with --repair"
+        yield recording.finding("error", what, hint, rows[1:][gaps], signal)
+    elif len(uneven):
         what = f"sample period varies from {per_row.min():.4g} to {per_row.max():.4g} s around {period:.4g} s"
-        yield recording.finding(
-            "warning", what, "commands are held and angles interpolated", rows[1:][uneven], signal
-        )
+        hint = "commands are held and angles interpolated"
+        yield recording.finding("warning", what, hint, rows[1:][uneven], signal)
 
 
 def _outside(recording: Recording) -> Iterator[Finding]:
@@ -110,19 +122,10 @@ def _outside(recording: Recording) -> Iterator[Finding]:
         rows = np.flatnonzero((values < signal.low - rounding) | (values > signal.high + rounding))
         if not len(rows):
             continue
-        to_unit, unit, hint = _presented(signal)
+        to_unit, unit, hint = PRESENTED[signal.kind]
         value, low, high = (to_unit * x for x in (values[rows[0]], signal.low, signal.high))
         what = f"{signal} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
         yield recording.finding("error", what, hint, rows, signal)
-
-
-def _presented(signal: Signal) -> tuple[float, str, str]:
-    if signal.kind == "command":
-        return 1.0, "%", "correct the cells, or log.command's scale and offset"
-    if signal.kind == "pressure":
-        return 1e-5, "bar", "correct the cells, or log.pressure's unit, scale and offset"
-    hint = "correct the cells, log.angle's unit, scale and offset, or the joint's range"
-    return 180 / np.pi, "deg", hint
 
 
 def _jumps(recording: Recording) -> Iterator[Finding]:
@@ -136,13 +139,12 @@ def _jumps(recording: Recording) -> Iterator[Finding]:
         if len(far):
             first = np.rad2deg(steps[np.abs(steps) > np.pi][0])
             what = f"{signal} jumps by {first:.6g} deg from one sample to the next"
-            yield recording.finding(
-                "error", what, "correct the cells, or log.angle's unit and scale", far, signal
-            )
+            hint = "correct the cells, or log.angle's unit and scale"
+            yield recording.finding("error", what, hint, far, signal)
 
 
 def _constant(recording: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
-    command, angle = recording.motions(max((c.joint for c in recording.signals), default=0))
+    command, angle = recording.motions()
     names = {(c.kind, c.joint): c for c in reversed(recording.signals)}
     joints = range(1, command.shape[1] + 1)
     driven = {j for j in joints if np.nan_to_num(command[:, j - 1]).any()}
@@ -163,3 +165,37 @@ def _constant(recording: Recording, outputs: Sequence[int]) -> Iterator[Finding]
 def _is_constant(values: Floats) -> bool:
     there = values[~np.isnan(values)]
     return len(there) > 0 and bool((there == there[0]).all())
+
+
+def _units(recording: Recording) -> Iterator[Finding]:
+    """Values that are allowed but look as if they had another unit: fractions for %, radians for degrees.
+
+    The arm's motion must contradict the unit; nothing is said where another explanation is possible.
+    """
+    if np.isnan(recording.values).any() or len(recording.time) < 2 or (np.diff(recording.time) <= 0).any():
+        return  # has faults to be mended first
+    command, angle = recording.motions()
+    driven = np.flatnonzero(command.any(axis=0) & ~np.isnan(angle[0]))
+    if not len(driven):
+        return
+    command, largest = np.abs(command), np.rad2deg(np.nanmax(np.abs(angle)))
+    # means over windows of half a second, shape (windows, driven); the last may be shorter
+    starts = np.flatnonzero(np.diff(np.floor((recording.time - recording.time[0]) / WINDOW), prepend=-1.0))
+    counts = np.diff(starts, append=len(angle))
+    means = np.add.reduceat(np.rad2deg(angle[:, driven]), starts, axis=0) / counts[:, None]
+    if command.max() <= FRACTION:
+        moved = np.ptp(means, axis=0)
+        joint = int(driven[moved.argmax()]) + 1
+        if moved.max() > MOVES:
+            what = f"no command exceeds {FRACTION:g} %, yet joint {joint} turns by {moved.max():.3g} deg"
+            hint = "if commands are fractions from -1 to 1, set log.command.scale: 100"
+            yield recording.finding("warning", what, hint, (), recording.signal("command", joint))
+    elif largest <= HALF_TURN:
+        strong = np.where(command[:-1, driven] > STRONG, command[:-1, driven], 0.0)
+        push, path = np.diff(recording.time) @ strong, np.abs(np.diff(means, axis=0)).sum(axis=0)
+        judged = push > LEAST
+        if judged.any() and ((path > 0) & (path < SLUGGISH * push))[judged].all():
+            joint = int(driven[judged][0]) + 1
+            what = f"no angle exceeds {HALF_TURN:g} deg, and joint {joint} hardly follows strong commands"
+            hint = "if angles are in rad, set log.angle.unit: rad"
+            yield recording.finding("warning", what, hint, (), recording.signal("angle", joint))

@@ -1,12 +1,11 @@
-"""Is a command shifted in time against the angle that it moves?
+"""Whether a command is shifted in time against the angle that it moves.
 
 For each lag the joint's velocity is regressed on the command at that lag, the angle and a constant:
 q̇(t) ≈ k u(t − lag) + s q(t) + c. The angle stands for springs and gravity's gradient, which turn a slow
-velocity ahead of its command; without it a sine would look acausal. All are smoothed by one Gaussian, which
-is symmetric and so shifts nothing. Samples at which a joint stands at the end of its travel, pushed further,
-do not count: its velocity says nothing about the command. The lag of the smallest residual is the answer if
-it lies inside the range of lags and is clearly better than any lag of the opposite sign and than the lags of
-a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
+velocity ahead of its command. All are smoothed by one Gaussian, which shifts nothing. Samples at which a
+joint stands at the end of its travel, pushed further, do not count. The lag of the smallest residual is the
+answer if it lies inside the range of lags and is clearly better than any lag of the opposite sign and than
+the lags of a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
 """
 
 from collections.abc import Callable
@@ -15,9 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.log.finding import Finding, numbered
-from hydroid.log.log import Floats, Log
-from hydroid.settings.log import LogSettings
+from hydroid.log.log import Finding, Floats, Log, numbered
 
 EARLIEST, LATEST = -0.5, 1.5  # lags tried [s]
 PLAIN = (0.0, 0.1)  # lags that need no transport delay [s]
@@ -34,26 +31,14 @@ _ROUNDING = 1e-9  # part of a sum of squares
 
 @dataclass(frozen=True)
 class Delay:
-    """How a joint's motion follows its command.
-
-    Attributes:
-        lag: of the motion behind the command [s].
-        strength: share of the velocity's variance that the command explains there, 0.5 to 1.
-        sign: −1 if the joint moves against its command.
-    """
+    """How a joint's motion follows its command: the lag behind it [s], and −1 if it moves against it."""
 
     lag: float
-    strength: float
     sign: int
 
 
 def suggest_delay(log: Log, joint: int) -> Delay | None:
-    """Return the lag of a joint (number, from 1) behind its command; None where the log does not tell.
-
-    It does not if it is short, if command and motion do not belong together, if the best lag is the first or
-    the last tried, or if a plain actuator's lag or one of the opposite sign explains the motion about as well
-    (the command is periodic, say).
-    """
+    """Return the lag of a joint (number, from 1) behind its command; None where the log does not tell."""
     u, q = log.command[:, joint - 1], log.angle[:, joint - 1]
     first, last = round(EARLIEST / log.period), round(LATEST / log.period)
     used = slice(last, len(u) + first)
@@ -66,33 +51,49 @@ def suggest_delay(log: Log, joint: int) -> Delay | None:
     if counts.sum() < last:
         return None
     residual, sign = _regress(command, angle[used], speed[used], counts)
-    residual, sign = residual[::-1], sign[::-1]  # by increasing lag
     lag = np.arange(first, last + 1) * log.period
     best = int(residual.argmin())
-    if not 0 < best < len(lag) - 1 or residual[best] > (
-        MAX_RESIDUAL if lag[best] > ACAUSAL else MAX_ACAUSAL_RESIDUAL
-    ):
-        return None
+    allowed = MAX_RESIDUAL if lag[best] > ACAUSAL else MAX_ACAUSAL_RESIDUAL
     plain = (lag > PLAIN[0] - log.period / 2) & (lag < PLAIN[1] + log.period / 2)
-    rivals = (sign != sign[best]) | (plain & ~plain[best])
-    if rivals.any() and residual[best] >= CLEARER * residual[rivals].min():
+    rivals = residual[(sign != sign[best]) | (plain & ~plain[best])]
+    unclear = bool(rivals.size) and residual[best] >= CLEARER * rivals.min()
+    if best in (0, len(lag) - 1) or residual[best] > allowed or unclear:
         return None
-    return Delay(float(lag[best]), float(1 - residual[best]), int(sign[best]))
+    return Delay(float(lag[best]), int(sign[best]))
+
+
+def delay_findings(log: Log, delay_s: float, column: Callable[[int], str]) -> list[Finding]:
+    """Report commands that look early, late, or of the wrong sign; `column` names a joint's."""
+    joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+    delays = {joint: delay for joint in joints if (delay := suggest_delay(log, joint))}
+    early = [j for j, d in delays.items() if d.lag > PLAIN[1] + log.period / 2]
+    late = [j for j, d in delays.items() if d.lag < ACAUSAL]
+    against = [j for j, d in delays.items() if d.sign < 0]
+    findings = list[Finding]()
+    if early:
+        lag = float(np.median([delays[j].lag for j in early]))
+        what = f"command of {numbered(early)} looks {lag:.2f} s early against the angle"
+        hint = f"set log.delay_s: {delay_s + lag:.2f} if the machine has that transport delay"
+        findings.append(Finding("note", what, log.source, hint, column=column(early[0])))
+    if late:
+        lag = float(np.median([delays[j].lag for j in late]))
+        what = f"angle of {numbered(late)} moves {-lag:.2f} s before the command, as no machine does"
+        hint = f"the log's clocks differ: mend the log, or set log.delay_s: {delay_s + lag:.2f}"
+        findings.append(Finding("warning", what, log.source, hint, column=column(late[0])))
+    if against:
+        what = f"angle of {numbered(against)} moves against the command"
+        hint = "give log.command or log.angle a negative scale if one is logged the other way around"
+        findings.append(Finding("warning", what, log.source, hint, column=column(against[0])))
+    return findings
 
 
 def _regress(
     command: Floats, angle: Floats, speed: Floats, counts: NDArray[np.bool_]
 ) -> tuple[Floats, Floats]:
-    """Regress the speed on the angle, a constant and the command, shifted by all lags from the latest on.
+    """Regress the speed, shape (N,), on the angle, a constant and the command, (T,), shifted by each lag.
 
-    Args:
-        command: of the whole log, shape (T,).
-        angle: of the samples compared at all lags, shape (N,).
-        speed: of these, shape (N,).
-        counts: which of these count, shape (N,).
-
-    Returns:
-        Share of the speed's variance that is left, and the sign of the command's effect, shape (T - N + 1,).
+    Only samples that count enter. Returns the share of the speed's variance that is left, and the sign of the
+    command's effect, by increasing lag, shape (T - N + 1,).
     """
     basis = np.linalg.qr(counts[:, None] * np.stack([np.ones_like(angle), angle], axis=1))[0]
     wanted = counts * speed
@@ -104,7 +105,7 @@ def _regress(
     enough = own > _ROUNDING * power
     match = np.zeros_like(product)
     np.divide(product**2, own * (wanted @ wanted), out=match, where=enough & (wanted @ wanted > 0))
-    return 1 - match, np.sign(product)
+    return 1 - match[::-1], np.sign(product)[::-1]
 
 
 def _at_stop(command: Floats, angle: Floats, speed: Floats, period: float) -> NDArray[np.bool_]:
@@ -131,30 +132,3 @@ def _smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats
     kernel /= kernel.sum()
     kernel = -at / width**2 * kernel if derivative else kernel
     return np.convolve(np.pad(signal, reach, "symmetric"), kernel, "valid").astype(np.float64)
-
-
-def delay_findings(log: Log, settings: LogSettings, column: Callable[[int], str]) -> list[Finding]:
-    """Report commands that look early, late, or of the wrong sign against the angle."""
-    joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
-    delays = {joint: delay for joint in joints if (delay := suggest_delay(log, joint))}
-    early = {j: d.lag for j, d in delays.items() if d.lag > PLAIN[1] + log.period / 2}
-    late = {j: d.lag for j, d in delays.items() if d.lag < ACAUSAL}
-    against = [j for j, d in delays.items() if d.sign < 0]
-    findings = list[Finding]()
-    if early:
-        lag = float(np.median(list(early.values())))
-        what = f"command of {numbered(list(early))} looks {lag:.2f} s early against the angle"
-        hint = f"set log.delay_s: {settings.delay_s + lag:.2f} if the machine has that transport delay"
-        findings.append(Finding("note", what, log.source, hint, column=column(min(early))))
-    if late:
-        lag = float(np.median(list(late.values())))
-        what = f"angle of {numbered(list(late))} moves {-lag:.2f} s before the command, as no machine does"
-        hint = f"the log's clocks differ: mend the log, or set log.delay_s: {settings.delay_s + lag:.2f}"
-        findings.append(Finding("warning", what, log.source, hint, column=column(min(late))))
-    if against:
-        what = f"angle of {numbered(against)} moves against the command"
-        hint = (
-            "give log.command or log.angle a negative scale if the axis or the valve is logged the other way"
-        )
-        findings.append(Finding("warning", what, log.source, hint, column=column(min(against))))
-    return findings

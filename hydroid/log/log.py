@@ -1,11 +1,16 @@
-"""The log as the rest of the program sees it: commands and angles at one period."""
+"""The log as the rest of the program sees it, and what its reader noticed."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.errors import LogError
+
 Floats = NDArray[np.float64]
+Level = Literal["error", "warning", "note"]
 
 LONGEST_REST = 2.0
 """of a rest before the first command, what counts for the start pose [s]: a leaking valve lets an arm sink"""
@@ -74,3 +79,41 @@ class Log:
             angle=self.angle[part],
             pressure=None if self.pressure is None else self.pressure[part],
         )
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong or worth knowing, where, and what to do.
+
+    An `error`: the log cannot be used; a `warning`: look at it; a `note`: what the reader did. `line` [1-based]
+    is that of the first place, and `column` its name in the header, where there is one.
+    """
+
+    level: Level
+    what: str
+    source: str
+    hint: str = ""
+    line: int | None = None
+    column: str = ""
+
+    @property
+    def where(self) -> str:
+        """The file, and the line and column where known."""
+        line = f", line {self.line}" if self.line else ""
+        return self.source + line + (f", column {self.column}" if self.column else "")
+
+    def error(self) -> LogError:
+        """Return the finding as the error that ends a command."""
+        return LogError(self.what, where=self.where, hint=self.hint)
+
+    def __str__(self) -> str:
+        return str(self.error())
+
+
+Warn = Callable[[Finding], None]
+"""receives warnings and notes about a log"""
+
+
+def numbered(joints: Sequence[int]) -> str:
+    """Return "joint 2" or "joints 2, 3"."""
+    return f"joint{'' if len(joints) == 1 else 's'} {', '.join(map(str, joints))}"

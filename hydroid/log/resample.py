@@ -1,15 +1,100 @@
-"""Any rate -> one period: commands are held, angles interpolated.
+"""A recording's samples -> one period: repairs that invent no data, then commands held, angles interpolated.
 
 A faster log is thinned by plain interpolation, without a filter before it: the fit compares angles sample by
 sample, and white sensor noise stays what it was, while a filter would colour it and delay the angle.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
-from hydroid.log.log import Floats
+from hydroid.log.checks import GAP, sample_period
+from hydroid.log.log import Finding, Floats
+from hydroid.log.signals import Recording
 
+TURN = 2 * np.pi
+MAX_GROWTH = 2  # largest ratio of rows after and before: mostly gaps cannot be repaired
+NEAR_TURN = np.pi / 4  # largest difference of a wrap from a whole turn: the motion within one sample
 ON_GRID = 0.01  # of a period: where all samples are this near to the first one's grid, values pass unchanged
 _ROUNDING = 1e-6  # of a period
+
+
+def unwrap(recording: Recording) -> tuple[Recording, list[Finding]]:
+    """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
+    values, notes = recording.values.copy(), list[Finding]()
+    for column, signal in enumerate(recording.signals):
+        if signal.kind != "angle" or np.isfinite(signal.high):
+            continue
+        rows = np.flatnonzero(~np.isnan(values[:, column]))
+        steps = np.diff(values[rows, column])
+        wraps = np.abs(np.abs(steps) - TURN) < NEAR_TURN
+        if wraps.any():
+            values[rows[1:], column] -= TURN * np.cumsum(np.sign(steps) * wraps)
+            what = f"{signal} wraps by 360 deg and was joined"
+            notes.append(recording.finding("note", what, "", rows[1:][wraps], signal))
+    return replace(recording, values=values), notes
+
+
+def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]]:
+    """Fill gaps up to `longest` [s] besides the usual step: interpolate angles, hold commands, insert samples.
+
+    Rows without a time are dropped, and put back if they leave a gap.
+    """
+    timed = ~np.isnan(recording.time)
+    lost, first = int((~timed).sum()), recording.lines[~timed][:1]
+    recording = recording.take(np.flatnonzero(timed))
+    period = sample_period(recording.time)
+    reach = longest * (1 + 1e-9) + period
+    recording, added = _insert(recording, period, reach)
+    values = recording.values.copy()
+    for column, signal in enumerate(recording.signals[1:], 1):
+        _bridge(recording.time, values[:, column], reach, held=signal.kind == "command")
+    filled = np.isnan(recording.values) & ~np.isnan(values) & ~added[:, None]
+    recording = replace(recording, values=values)
+    cells, samples = int(filled.sum()), int(added.sum())
+    if not (cells or samples or lost):
+        return recording, []
+    what = f"repaired: {_count(cells, 'missing cell')} filled, {_count(samples, 'dropped sample')} inserted"
+    what += f", {_count(lost, 'row')} without a time left out" if lost else ""
+    line = min([*recording.lines[filled.any(axis=1) | added][:1], *first])
+    hint = "angles interpolated, commands held"
+    return recording, [Finding("warning", what, recording.file.source, hint, int(line))]
+
+
+def _insert(recording: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:
+    """Put rows of NaN where samples are missing; also returns which rows are new, shape (R,)."""
+    steps = np.diff(recording.time)
+    gaps = (steps > GAP * period) & (steps <= reach)
+    copies = np.ones(len(recording.time), dtype=np.int64)
+    copies[:-1][gaps] = np.rint(np.minimum(steps[gaps] / period, 1e9)).astype(np.int64)
+    if copies.sum() > MAX_GROWTH * len(copies):
+        copies[:] = 1
+    origin = np.repeat(np.arange(len(copies)), copies)
+    nth = np.arange(len(origin)) - np.repeat(np.cumsum(copies) - copies, copies)
+    added = nth > 0
+    longer = recording.take(origin)
+    longer.values[added] = np.nan
+    longer.values[:, 0] = recording.time[origin] + nth * np.append(steps, 0.0)[origin] / copies[origin]
+    longer.ragged[added] = False
+    return longer, added
+
+
+def _bridge(time: Floats, values: Floats, reach: float, held: bool) -> None:
+    """Fill, in place, the holes between two samples no more than `reach` [s] apart."""
+    there = ~np.isnan(values)
+    if there.all() or not there.any():
+        return
+    rows = np.arange(len(values))
+    before = np.maximum.accumulate(np.where(there, rows, -1))
+    after = np.minimum.accumulate(np.where(there, rows, len(rows))[::-1])[::-1]
+    inside = ~there & (before >= 0) & (after < len(rows))
+    inside[inside] = time[after[inside]] - time[before[inside]] <= reach
+    filled = values[before] if held else np.interp(time, time[there], values[there])
+    values[inside] = filled[inside]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def resample(
@@ -17,12 +102,10 @@ def resample(
 ) -> tuple[Floats, Floats, Floats]:
     """Bring a recording to the grid k · period, from its first sample to its last.
 
-    Pressures are interpolated as angles are.
-
     Args:
         time: [s], shape (R,), strictly increasing.
         command: [%], shape (R, J).
-        angle: [rad] (and other signals that are measured), shape (R, M).
+        angle: [rad], and other signals that are interpolated, shape (R, M).
         period: [s].
         delay: the command acts this much later [s] than logged; before the first one acts it is 0 %.
 

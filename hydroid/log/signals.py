@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.log.csv_file import CsvFile, read_cells
-from hydroid.log.finding import Finding
-from hydroid.log.log import Floats
+from hydroid.log.log import Finding, Floats, Level
 from hydroid.settings.log import LogSettings
 
 _MAX_LISTED = 40  # column names in a message
@@ -23,13 +22,8 @@ _PRESSURES = (-5e5, 2e8)  # plausible pressures [Pa]: sensors have an offset, ho
 class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa].
 
-    Attributes:
-        name: in the header.
-        kind: of signal.
-        joint: number, from 1; 0 for the time.
-        low, high: limits of the value; ∓inf for a continuous joint.
-        sign: +1, or −1 for the column of a command's negative direction.
-        chamber: of a pressure, 0 for A and 1 for B.
+    `name` is that in the header, `joint` a number from 1, or 0 for the time; `sign` is −1 for the column of a
+    command's negative direction; `chamber` of a pressure is 0 for A and 1 for B.
     """
 
     name: str
@@ -71,7 +65,7 @@ class Recording:
 
     def finding(
         self,
-        level: Literal["error", "warning", "note"],
+        level: Level,
         what: str,
         hint: str = "",
         rows: Sequence[int] | NDArray[np.int64] = (),
@@ -84,13 +78,22 @@ class Recording:
         line = int(self.lines[rows[0]]) if len(rows) else None
         return Finding(level, what, self.file.source, hint, line, signal.name if signal else "")
 
+    def take(self, rows: NDArray[np.int64]) -> "Recording":
+        """Return a copy with these rows, in this order."""
+        return replace(self, values=self.values[rows], lines=self.lines[rows], ragged=self.ragged[rows])
+
+    def signal(self, kind: str, joint: int) -> Signal:
+        """Return the first signal of a joint of this kind."""
+        return next(signal for signal in self.signals if (signal.kind, signal.joint) == (kind, joint))
+
     def text(self, row: int, column: int) -> str:
         """Return the cell of a row and a signal as it stands in the file."""
         name = self.signals[column].name
         return self.file.text(int(self.lines[row]), self.file.names.index(name))
 
-    def motions(self, joints: int) -> tuple[Floats, Floats]:
+    def motions(self, joints: int | None = None) -> tuple[Floats, Floats]:
         """Return command [%] and angle [rad], shapes (R, J): 0 where undriven, NaN where unmeasured."""
+        joints = joints or max(signal.joint for signal in self.signals)
         command = np.zeros((len(self.values), joints))
         angle = np.full((len(self.values), joints), np.nan)
         for signal, values in zip(self.signals, self.values.T, strict=True):
@@ -110,12 +113,7 @@ class Recording:
 
 
 def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
-    """Return the signals that the settings ask for, time first.
-
-    Args:
-        settings: the mapping.
-        ranges: of the joints [rad], shape (J, 2), ∓inf for a continuous joint.
-    """
+    """Return the signals that the settings ask for, time first; joint ranges [rad], shape (J, 2)."""
     signals = [Signal(settings.time.column, "time", gain=1e-3 if settings.time.unit == "ms" else 1.0)]
     margin = np.deg2rad(settings.angle_margin_deg)
     for joint in range(1, len(ranges) + 1):
@@ -152,8 +150,9 @@ def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
             f"it has: {', '.join(have[:_MAX_LISTED])}{more}; set log.time, log.command, log.angle or "
             "log.joints, where null says that a joint is not in the log"
         )
-        what = f"has no column {names}"
-        findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
+        findings.append(
+            Finding("error", f"has no column {names}", file.source, hint, file.header, lacking[0].name)
+        )
     for name, count in Counter(file.names).items():
         if count > 1 and any(signal.name == name for signal in wanted):
             what = f"has {count} columns of this name"

@@ -1,21 +1,23 @@
-"""One CSV log -> `Log`: open, map, repair, check, resample."""
+"""One CSV log <-> `Log`: open, map, repair, check, resample; and written so that it reads back the same."""
 
+import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.files import write_atomic
 from hydroid.log.checks import check_recording, sample_period
 from hydroid.log.csv_file import open_csv
 from hydroid.log.delay import delay_findings
-from hydroid.log.finding import Finding
-from hydroid.log.log import Floats, Log
-from hydroid.log.repair import fill, unwrap
-from hydroid.log.resample import is_on_grid, resample
+from hydroid.log.log import Finding, Floats, Log
+from hydroid.log.resample import fill, hold, is_on_grid, resample, unwrap
 from hydroid.log.signals import Recording, Signal, map_signals, missing_columns, read_recording
-from hydroid.log.units import check_units
 from hydroid.settings.log import LogSettings
+
+DIGITS = "%.10g"
 
 
 def read_log(
@@ -81,11 +83,7 @@ def check_log(
         if repair:
             recording, repairs = fill(recording, settings.repair_s)
             notes += repairs
-        findings += [
-            *notes,
-            *check_recording(recording, settings, outputs, repaired=repair),
-            *check_units(recording),
-        ]
+        findings += [*notes, *check_recording(recording, settings, outputs, repaired=repair)]
         if all(finding.level != "error" for finding in findings):
             log, more = _to_log(recording, settings, len(ranges))
             findings += more
@@ -95,14 +93,17 @@ def check_log(
 def _mapping_faults(
     source: str, settings: LogSettings, wanted: Sequence[Signal], joints: int, outputs: Sequence[int]
 ) -> list[Finding]:
-    strangers = [f"log.joints.{joint}" for joint in settings.joints if joint > joints]
-    faults = [Finding("error", f"{name}: the arm has joints 1 to {joints}", source) for name in strangers]
     measured = {signal.joint for signal in wanted if signal.kind == "angle"}
-    for joint in outputs:
-        if joint not in measured:
-            what = f"output joint {joint} has no angle column"
-            faults.append(Finding("error", what, source, "map it in log.joints, or choose another output"))
-    return faults
+    hint = "map it in log.joints, or choose another output"
+    return [
+        Finding("error", f"log.joints.{joint}: the arm has joints 1 to {joints}", source)
+        for joint in settings.joints
+        if joint > joints
+    ] + [
+        Finding("error", f"output joint {joint} has no angle column", source, hint)
+        for joint in outputs
+        if joint not in measured
+    ]
 
 
 def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[Finding]]:
@@ -121,7 +122,50 @@ def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[L
         findings.append(recording.finding("note", what, "commands held, angles interpolated"))
     if not log.driven.any():
         findings.append(recording.finding("warning", "no joint is driven", "check log.command"))
-    columns = {
-        signal.joint: signal.name for signal in reversed(recording.signals) if signal.kind == "command"
-    }
-    return log, findings + delay_findings(log, settings, columns.__getitem__)
+    findings += delay_findings(log, settings.delay_s, lambda joint: recording.signal("command", joint).name)
+    return log, findings
+
+
+def write_log(path: Path, log: Log, settings: LogSettings) -> None:
+    """Write a log, whole or not at all.
+
+    The command is written ahead by `settings.delay_s`, so that reading delays it to what `log` holds.
+
+    Raises:
+        LogError: the settings map no column for a joint that is driven, or a column for an angle that was not
+            measured.
+        RunError: the file cannot be written.
+    """
+    signals = map_signals(settings, np.full((log.joints, 2), np.inf))
+    if log.pressure is None:
+        signals = [signal for signal in signals if signal.kind != "pressure"]
+    commanded = {signal.joint for signal in signals if signal.kind == "command"}
+    for joint in np.flatnonzero(log.driven) + 1:
+        if joint not in commanded:
+            hint = f"map a column in log.joints.{joint}.command"
+            what = f"joint {joint} is driven but no column holds its command"
+            raise LogError(what, where=str(path), hint=hint)
+    for signal in signals:
+        if signal.kind == "angle" and not log.measured[signal.joint - 1]:
+            hint = f"set log.joints.{signal.joint}.angle: null"
+            raise LogError(f"joint {signal.joint} has no angle to write", where=str(path), hint=hint)
+    command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
+    columns = [_cells(signal, log, command) for signal in signals]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow([signal.name for signal in signals])
+    np.savetxt(text, np.stack(columns, axis=1), fmt=DIGITS, delimiter=",")
+    write_atomic(path, text.getvalue())
+
+
+def _cells(signal: Signal, log: Log, command: Floats) -> Floats:
+    """Return the column [file's unit] whose reading gives the log's values, shape (T,)."""
+    values = log.time
+    if signal.kind == "command":
+        values = signal.sign * command[:, signal.joint - 1]
+        values = values.clip(min=0.0) if signal.low == 0 else values
+    elif signal.kind == "angle":
+        values = log.angle[:, signal.joint - 1]
+    elif signal.kind == "pressure":
+        assert log.pressure is not None
+        values = log.pressure[:, signal.joint - 1, signal.chamber]
+    return (values - signal.offset) / signal.gain

@@ -34,7 +34,7 @@ def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: i
     period = 0.01
     command = np.zeros((round(len(levels) * dwell / period), len(pose)))
     command[:, joint - 1] = np.repeat(levels, round(dwell / period))
-    time = np.arange(len(command)) * period
+    time = np.arange(len(command), dtype=float) * period
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 

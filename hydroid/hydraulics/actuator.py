@@ -49,19 +49,16 @@ class Observation:
 
 
 class Actuator:
-    """All actuators of a population on one model.
+    """All actuators of a population on one model; `plugin` is what compiled code reads of them.
 
     Args:
-        parameters: of n candidates, from `records.nominal_parameters`, shape (n, J); the coil of an
-            infeasible one has no force, its spool never moves.
-        linkages: of the J joints, from `records.linkages`.
+        parameters: from `records.nominal_parameters`, shape (n, J); the coil of an infeasible candidate has
+            no force, its spool never moves.
+        linkages: from `records.linkages`, shape (J,).
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
         settings: for the sub-steps and the start pressure.
         entries: where M[i, j] stands in a row of `mass`, shape (J, J); by default rows are whole matrices.
-
-    Attributes:
-        plugin: all this as compiled code reads it.
     """
 
     def __init__(
@@ -91,21 +88,14 @@ class Actuator:
         self._history = 2 + int(np.ceil(parameters.delay.max() / period))
 
     def start(self, angle: Array, torque: Array) -> ActuatorState:
-        """Return the state at rest in static balance, with the plungers' coils at I_min.
+        """Return the state at rest at `angle` [rad], with the plungers' coils at I_min.
 
-        Args:
-            angle: [rad], shape (n, J).
-            torque: what the actuators must hold, g(q) [N·m], shape (n, J).
+        The torque g(q) [N·m] is what the actuators must hold; both have the shape (n, J).
         """
         c = self.plugin.coefficients
-        pressure_a, pressure_b = holding_pressures(
-            torque / _arm(c, angle),
-            c["area_a"],
-            c["area_b"],
-            c["supply_pressure"],
-            c["tank_pressure"],
-            self._level,
-        )
+        force = torque / np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
+        limits = c["supply_pressure"], c["tank_pressure"]
+        pressure_a, pressure_b = holding_pressures(force, c["area_a"], c["area_b"], *limits, self._level)
         fill_a, fill_b = _fills(c, angle)
         z = np.zeros(self.shape, JOINT_STATE)
         z["oil_a"] = pressure_a + c["bulk_modulus"] * fill_a
@@ -118,14 +108,10 @@ class Actuator:
     def advance(
         self, state: ActuatorState, command: ArrayLike, angle: Array, velocity: Array, mass: Array
     ) -> tuple[Array, Array]:
-        """Look ahead over one step.
+        """Look ahead over one step, during which the command [%], shape (J,), is held.
 
-        Args:
-            state: at the start of the step.
-            command: held during the step [%], shape (J,).
-            angle: [rad], shape (n, J).
-            velocity: [rad/s], shape (n, J).
-            mass: MuJoCo's `M` [kg·m²], shape (n, nC), with the armature of the step before.
+        Angle [rad] and velocity [rad/s], shape (n, J), are those at its start; `mass` [kg·m²], shape (n, nC),
+        contains the armature of the step before.
 
         Returns:
             Torque [N·m], damping included, and armature [kg·m²] for MuJoCo's step, shape (n, J) each.
@@ -138,16 +124,7 @@ class Actuator:
         return exchange.torque, exchange.armature
 
     def close(self, state: ActuatorState, velocity: Array, mass: Array) -> Array:
-        """Take over what MuJoCo's step made of the look-ahead.
-
-        Args:
-            state: after `advance`.
-            velocity: MuJoCo's new velocity [rad/s], shape (n, J).
-            mass: MuJoCo's `M` [kg·m²], shape (n, nC), now that of the step.
-
-        Returns:
-            The new angle [rad], shape (n, J).
-        """
+        """Take over MuJoCo's new velocity [rad/s] and `mass`; returns the new angle [rad], shape (n, J)."""
         angle = np.empty(self.shape)
         velocity, mass = np.ascontiguousarray(velocity), np.ascontiguousarray(mass)
         kernel.close(self.plugin, state.joints, velocity, mass, angle)
@@ -168,11 +145,6 @@ class Actuator:
         force = c["area_a"] * pressure[0] - c["area_b"] * pressure[1]
         flow = np.stack([z["flow_a"], -z["flow_b"]], axis=-1)
         return Observation(np.stack(pressure, axis=-1), flow, z["stroke_a"] - z["stroke_b"], force)
-
-
-def _arm(c: NDArray[np.void], angle: Array) -> Array:
-    """Moment arm [m]; 1 for a rotary actuator."""
-    return np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
 
 
 def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:

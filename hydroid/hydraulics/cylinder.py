@@ -44,13 +44,7 @@ def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
     """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while moving further in.
 
     F_c opposes the motion at both ends; the article's sign at the lower one would push the rod out of the
-    barrel.
-
-    Args:
-        travel: x [m].
-        speed: ẋ [m/s].
-        stroke: S [m].
-        penetration: K_p [N·s/m²].
+    barrel. Travel x and stroke S [m], speed ẋ [m/s], K_p [N·s/m²].
     """
     beyond = select(speed > 0.0, travel - stroke, select(speed < 0.0, -travel, 0.0))
     return penetration * np.maximum(beyond, 0.0)
@@ -69,15 +63,8 @@ def holding_pressures(
 
     They satisfy A_A p_A − A_B p_B = force. Balance leaves their common level open: p_B is `level`,
     raised or lowered until both pressures lie between tank and supply. For a load too heavy for that, the
-    nearest pressures that hold it are returned, one of them above supply.
-
-    Args:
-        force: A_A p_A − A_B p_B [N]; of a rotary actuator the torque [N·m].
-        area_a: A_A [m²], or D_m [m³/rad].
-        area_b: A_B, likewise.
-        supply: p_S [Pa].
-        tank: p_T [Pa].
-        level: wanted p_B [Pa].
+    nearest pressures that hold it are returned, one of them above supply. Of a rotary actuator the force is
+    the torque [N·m] and both areas are D_m [m³/rad].
     """
     low = np.maximum(tank, (area_a * tank - force) / area_b)
     high = np.minimum(supply, (area_a * supply - force) / area_b)

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.cylinder import friction_damping, stop_damping, triangle, volume
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import plunger_step, plunger_weight
+from hydroid.hydraulics.solenoid import coil_current, plunger_step, plunger_weight, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 
 

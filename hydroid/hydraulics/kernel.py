@@ -94,12 +94,10 @@ class Plugin(NamedTuple):
 
 
 class Pad(NamedTuple):
-    """Scratch space of one look-ahead."""
+    """Scratch space of one look-ahead: (J,) of SCRATCH; what the matrices of all sub-steps share, (J, J)."""
 
     joints: Any
-    """(J,), of SCRATCH"""
     common: Any
-    """what the matrices of all sub-steps share, (J, J); joints in the plugin's order"""
     matrix: Any
     gain: Any
 
@@ -115,30 +113,23 @@ class Exchange(NamedTuple):
     """What MuJoCo and the actuators of one candidate, or of n, tell each other at a step."""
 
     angle: Any
-    """[rad], (J,) or (n, J)"""
+    """[rad], (J,) or (n, J), as all but `mass`"""
     velocity: Any
-    """[rad/s], (J,) or (n, J)"""
     mass: Any
     """MuJoCo's `M` [kg·m²], (nC,) or (n, nC)"""
     torque: Any
-    """answer: damping included [N·m], (J,) or (n, J)"""
+    """answer: damping included [N·m]"""
     armature: Any
-    """answer: [kg·m²], (J,) or (n, J)"""
+    """answer: [kg·m²]"""
 
 
 @compilable
 def look_ahead(
     plugin: Plugin, candidate: int, state: Any, commands: Any, exchange: Exchange, pad: Pad
 ) -> None:
-    """Look ahead over one step of one candidate; writes the torque and armature of `exchange`.
+    """Look ahead over one step of one candidate; writes the torque and armature of its `exchange`.
 
-    Args:
-        plugin: of the population.
-        candidate: which one of it.
-        state: its actuators, (J,) of JOINT_STATE.
-        commands: up to the one that holds now, newest last [%], (.., J).
-        exchange: of this candidate.
-        pad: scratch space.
+    `state` is its actuators', (J,) of JOINT_STATE; the newest of the commands [%], (.., J), holds now.
     """
     coefficients, damping, order, entries, idle, period, substeps = plugin
     angle, velocity, mass, torque, armature = exchange

@@ -72,13 +72,9 @@ SCRATCH = np.dtype(
 def nominal_parameters(
     arm: Arm, settings: HydraulicSettings, joints: Sequence[int], candidates: int = 1
 ) -> Records:
-    """Return what the settings say, the same for all candidates, shape (n, J).
+    """Return what the settings say of the moving joints, the same for n candidates, shape (n, J).
 
-    Args:
-        arm: the arm's settings, for areas and valve openings.
-        settings: the hydraulics.
-        joints: the moving joints, 0-based, in the order of the stepped model.
-        candidates: n.
+    Joints are 0-based, in the order of the stepped model. Areas and valve openings are the arm's.
     """
     row = [_nominal(arm.joints[j], settings) for j in joints]
     return np.tile(np.array(row, PARAMETERS), (candidates, 1)).view(np.recarray)
@@ -98,11 +94,9 @@ def _nominal(joint: Joint, settings: HydraulicSettings) -> tuple[float, ...]:
 
 
 def with_values(parameters: Records, values: Mapping[str, Any]) -> Records:
-    """Return the parameters with some quantities replaced.
+    """Return the parameters, shape (n, J), with some quantities replaced; n may grow from 1.
 
-    Args:
-        parameters: shape (n, J).
-        values: by name, in the units of QUANTITIES, of shapes that broadcast to (n, J); n may grow from 1.
+    The values, by name in the units of QUANTITIES, have shapes that broadcast to (n, J).
     """
     shape = np.broadcast_shapes(parameters.shape, *(np.shape(v) for v in values.values()))
     replaced = np.broadcast_to(parameters, shape).copy().view(np.recarray)
@@ -127,12 +121,9 @@ def has_force_curve(parameters: Records) -> NDArray[np.bool_]:
 
 
 def linkages(arm: Arm, joints: Sequence[int], driven: Sequence[int]) -> Records:
-    """Return how joints are moved, a record array of LINKAGE, shape (J,).
+    """Return how the moving joints (0-based, as stepped) are moved, a record array of LINKAGE, shape (J,).
 
-    Args:
-        arm: the arm's settings.
-        joints: the moving joints, 0-based, in the order of the stepped model.
-        driven: those among them that have a hydraulic actuator; the others get none.
+    Those that are not `driven` have no hydraulic actuator.
     """
     table = np.zeros(len(joints), LINKAGE)
     for place, j in enumerate(joints):

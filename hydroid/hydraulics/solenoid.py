@@ -1,6 +1,12 @@
-"""Solenoid and plunger (article 2.2, equation (5)), one for each side of the spool.
+"""From the command in % to the plunger: calibration (article 2.1), amplifier, solenoid (2.2), one per side.
 
-The article parametrises its force by two points (x1, F1), (x2, F2) of the curve at rated current i0. Read as
+The calibration of the Compact Field Point lifts the voltage over the valve's dead zone as soon as there is a
+command: A and C are the voltages at the smallest command, B and D those at full command. The article
+estimates A and C and does not print B and D. 10 V, the amplifier's full scale, is ours. It lets the spool
+open over the whole range of the command.
+
+The article parametrises the solenoid's force, equation (5), by two points (x1, F1), (x2, F2) of the curve at
+rated current i0. Read as
 
     F = k i² / (x + δ)²,   r = √(F1/F2),   δ = (x2 − r x1) / (r − 1),   k i0² = F1 (x1 + δ)²,
 
@@ -16,6 +22,26 @@ import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, select
 
+FULL_SCALE = 10.0
+"""voltage from which the current is I_max [V], equation (4)"""
+
+
+@compilable
+def side_voltage(command: Any, onset: Any, full: Any) -> Any:
+    """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
+
+    For side A give (u, A, B), for side B (-u, C, D): command towards this side [%], voltage at the smallest
+    command and at 100 % [V]. It is 0 unless the command is positive.
+    """
+    return select(command > 0.0, onset + command * (full - onset) / 100.0, 0.0)
+
+
+@compilable
+def coil_current(voltage: Any, current_max: Any, current_min: Any) -> Any:
+    """Coil current [A], equation (4): I_min at 0 V, I_max from 10 V on, a straight line between."""
+    share = np.minimum(np.maximum(voltage, 0.0), FULL_SCALE) / FULL_SCALE
+    return current_min + share * (current_max - current_min)
+
 
 def curve_exists(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any) -> Any:
     """Whether a force-stroke curve runs through (stroke_1, force_1) and (stroke_2, force_2), elementwise."""
@@ -24,17 +50,9 @@ def curve_exists(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any) -> An
 
 
 def force_curve(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any, rated_current: Any) -> Any:
-    """Return the curve's constants k [N·m²/A²] and δ [m].
+    """Return the curve's constants k [N·m²/A²] and δ [m] from forces [N], strokes [m] and i0 [A].
 
-    Args:
-        force_1: at stroke_1 and rated current [N].
-        force_2: at stroke_2 and rated current [N].
-        stroke_1: [m].
-        stroke_2: [m].
-        rated_current: i0 [A].
-
-    Returns:
-        k and δ; where no curve exists, a coil without force: k = 0, δ = stroke_2.
+    Where no curve exists, it is a coil without force: k = 0, δ = stroke_2.
     """
     exists = curve_exists(force_1, force_2, stroke_1, stroke_2)
     ratio = np.sqrt(np.where(exists, force_1 / np.where(exists, force_2, 1.0), 4.0))
@@ -66,30 +84,16 @@ def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
 
 @compilable
 def plunger_weight(c: Any, step: Any) -> Any:
-    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff.
-
-    Args:
-        c: an actuator, with its `plunger_mass`, `plunger_damping`, `plunger_stiffness`.
-        step: [s].
-    """
+    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff."""
     natural = np.sqrt(3.0 * c.plunger_stiffness / c.plunger_mass)
     return implicit_weight(step * np.maximum(c.plunger_damping / c.plunger_mass, natural))
 
 
 @compilable
 def plunger_step(stroke: Any, speed: Any, drive: Any, step: Any, weight: Any, c: Any) -> Any:
-    """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step.
+    """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step [s]; stroke [m] and speed [m/s] after it.
 
-    Args:
-        stroke: [m].
-        speed: [m/s].
-        drive: k i² during the step [N·m²].
-        step: [s].
-        weight: of the new state, from `plunger_weight`.
-        c: an actuator, with its `gap`, `plunger_mass`, `plunger_damping`, `plunger_stiffness`.
-
-    Returns:
-        Stroke [m] and speed [m/s] after the step; a plunger that reaches its seat at x = 0 stops there.
+    The drive k i² [N·m²] holds during the step. A plunger that reaches its seat at x = 0 stops there.
     """
     force = coil_force(drive, stroke, c.gap)
     slope = c.plunger_stiffness + 2.0 * force / (stroke + c.gap)

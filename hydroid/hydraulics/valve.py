@@ -26,13 +26,7 @@ def spool(stroke_a: Any, stroke_b: Any) -> Any:
 
 @compilable
 def opening(spool: Any, c: Any) -> Any:
-    """Opening A(x) of both metering edges [m²], without leakage.
-
-    Args:
-        spool: x [m]; x > 0 opens towards A.
-        c: an actuator, with its `opening_a`, `opening_b`, `slot_width`, `overlap_a`, `overlap_b` and
-            `opening_exponent`.
-    """
+    """Opening A(x) of both metering edges [m²], without leakage, at x [m]; x > 0 opens towards A."""
     towards_a = spool > 0.0
     beyond = np.abs(spool) - select(towards_a, c.overlap_a, c.overlap_b)
     fraction = np.minimum(np.maximum(beyond, 0.0) / c.slot_width, 1.0)
@@ -55,17 +49,9 @@ def root(drop: Any, transition: Any) -> Any:
 
 @compilable
 def port_flow(pressure: Any, pump_area: Any, tank_area: Any, c: Any) -> Any:
-    """Flow into a chamber through its two edges, (7) and (8).
+    """Flow Q [m³/s] into a chamber at a pressure [Pa] through its two edges, openings [m²], (7) and (8).
 
-    Args:
-        pressure: in the chamber [Pa].
-        pump_area: opening towards the pump [m²].
-        tank_area: opening towards the tank [m²].
-        c: an actuator, with its `supply_pressure`, `tank_pressure`, `transition_pressure`, `flow_limit` and
-            `conductance`.
-
-    Returns:
-        Q [m³/s] and -dQ/dp [m³/(s Pa)], which is never negative.
+    Also returns -dQ/dp [m³/(s Pa)], which is never negative.
     """
     into, into_slope = root(c.supply_pressure - pressure, c.transition_pressure)
     out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)

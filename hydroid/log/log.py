@@ -85,8 +85,8 @@ class Log:
 class Finding:
     """What is wrong or worth knowing, where, and what to do.
 
-    An `error`: the log cannot be used; a `warning`: look at it; a `note`: what the reader did. `line` [1-based]
-    is that of the first place, and `column` its name in the header, where there is one.
+    An error: the log cannot be used; a warning: look at it; a note: what the reader did. `line` [1-based] is
+    that of the first place, and `column` its name in the header, where there is one.
     """
 
     level: Level

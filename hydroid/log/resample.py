@@ -36,9 +36,10 @@ def unwrap(recording: Recording) -> tuple[Recording, list[Finding]]:
 
 
 def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]]:
-    """Fill gaps up to `longest` [s] besides the usual step: interpolate angles, hold commands, insert samples.
+    """Fill gaps: interpolate angles, hold commands, insert dropped samples.
 
-    Rows without a time are dropped, and put back if they leave a gap.
+    A gap is at most `longest` [s] besides the usual step between samples. Rows without a time are dropped,
+    and put back if they leave a gap.
     """
     timed = ~np.isnan(recording.time)
     lost, first = int((~timed).sum()), recording.lines[~timed][:1]

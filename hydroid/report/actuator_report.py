@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.records import coefficients, linkages
-from hydroid.hydraulics.solenoid import coil_force, curve_exists, resting_stroke
+from hydroid.hydraulics.solenoid import coil_current, coil_force, curve_exists, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
 from hydroid.report import style

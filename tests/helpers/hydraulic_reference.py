@@ -10,6 +10,7 @@ from math import cos, inf, log, radians, sin, sqrt
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from numpy.typing import ArrayLike
 from scipy.integrate import Radau
 
 from hydroid.hydraulics.actuator import Actuator
@@ -28,14 +29,14 @@ TEN = {
 }  # fmt: skip
 
 
-def parameters(settings: HydraulicSettings, **values: object) -> Records:
+def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
     """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
     base = settings.model_dump() | {"flow_limit": settings.flow_limit or inf} | TRUTH
     one = np.zeros((1, 1), PARAMETERS).view(np.recarray)
     return with_values(
         one,
         {k: np.reshape(base[k], (-1, 1)) for k in QUANTITIES}
-        | {k: np.reshape(v, (-1, 1)) for k, v in values.items()},
+        | {k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()},
     )
 
 

@@ -21,7 +21,7 @@ def errors(p: Records, command: np.ndarray, exact: np.ndarray, **steps: int) -> 
 def test_default_settings_hold_the_bound_over_the_search_space():
     rng = np.random.default_rng(21)
     command, p = pulses(rng, 300), parameters(SETTINGS, **draw(rng, 3))
-    exact = np.array([reference(p[i : i + 1], command)[0] for i in range(3)])
+    exact = np.array([reference(p[i : i + 1].view(np.recarray), command)[0] for i in range(3)])
     error = errors(p, command, exact)
     assert np.ptp(exact, axis=1).max() > np.radians(10)
     assert np.median(np.sqrt((error**2).mean(axis=1))) < 0.1

@@ -218,7 +218,7 @@ def test_delay_shifts_the_response():
     assert np.ptp(prompt) > 0.05
     assert abs(near - late).max() < 1e-5  # continuous through a whole number of samples
     # part of a sample: against steps of 2.5 ms, of which the delay is a whole number
-    exact = simulate(p[3:], command, fine, steps=4)[0]
+    exact = simulate(p[3:].view(np.recarray), command, fine, steps=4)[0]
     assert abs(between - exact).max() < 0.1 * abs(late - exact).max()
 
 
@@ -239,7 +239,7 @@ def test_an_infeasible_member_stands_still_and_harms_nobody():
     assert has_force_curve(p).tolist() == [True, False, True]
     assert abs(angle[1] - START).max() < 1e-9
     np.testing.assert_array_equal(angle[0], angle[2])
-    np.testing.assert_array_equal(simulate(p[[0]], command, TIGHT)[0], angle[0])
+    np.testing.assert_array_equal(simulate(p[[0]].view(np.recarray), command, TIGHT)[0], angle[0])
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():

@@ -48,7 +48,7 @@ def test_the_arm_holds_its_pose_without_command(arm: Arm):
 def test_company_threads_and_chunks_change_no_bit(arm: Arm):
     p, command = candidates(arm, 7), commands(150, ALL)
     together = DrivenArm(arm, p, ALL, SETTINGS, threads=2).run(command)
-    apart = [DrivenArm(arm, p[i : i + 3], ALL, SETTINGS).run(command) for i in (0, 3, 6)]
+    apart = [DrivenArm(arm, p[i : i + 3].view(np.recarray), ALL, SETTINGS).run(command) for i in (0, 3, 6)]
     np.testing.assert_array_equal(together, np.concatenate(apart))
 
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hydroid.hydraulics.amplifier import coil_current, side_voltage
 from hydroid.hydraulics.cylinder import (
     friction_damping,
     holding_pressures,
@@ -16,12 +15,14 @@ from hydroid.hydraulics.cylinder import (
 )
 from hydroid.hydraulics.records import has_force_curve, linkages, nominal_parameters, with_values
 from hydroid.hydraulics.solenoid import (
+    coil_current,
     coil_force,
     curve_exists,
     force_curve,
     plunger_step,
     plunger_weight,
     resting_stroke,
+    side_voltage,
 )
 from hydroid.hydraulics.valve import conductance, opening, port_flow, root
 from hydroid.settings.arm import Arm
@@ -58,7 +59,7 @@ def test_force_curve_runs_through_both_points():
 
 
 @pytest.mark.parametrize("broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)])
-def test_impossible_curves_are_marked_and_have_no_force(broken: tuple[float, ...]):
+def test_impossible_curves_are_marked_and_have_no_force(broken: tuple[float, float, float, float]):
     assert not curve_exists(*broken)
     coil, gap = force_curve(*broken, 0.9)
     assert coil == 0.0

@@ -30,7 +30,7 @@ def mentions(log: Log, folder: Path, settings: LogSettings | None = None) -> lis
 @pytest.mark.parametrize("samples", [-30, -10, 0, 25, 100])
 def test_the_lag_follows_a_shift_to_the_sample(name: str, samples: int) -> None:
     log = rig(name)
-    for joint in np.flatnonzero(log.driven) + 1:
+    for joint in (np.flatnonzero(log.driven) + 1).tolist():
         own, moved = suggest_delay(log, joint), suggest_delay(shifted(log, samples * log.period), joint)
         assert own is not None
         assert moved is not None
@@ -74,7 +74,7 @@ def spring_arm(command: np.ndarray, delay: int = 0, noise_deg: float = 0.05) -> 
             speed = (speed + h / 8 * (0.2 * u - 53.4 * position)) / (1 + h * 231.8 / 8)
             position += h * speed
     q += np.deg2rad(noise_deg) * np.random.default_rng(5).normal(size=len(q))
-    time = np.arange(len(q)) * 0.01
+    time = np.arange(len(q), dtype=float) * 0.01
     return Log("spring", time, command[:, None], q[:, None], 0.01)
 
 
@@ -113,7 +113,7 @@ def stopping_joint(command: np.ndarray, stop_deg: float, delay: int, seed: int) 
         if abs(angle) > stop:
             angle, speed = np.clip(angle, -stop, stop), 0.0
     q += np.deg2rad(0.05) * np.random.default_rng(seed).normal(size=len(q))
-    return Log("stop", np.arange(len(q)) * 0.01, command[:, None], q[:, None], 0.01)
+    return Log("stop", np.arange(len(q), dtype=float) * 0.01, command[:, None], q[:, None], 0.01)
 
 
 @pytest.mark.parametrize("stop_deg", [5, 15, 40])
@@ -140,5 +140,5 @@ def test_noise_alone_has_no_delay() -> None:
     for _ in range(40):
         noise = rng.normal(size=log.angle.shape)
         assert suggest_delay(replace(log, angle=noise), 2) is None
-    assert suggest_delay(replace(log, angle=np.full_like(noise, np.nan)), 2) is None
+    assert suggest_delay(replace(log, angle=np.full_like(log.angle, np.nan)), 2) is None
     assert suggest_delay(log, 1) is None

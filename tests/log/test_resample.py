@@ -48,7 +48,7 @@ def test_samples_on_the_grid_pass_unchanged() -> None:
 
 
 def test_an_unmeasured_joint_stays_unmeasured_off_the_grid() -> None:
-    time = np.arange(100) * 0.013
+    time = np.arange(100, dtype=float) * 0.013
     angle = np.stack([np.full(100, np.nan), time], axis=1)
     _, _, q = resample(time, np.zeros((100, 2)), angle, 0.01)
     assert np.isnan(q[:, 0]).all()

@@ -19,7 +19,7 @@ signed = names.map(lambda n: "u" + n + "{joint}")
 pairs = names.map(lambda n: ["p" + n + "{joint}", "n" + n + "{joint}"])
 scales = st.sampled_from([1, 0.1, 6.25, 10])
 logs = st.builds(
-    lambda u, q, period: Log("x", np.arange(T) * period, u, q, period),
+    lambda u, q, period: Log("x", np.arange(T, dtype=float) * period, u, q, period),
     arrays(np.float64, (T, 2), elements=st.integers(-1000, 1000).map(lambda n: n / 10)),
     arrays(np.float64, (T, 2), elements=st.floats(-0.5, 1.5)),
     st.sampled_from([0.01, 0.02]),
@@ -70,7 +70,7 @@ def test_a_rig_log_survives_to_the_bit(name: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.angle, log.angle)
 
 
-LOG = Log("x", np.arange(T) * 0.01, np.ones((T, 2)), np.zeros((T, 2)), 0.01)
+LOG = Log("x", np.arange(T, dtype=float) * 0.01, np.ones((T, 2)), np.zeros((T, 2)), 0.01)
 
 
 def test_nothing_is_lost_silently(tmp_path: Path) -> None:

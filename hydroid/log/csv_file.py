@@ -24,15 +24,7 @@ MAX_LINE = 100_000  # characters; also below the csv module's own limit for one 
 
 @dataclass(frozen=True)
 class CsvFile:
-    """The lines of a file and its header.
-
-    Attributes:
-        source: the file.
-        lines: all lines of the file.
-        header: line number of the header [1-based].
-        names: of the columns.
-        separator: between cells.
-    """
+    """All lines of a file, the line [1-based] of its header, and the names of its columns."""
 
     source: str
     lines: Sequence[str]
@@ -75,11 +67,9 @@ def open_csv(path: Path) -> CsvFile:
 
 
 def read_cells(file: CsvFile, columns: Sequence[int]) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
-    """Read the numbers of the given columns.
+    """Read the numbers of the given columns, shape (R, columns), NaN where a cell holds none.
 
-    Returns:
-        Numbers, shape (R, columns), NaN where a cell holds none and in ragged rows; the line of each row
-        [1-based], shape (R,); and which rows have more or fewer cells than the header, shape (R,).
+    Also returns the line [1-based] of each row, and which rows have more or fewer cells than the header.
     """
     width, separator = len(file.names), file.separator
     below = range(file.header, len(file.lines))
@@ -96,7 +86,7 @@ def read_cells(file: CsvFile, columns: Sequence[int]) -> tuple[Floats, NDArray[n
         cells = _split(row, separator)
         ragged[k] = len(cells) < width or (len(cells) > width and any(map(str.strip, cells[width:])))
         if not ragged[k]:
-            values[k] = [_number(cells[column]) for column in columns]
+            values[k] = [float(cells[c]) if _is_number(cells[c]) else np.nan for c in columns]
     return values, lines, ragged
 
 
@@ -151,10 +141,6 @@ def _separator(header: str, row: str) -> str:
 
 def _split(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
-
-
-def _number(cell: str) -> float:
-    return float(cell) if _is_number(cell) else float("nan")
 
 
 def _is_number(cell: str) -> bool:

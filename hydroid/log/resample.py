@@ -101,14 +101,10 @@ def _count(number: int, noun: str) -> str:
 def resample(
     time: Floats, command: Floats, angle: Floats, period: float, delay: float = 0.0
 ) -> tuple[Floats, Floats, Floats]:
-    """Bring a recording to the grid k · period, from its first sample to its last.
+    """Bring a recording to the grid k · period [s], from its first sample to its last.
 
-    Args:
-        time: [s], shape (R,), strictly increasing.
-        command: [%], shape (R, J).
-        angle: [rad], and other signals that are interpolated, shape (R, M).
-        period: [s].
-        delay: the command acts this much later [s] than logged; before the first one acts it is 0 %.
+    Commands, shape (R, J), act `delay` [s] later than logged, and are 0 % before the first one acts. Angles
+    and other signals that are interpolated have the shape (R, M); times [s] increase strictly.
 
     Returns:
         Grid [s] from 0, shape (T,); command and angle, shapes (T, J) and (T, M).

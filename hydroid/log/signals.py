@@ -44,12 +44,8 @@ class Signal:
 class Recording:
     """The used columns of one file, R rows of C signals, time first.
 
-    Attributes:
-        file: the lines they come from.
-        signals: C of them.
-        values: [s, %, rad], shape (R, C), NaN where the file holds no number.
-        lines: line of each row [1-based], shape (R,).
-        ragged: rows whose number of cells is wrong, shape (R,).
+    Values are in [s], [%], [rad] or [Pa], shape (R, C), NaN where the file holds no number. `lines`, (R,), is
+    the line [1-based] of each row; `ragged`, (R,), marks rows whose number of cells is wrong.
     """
 
     file: CsvFile

@@ -3,8 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from log_files import NAMES, RANGES, RIG, RIG_RANGES, cells, faults, lines, read, save
 
 from hydroid.errors import LogError
@@ -24,55 +22,6 @@ def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
     np.testing.assert_allclose(log.time, raw[:, 0], atol=1e-12)
     assert (log.driven == raw[:, 1:8].any(axis=0)).all()
     assert log.measured.all()
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    st.integers(1, 80),
-    st.integers(0, 4),
-    st.floats().map(repr)
-    | st.floats(-120, 120).map(lambda x: f"{x:.3f}")
-    | st.sampled_from(
-        ["", " ", "nan", "NaN", "inf", "-inf", "1e3", "1_0", "1,5", "--", "#N/A", "0x1F", "1e999", "٣"]
-    )
-    | st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=8),
-)
-def test_one_bad_cell_is_named_or_harmless(
-    tmp_path_factory: pytest.TempPathFactory, row: int, column: int, text: str
-) -> None:
-    rows = lines(cells())
-    rows[row][column] = text
-    file = save(tmp_path_factory.getbasetemp() / "bad.csv", rows)
-    errors, line = faults(file), row + 1
-    where = {(error.line, error.column) for error in errors}
-    if len(",".join(rows[row]).split(",")) != 5 or '"' in text:
-        assert {(line, ""), (line, NAMES[column])} & where or '"' in text
-        return
-    value = float(text) if text.strip() and "_" not in text and _is_float(text) else np.nan
-    if column == 0:
-        near = {(line + k, "time_s") for k in (0, 1)}
-        assert near & where if not np.isfinite(value) and row not in (1, 80) else where <= near
-    elif not abs(value) < 1e100:
-        assert (line, NAMES[column]) in where
-    elif column < 3:
-        assert where == ({(line, NAMES[column])} if abs(value) > 100 + 1e-6 else set())
-    elif column == 3:
-        low, high = np.rad2deg(RANGES[0]) + np.array([-1, 1])
-        assert where == ({(line, NAMES[column])} if not low <= value <= high else set())
-    else:
-        assert where <= {(line, NAMES[column]), (line + 1, NAMES[column])}
-        far = min(abs(value - cells()[r - 1, 4]) for r in (row - 1, row + 1) if 1 <= r <= 80)
-        assert where or far < 405
-    if not errors and column in (1, 2):
-        assert read(file)[0].command[row - 1, column - 1] == np.clip(value, -100, 100)
-
-
-def _is_float(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """The report of one actuator: its curves at rest, from the command to the joint's torque."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -64,32 +63,25 @@ def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> 
 
 
 def actuator_page(actuator: JointActuator) -> Page:
-    """Return the page of an actuator: all curves as one figure and each as its own."""
-    everything = Plot(
-        "actuator", "Numbers in brackets are the article's equations.", partial(overview, actuator)
+    """Return the page of an actuator: all its curves as one figure."""
+    caption = (
+        "Numbers in brackets are the article's equations. Dots: where the plunger rests at each current."
     )
-    single_ones = tuple(Plot(n, text, partial(single, actuator, n)) for n, (_, text) in PANELS.items())
-    sections = Section("All curves", plots=(everything,)), Section("One by one", plots=single_ones)
+    section = Section(
+        "From the command to the torque", plots=(Plot("actuator", caption, partial(draw, actuator)),)
+    )
     lead = "What its parameters mean at rest, from the command to the torque at the joint."
-    return Page("actuator", f"Actuator of {actuator.title.lower()}", lead, sections)
+    return Page("actuator", f"Actuator of {actuator.title.lower()}", lead, (section,))
 
 
-def overview(actuator: JointActuator) -> Figure:
-    """Draw all panels of an actuator on one page."""
+def draw(actuator: JointActuator) -> Figure:
+    """Draw all curves of an actuator."""
     drawing = style.figure(11.0, 7.6, left=0.65, top=0.75, bottom=0.5)
     style.headline(drawing, actuator.title)
-    axes = drawing.subplots(4, 2, gridspec_kw={"hspace": 0.45, "wspace": 0.25})
-    for each, (panel, _) in zip(axes.flat, PANELS.values(), strict=True):
-        panel(each, actuator)
-    return drawing
-
-
-def single(actuator: JointActuator, name: str) -> Figure:
-    """Draw one panel, by its name in `PANELS`."""
-    drawing = style.figure(3.8)
-    axes = drawing.subplots()
-    PANELS[name][0](axes, actuator)
-    axes.set_title(f"{actuator.title}: {axes.get_title(loc='left').lower()}")
+    panels = drawing.subplots(4, 2, gridspec_kw={"hspace": 0.45, "wspace": 0.25})
+    curves = _calibration, _current, _force, _spool, _opening, _flow, _pressure_flow, _torque
+    for axes, curve in zip(panels.flat, curves, strict=True):
+        curve(axes, actuator)
     return drawing
 
 
@@ -175,22 +167,6 @@ def _torque(axes: Axes, actuator: JointActuator) -> None:
     axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     lever = f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm" if linkage else ""
     _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
-
-
-PANELS: dict[str, tuple[Callable[[Axes, JointActuator], None], str]] = {
-    "calibration": (_calibration, "Voltage of each side against the command."),
-    "current": (_current, "Coil current of each side against the command."),
-    "force": (
-        _force,
-        "Solenoid force and spring against the stroke; dots: where the plunger rests at each current.",
-    ),
-    "spool": (_spool, "Spool displacement at rest against the command."),
-    "opening": (_opening, "Valve opening against the spool displacement."),
-    "flow": (_flow, "Flow from the pump against the spool displacement for several pressure drops."),
-    "pressure_flow": (_pressure_flow, "Flow from the pump into chamber A against its pressure."),
-    "torque": (_torque, "Largest static torque against the joint's angle."),
-}
-"""the panels by name, in the order of the chain, and what each shows"""
 
 
 def _voltages(p: Any, command: Array) -> tuple[Array, Array]:

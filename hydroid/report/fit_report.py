@@ -86,14 +86,10 @@ def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
         ),
         Section("What was fitted", facts=_facts(identity, problem)),
     )
-    data = {
-        "tables/pareto.csv": pareto_table(problem, fit).csv(),
-        "history.csv": _history(fit),
-        "pareto.csv": _pareto(problem, fit),
-    }
     versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
     title = f"Parameters of {problem.settings.arm.name}"
-    return Page("report", title, fit_summary(fit), sections, fit_warnings(problem, fit), versions, data)
+    warnings, data = fit_warnings(problem, fit), _data(problem, fit)
+    return Page("report", title, fit_summary(fit), sections, warnings, versions, data)
 
 
 def parameter_table(problem: Problem, fit: Fit) -> Table:
@@ -141,19 +137,6 @@ def objective_table(problem: Problem, fit: Fit) -> Table:
     column = "objective [-]" if objective.relative else "objective [deg]"
     header = ("estimate", "log", "joint", *INDICES, column)
     return Table("Output error on the fitted logs", header, tuple(rows), note, (INDICES[0], column))
-
-
-def pareto_table(problem: Problem, fit: Fit) -> Table:
-    """Return the non-dominated candidates of the last population, best overall first."""
-    theta, evaluation = fit.front
-    objective = problem.settings.objective
-    segments, overall = (in_reader_units(objective, a) for a in (evaluation.segments, evaluation.overall))
-    header = [f"{p.name} [{p.unit}]" for p in problem.parameters.parameters]
-    header += [f"segment {s}" for s in range(1, segments.shape[1] + 1)]
-    rows = tuple(
-        tuple(map(float, (*theta[i], *segments[i], overall[i]))) for i in np.argsort(overall, kind="stable")
-    )
-    return Table("Pareto set", (*header, "whole record"), rows, f"Objectives: {norm_label(objective)}.")
 
 
 def index_cells(indices: ErrorIndices) -> tuple[float, ...]:
@@ -206,17 +189,13 @@ def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
     return tuple(facts)
 
 
-def _history(fit: Fit) -> str:
-    """Return the history with every bit, in the search's units: rad unless relative."""
+def _data(problem: Problem, fit: Fit) -> dict[str, str]:
+    """Return the history and the Pareto set with every bit, in the search's units: rad unless relative."""
     counts = len(HISTORY) - 2
     rows = tuple((*(int(v) for v in row[:counts]), *(float(v) for v in row[counts:])) for row in fit.history)
-    return Table("", HISTORY, rows).csv()
-
-
-def _pareto(problem: Problem, fit: Fit) -> str:
-    """Return the Pareto set with every bit, in the search's units."""
     theta, evaluation = fit.front
     unit = "" if problem.settings.objective.relative else "_rad"
     segments = (f"segment_{s}{unit}" for s in range(1, evaluation.segments.shape[1] + 1))
     header = (*problem.parameters.names, *segments, f"overall{unit}")
-    return numbers_csv(header, np.column_stack([theta, evaluation.segments, evaluation.overall]))
+    front = np.column_stack([theta, evaluation.segments, evaluation.overall])
+    return {"history.csv": Table("", HISTORY, rows).csv(), "pareto.csv": numbers_csv(header, front)}

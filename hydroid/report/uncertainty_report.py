@@ -14,7 +14,7 @@ from hydroid.problem.problem import Problem
 from hydroid.report import style
 from hydroid.report.page import Page, Plot, Section, log_names
 from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
-from hydroid.report.table import Cell, Table, plain, unless_nan
+from hydroid.report.table import Cell, Table, unless_nan
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.directions import Identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE
@@ -35,7 +35,6 @@ _CAPTIONS = {
     "singular_values": "The inverse of the relative standard deviation of each combination, from the noise "
     f"that the logs show. Below the dashed line the standard deviation is above {100 * WEAK_ABOVE:.0f} %. A "
     "hollow mark at the foot: the combination has no effect on the logs.",
-    "directions": "Each column is one combination of relative changes, best determined first.",
     "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
     "identifiable are left out.",
     "profiles": "The error, in units of the noise, with one parameter held and the others fitted again. "
@@ -77,23 +76,14 @@ def uncertainty_page(study: UncertaintyStudy) -> Page:
 
 def determined_section(problem: Problem, uncertainty: Uncertainty, result: Identifiability) -> Section:
     """Return the section about directions and noise."""
+    values = Plot("singular_values", _CAPTIONS["singular_values"], partial(singular_values, result))
+    drawn = partial(correlation, uncertainty, result.names)
+    correlations = Plot("correlation", _CAPTIONS["correlation"], drawn)
     return Section(
         "Which combinations the logs determine",
         points=direction_phrases(problem, result),
         tables={"directions": direction_table(result), "noise": noise_table(problem, uncertainty)},
-        plots=tuple(
-            Plot(name, _CAPTIONS[name], draw)
-            for name, draw, shown in (
-                ("singular_values", partial(singular_values, result), True),
-                ("directions", partial(directions, result), True),
-                (
-                    "correlation",
-                    partial(correlation, uncertainty, result.names),
-                    _correlated(uncertainty).sum() > 1,
-                ),
-            )
-            if shown
-        ),
+        plots=(values, correlations) if np.sum(_correlated(uncertainty)) > 1 else (values,),
     )
 
 
@@ -189,24 +179,27 @@ def singular_values(result: Identifiability) -> Figure:
     return drawing
 
 
-def directions(result: Identifiability) -> Figure:
-    """Draw the directions as a map, one per column, with their standard deviations below."""
-    deviations = [f"{plain(float(f'{100 / v:.2g}'))} %" if v > 0.1 else "∞" for v in result.singular]
-    drawing = _map(result.axes.T, result.names, deviations)
-    axes = drawing.axes[0]
-    axes.set_title("Share of each parameter in each direction")
-    axes.set_xlabel("relative standard deviation along the direction")
-    for label, value in zip(axes.get_xticklabels(), result.singular, strict=True):
-        label.set_color(style.MEASURED if value >= 1 / WEAK_ABOVE else style.REFINED)
-    return drawing
-
-
 def correlation(uncertainty: Uncertainty, names: Sequence[str]) -> Figure:
-    """Draw the correlation of the estimates that are identifiable."""
+    """Draw the correlation of the estimates that are identifiable, with numbers where there is room."""
     shown = _correlated(uncertainty)
     names = [name for name, each in zip(names, shown, strict=True) if each]
-    drawing = _map(uncertainty.correlation[np.ix_(shown, shown)], names, names)
-    drawing.axes[0].set_title("Correlation of the estimates")
+    values = uncertainty.correlation[np.ix_(shown, shown)]
+    room = style.room_for(names)
+    drawing = style.figure(1.5 + _CELL * len(names), left=room, right=0.1, bottom=0.2 + 0.7 * room)
+    axes = drawing.subplots()
+    image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xticks(range(len(names)), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    if len(names) <= _MOST_NUMBERS:
+        for (i, j), value in np.ndenumerate(values):
+            color = "white" if abs(value) > 0.6 else style.MEASURED
+            text = f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
+            axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
+    drawing.colorbar(image, ax=axes, shrink=0.8, pad=0.02)
+    axes.set_title("Correlation of the estimates")
     return drawing
 
 
@@ -243,29 +236,4 @@ def draw_profiles(study: UncertaintyStudy) -> Figure:
         axes.set_ylabel("deviance")
     panels[0].set_title("Error with one parameter held and the others fitted again")
     style.legend_below(drawing, panels[0], columns=4)
-    return drawing
-
-
-def _map(values: Array, rows: Sequence[str], columns: Sequence[str]) -> Figure:
-    """Draw numbers from -1 to 1 as colours, with the numbers where there is room."""
-    drawing = style.figure(
-        1.5 + _CELL * len(rows),
-        left=style.room_for(rows),
-        right=0.1,
-        bottom=0.5 + 0.7 * style.room_for(columns, 8),
-    )
-    axes = drawing.subplots()
-    image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
-    axes.set_yticks(range(len(rows)), rows)
-    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.tick_params(length=0)
-    axes.grid(False)
-    axes.spines[["left", "bottom"]].set_visible(False)
-    if max(values.shape) <= _MOST_NUMBERS:
-        for (i, j), value in np.ndenumerate(values):
-            if np.isfinite(value):
-                color = "white" if abs(value) > 0.6 else style.MEASURED
-                text = f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
-                axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
-    drawing.colorbar(image, ax=axes, shrink=0.8, pad=0.02)
     return drawing

@@ -7,7 +7,7 @@ import pytest
 from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.fitting.validation import error_indices
-from hydroid.report.fit_report import objective_table, parameter_table, pareto_table
+from hydroid.report.fit_report import objective_table, parameter_table
 from hydroid.report.page import log_names
 from hydroid.report.phrases import fit_warnings, parameter_advice
 from hydroid.report.responses import joint_responses
@@ -95,17 +95,6 @@ def test_a_relative_objective_has_no_unit():
     fit = make_fit(problem)
     overall = [e.overall for e in fit.estimates.values()]
     assert column(objective_table(problem, fit), "objective [-]") == overall
-    assert "relative rms error" in pareto_table(problem, fit).note
-
-
-def test_pareto_table_holds_the_front_best_first():
-    problem = make_problem()
-    fit = make_fit(problem)
-    table = pareto_table(problem, fit)
-    overall = column(table, "whole record")
-    assert overall == sorted(overall)
-    assert overall == pytest.approx(np.degrees(np.sort(fit.front[1].overall)))
-    assert {row[0] for row in table.rows} == set(fit.front[0][:, 0])
 
 
 def test_joint_responses_cut_the_long_row_apart_again():

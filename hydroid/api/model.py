@@ -82,7 +82,7 @@ def build_model(
     if meshes is not None:
         settings = settings.model_copy(update={"meshes": Path(meshes).resolve()})
     target = Path(out or settings.model)
-    from hydroid.arm.model import write_model
+    from hydroid.arm.build import write_model
 
     write_model(settings, target)
     return target

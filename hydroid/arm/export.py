@@ -1,11 +1,21 @@
-"""The files of `model/`: the arm as it came, and the fitted arm for programs other than hydroid."""
+"""An arm with locked joints as an MJCF with its looks: what a plant steps and shows, and what is exported.
 
+The bodies are those of `hydroid.arm.locked`, with the inertia of all that is fused into them. Shapes, sites,
+cameras and lights of a fused body hang on the body that carries it; contacts are off, as in every simulation.
+"""
+
+import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 import yaml
+from numpy.typing import ArrayLike
 
+from hydroid.arm.locked import Array, Frame, LockedArm, copy_joints
+from hydroid.arm.model import quiet_mujoco
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
 
@@ -35,14 +45,135 @@ mechanics.xml is the fitted arm without its hydraulics: masses, dampers and spri
 moving joints are {joints}; the others are fused in the start pose, which is the keyframe `start`.
 actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm before the fit.
 """
+_LEFT_OUT = ("contact", "equality", "sensor", "keyframe", "actuator", "deformable", "size")
+_COMPILER = ("angle", "autolimits", "eulerseq", "meshdir", "texturedir", "strippath")
+_OF_A_LINK = ("body", "inertial", "joint", "freejoint")
+_BODY_FIELDS = ("pos", "quat", "ipos", "iquat", "mass", "inertia", "simple", "sameframe")
+
+
+def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
+    """Return the locked arm's model with shapes, cameras and one idle motor per joint.
+
+    It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are free to hold
+    commands in %.
+    """
+    source, home = spec.copy(), Path(spec.modelfiledir).resolve()
+    source.meshdir, source.texturedir = str(home / spec.meshdir), str(home / spec.texturedir)
+    text = arm_mjcf(source, locked, locked.model, np.zeros((2, len(locked.joints))))
+    with quiet_mujoco():
+        model = mujoco.MjModel.from_xml_string(text)
+    for name in (*("body_" + field for field in _BODY_FIELDS), "jnt_pos", "jnt_axis", "dof_simplenum"):
+        getattr(model, name)[:] = getattr(locked.model, name)
+    copy_joints(locked.model, model)
+    model.opt.disableflags = locked.model.opt.disableflags
+    return model
+
+
+def arm_mjcf(
+    spec: mujoco.MjSpec,
+    locked: LockedArm,
+    model: mujoco.MjModel,
+    motors: ArrayLike | None = None,
+) -> str:
+    """Return the MJCF of an arm with locked joints.
+
+    Args:
+        spec: the arm's MJCF, for its looks.
+        locked: which of its bodies move as one.
+        model: inertia and joints of the locked arm, and the time step; `locked.model` or one like it.
+        motors: torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
+            None: no motors.
+    """
+    source = spec.copy()
+    source.compiler.savecompiled = source.compiler.savecanonical = False  # canonical is six digits
+    root = ElementTree.fromstring(source.to_xml())
+    for name in _LEFT_OUT:
+        for section in root.findall(name):
+            root.remove(section)
+    compiler = _section(root, "compiler")
+    for name in compiler.attrib.keys() - _COMPILER:  # what changes weights or fuses bodies
+        del compiler.attrib[name]
+    compiler.set("inertiafromgeom", "false")
+    option = _section(root, "option")
+    option.set("timestep", repr(float(model.opt.timestep)))
+    _section(option, "flag").set("contact", "disable")
+    _fuse(root, locked.frames, model)
+    _keep_drawn_tendons(root)
+    if motors is not None:
+        actuators = _section(root, "actuator")
+        for name, gain, bias in zip(locked.joints, *np.asarray(motors), strict=True):
+            values = {"gainprm": _text([gain]), "biastype": "affine", "biasprm": _text([bias, 0, 0])}
+            limits = {"ctrllimited": "true", "ctrlrange": "-100 100"}
+            ElementTree.SubElement(actuators, "general", {"name": name, "joint": name} | values | limits)
+    pose = {"name": "start", "qpos": _text(model.qpos_spring)}
+    ElementTree.SubElement(_section(root, "keyframe"), "key", pose)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _fuse(root: ElementTree.Element, frames: tuple[Frame, ...], model: mujoco.MjModel) -> None:
+    """Put the locked arm's bodies in the place of all; what hangs on the others moves to them in frames."""
+    world, degrees = _section(root, "worldbody"), _section(root, "compiler").get("angle") != "radian"
+    above = {child: body for body in world.iter() for child in body.findall("body")}
+    inherited: dict[ElementTree.Element, dict[str, str]] = {world: {}}  # default class of a body's parts
+    kept = [ElementTree.Element("worldbody", world.attrib)]
+    homes = [(kept[0], world)]
+    for body, frame in zip(world.iter("body"), frames[1:], strict=True):  # in the order of their numbers
+        own = body.get("childclass")
+        inherited[body] = {"childclass": own} if own else inherited[above[body]]
+        k = frame.body
+        if k < len(kept):
+            placed = _frame(frame.position, frame.turn)
+            home = ElementTree.SubElement(kept[k], "frame", placed | inherited[body])
+        else:
+            named = {"name": body.get("name", "")} | _frame(model.body_pos[k], model.body_quat[k])
+            home = ElementTree.SubElement(kept[model.body_parentid[k]], "body", named | inherited[body])
+            mass = {"mass": _text([model.body_mass[k]]), "diaginertia": _text(model.body_inertia[k])}
+            placed = _frame(model.body_ipos[k], model.body_iquat[k])
+            ElementTree.SubElement(home, "inertial", placed | mass)
+            home.append(_joint(body, model, k - 1, degrees))
+            kept.append(home)
+        homes.append((home, body))
+    for home, body in homes:
+        home.extend([part for part in body if part.tag not in _OF_A_LINK])
+    root[list(root).index(world)] = kept[0]
+
+
+def _joint(body: ElementTree.Element, model: mujoco.MjModel, j: int, degrees: bool) -> ElementTree.Element:
+    joint, slack = body.findall("joint")[0], float(model.qpos_spring[j])
+    joint.set("damping", _text([model.dof_damping[j]]))
+    joint.set("stiffness", _text([model.jnt_stiffness[j]]))
+    joint.set("frictionloss", _text([model.dof_frictionloss[j]]))
+    joint.set("armature", _text([model.dof_armature[j]]))
+    joint.set("springref", _text([math.degrees(slack) if degrees else slack]))
+    return joint
+
+
+def _keep_drawn_tendons(root: ElementTree.Element) -> None:
+    """Keep tendons as drawings of cylinders: none of their forces is simulated."""
+    for section in root.findall("tendon"):
+        for tendon in list(section):
+            if tendon.tag != "spatial":
+                section.remove(tendon)
+            for name in tendon.attrib.keys() - {"name", "width", "rgba", "material", "group"}:
+                del tendon.attrib[name]
+
+
+def _section(root: ElementTree.Element, name: str) -> ElementTree.Element:
+    found = root.find(name)
+    return ElementTree.SubElement(root, name) if found is None else found
+
+
+def _frame(position: Array, turn: Array) -> dict[str, str]:
+    return {"pos": _text(position), "quat": _text(turn)}
+
+
+def _text(values: Array | list[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
 
 
 def copy_model(spec: mujoco.MjSpec, folder: Path) -> None:
-    """Write `arm.xml` and its meshes, so that a folder can be read where the original is gone.
-
-    Args:
-        spec: the arm's MJCF, which then names the copied meshes.
-        folder: receives the files.
+    """Write `arm.xml` and its meshes, which the spec then names, to a folder that stands alone.
 
     Raises:
         RunError: a mesh cannot be read, or the folder cannot be written.
@@ -73,7 +204,7 @@ def copy_model(spec: mujoco.MjSpec, folder: Path) -> None:
 def write_fitted(
     folder: Path, mjcf: str, timestep: float, joints: str, actuators: dict[str, Any] | None
 ) -> None:
-    """Write the fitted arm beside `arm.xml`, and a README that says what it is good for.
+    """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
     Args:
         folder: `model/`.

@@ -8,30 +8,28 @@ moving nothing but the fixed parts is fused, and the result is the whole arm wit
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hydroid.arm.quiet import quiet_mujoco
+from hydroid.arm.model import quiet_mujoco
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm
 
 Array = NDArray[np.float64]
 
-_OPTIONS = [
-    "timestep",
-    "gravity",
-    "integrator",
-    "solver",
-    "iterations",
-    "tolerance",
-    "jacobian",
-    "enableflags",
-]
-_JOINT_FIELDS = ["range", "limited", "margin", "solref", "solimp", "stiffness", "stiffnesspoly"]
-_DOF_FIELDS = ["damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp"]
+_OPTIONS = (
+    "timestep", "gravity", "integrator", "solver", "iterations", "tolerance", "jacobian", "enableflags"
+)  # fmt: skip
+_JOINT_FIELDS = (
+    *("jnt_" + field for field in ("range", "limited", "margin", "stiffness", "stiffnesspoly")),
+    *(prefix + field for prefix in ("jnt_", "dof_") for field in ("solref", "solimp")),
+    *("dof_" + field for field in ("damping", "dampingpoly", "armature", "frictionloss")),
+    *("qpos0", "qpos_spring"),
+)
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,17 @@ class _Part:
     """about its centre, for 1 kg [m²], shape (3, 3)"""
 
 
+class Frame(NamedTuple):
+    """Where a body of the whole arm is in the locked arm."""
+
+    body: int
+    """the body of the locked arm that it is part of"""
+    position: Array
+    """of its frame in that body, or in the parent of the body that it names [m], shape (3,)"""
+    turn: Array
+    """of the same, a quaternion (w, x, y, z)"""
+
+
 @dataclass(frozen=True)
 class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
@@ -63,12 +72,11 @@ class LockedArm:
     pose: Array
     """where they start [rad], shape (V,)"""
     parts: tuple[_Part, ...]
+    frames: tuple[Frame, ...]
+    """of all bodies of the whole arm; a moving joint's body comes before those that are fused with it"""
 
     def inertials(self, masses: Array) -> dict[str, Array]:
-        """Fuse the links; row k depends on masses[k] alone, to the last bit.
-
-        Args:
-            masses: of the links [kg], shape (n, L), columns as in `Arm.link_names`.
+        """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone, to the last bit.
 
         Returns:
             The fields of mjModel that describe the B bodies, the world first: body_mass [kg], shape (n, B);
@@ -91,119 +99,113 @@ class LockedArm:
         return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
 
 
-class Fusion:
-    """Which bodies move as one while some joints are locked.
+def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
+    """Lock all joints but the moving ones.
 
     Args:
         spec: the arm's model, as `load_model` returns it.
         arm: its settings, which name joints and links.
         moving: names of the joints that stay, in any order.
-        pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is ignored.
-
-    Attributes:
-        joints: the moving joints in the arm's order.
-        kept: bodies that remain, the world first.
-        carrier: for each body the kept body that it moves with.
+        pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
 
     Raises:
-        ModelError: nothing to move, or a name that is no joint.
+        ModelError: nothing to move, a name that is no joint, or a body without mass.
     """
-
-    def __init__(self, spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> None:
-        self.joints = tuple(name for name in arm.joint_names if name in moving)
-        if not self.joints or len(self.joints) < len(set(moving)):
-            wrong = sorted(set(moving) - set(self.joints))
-            what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
-            raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
-        with quiet_mujoco():
-            self.full = spec.compile()
-        self.data = mujoco.MjData(self.full)
-        for name, angle in zip(arm.joint_names, pose, strict=True):
-            if name not in self.joints:
-                self.data.joint(name).qpos[0] = angle
-        mujoco.mj_kinematics(self.full, self.data)
-        self.kept = [0, *(int(self.full.joint(name).bodyid[0]) for name in self.joints)]
-        self.carrier: list[int] = []
-        for body in range(self.full.nbody):
-            parent = self.full.body_parentid[body]
-            self.carrier.append(body if body in self.kept else self.carrier[parent])
-
-    def place(self, body: int, carrier: int) -> tuple[Array, Array]:
-        """Return position [m] and quaternion (w, x, y, z) of a body in a carrier's frame."""
-        data, turn = self.data, np.empty(4)
-        mujoco.mju_mulQuat(turn, data.xquat[carrier] * [1, -1, -1, -1], data.xquat[body])
-        return data.xmat[carrier].reshape(3, 3).T @ (data.xpos[body] - data.xpos[carrier]), turn
-
-
-def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
-    """Lock all joints but the moving ones; arguments and errors as of `Fusion`.
-
-    Raises:
-        ModelError: also a body without mass.
-    """
-    fusion = Fusion(spec, arm, moving, pose)
-    columns = np.array([arm.joint_names.index(name) for name in fusion.joints])
-    locked = LockedArm(_skeleton(fusion), fusion.joints, columns, pose[columns], _parts(fusion, arm))
-    masses = np.array([fusion.full.body(name).mass[0] for name in arm.link_names])
-    for name, value in locked.inertials(masses[None]).items():
-        getattr(locked.model, name)[:] = value[0]
+    joints = tuple(name for name in arm.joint_names if name in moving)
+    if not joints or len(joints) < len(set(moving)):
+        wrong = sorted(set(moving) - set(joints))
+        what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
+        raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
+    columns = np.array([arm.joint_names.index(name) for name in joints])
     with quiet_mujoco():
-        mujoco.mj_setConst(locked.model, mujoco.MjData(locked.model))
+        full = spec.compile()
+    data = mujoco.MjData(full)
+    for name, angle in zip(arm.joint_names, pose, strict=True):
+        if name not in joints:
+            data.joint(name).qpos[0] = angle
+    mujoco.mj_kinematics(full, data)
+    kept = [0, *(int(full.joint(name).bodyid[0]) for name in joints)]
+    frames = _frames(full, data, kept)
+    model = _skeleton(full, joints, kept, frames)
+    locked = LockedArm(model, joints, columns, pose[columns], _parts(full, data, arm, kept, frames), frames)
+    masses = np.array([full.body(name).mass[0] for name in arm.link_names])
+    for name, value in locked.inertials(masses[None]).items():
+        getattr(model, name)[:] = value[0]
+    with quiet_mujoco():
+        mujoco.mj_setConst(model, mujoco.MjData(model))
     return locked
 
 
-def _parts(fusion: Fusion, arm: Arm) -> tuple[_Part, ...]:
-    """Every body that moves and has mass, seen from its carrier."""
-    full, data = fusion.full, fusion.data
+def copy_joints(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
+    """Give a model the options of another, and the properties of its joints by their names."""
+    joints = [source.joint(target.joint(j).name).id for j in range(target.njnt)]
+    for name in _JOINT_FIELDS:
+        getattr(target, name)[:] = getattr(source, name)[joints]
+    for name in _OPTIONS:
+        setattr(target.opt, name, getattr(source.opt, name))
+
+
+def _frames(full: mujoco.MjModel, data: mujoco.MjData, kept: list[int]) -> tuple[Frame, ...]:
+    frames: list[Frame] = []
+    for body, parent in enumerate(full.body_parentid):
+        above = kept[frames[parent].body] if body else 0  # its carrier, or its parent's
+        turn = np.empty(4)
+        mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
+        position = data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above])
+        frames.append(Frame(kept.index(body if body in kept else above), position, turn))
+    return tuple(frames)
+
+
+def _parts(
+    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: list[int], frames: tuple[Frame, ...]
+) -> tuple[_Part, ...]:
+    """Every body that moves and has mass, seen from the body that it is part of."""
     column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
     parts: list[_Part] = []
-    for body, carrier in enumerate(fusion.carrier):
-        mass = float(full.body_mass[body])
-        if carrier == 0 or (mass == 0 and body not in column):
+    for body, (frame, mass) in enumerate(zip(frames, full.body_mass.tolist(), strict=True)):
+        if frame.body == 0 or (mass == 0 and body not in column):
             continue
         if mass == 0:
             raise ModelError(f"body {full.body(body).name!r} has no mass", where=arm.name)
-        frame = data.xmat[carrier].reshape(3, 3)
-        axes = frame.T @ data.ximat[body].reshape(3, 3)
-        centre = frame.T @ (data.xipos[body] - data.xpos[carrier])
+        carrier = kept[frame.body]
+        inverse = data.xmat[carrier].reshape(3, 3).T
+        axes = inverse @ data.ximat[body].reshape(3, 3)
+        centre = inverse @ (data.xipos[body] - data.xpos[carrier])
         inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
-        parts.append(_Part(fusion.kept.index(carrier), column.get(body), mass, centre, inertia))
-    for place, body in enumerate(fusion.kept[1:], start=1):
+        parts.append(_Part(frame.body, column.get(body), mass, centre, inertia))
+    for place, body in enumerate(kept[1:], start=1):
         if all(part.body != place for part in parts):
             raise ModelError(f"body {full.body(body).name!r} moves and has no mass", where=arm.name)
     return tuple(parts)
 
 
-def _skeleton(fusion: Fusion) -> mujoco.MjModel:
+def _skeleton(
+    full: mujoco.MjModel, joints: tuple[str, ...], kept: list[int], frames: tuple[Frame, ...]
+) -> mujoco.MjModel:
     """The chain of kept bodies with the joints' properties; what it weighs is still to be written."""
-    full, spec = fusion.full, mujoco.MjSpec()
-    bodies = {0: spec.worldbody}
-    for name, body in zip(fusion.joints, fusion.kept[1:], strict=True):
-        parent = fusion.carrier[full.body_parentid[body]]
-        position, turn = fusion.place(body, parent)
-        bodies[body] = bodies[parent].add_body(
-            name=full.body(body).name,
-            pos=position,
-            quat=turn,
+    spec = mujoco.MjSpec()
+    bodies = [spec.worldbody]
+    for name, number in zip(joints, kept[1:], strict=True):
+        parent = bodies[frames[full.body_parentid[number]].body]
+        body = parent.add_body(
+            name=full.body(number).name,
+            pos=frames[number].position,
+            quat=frames[number].turn,
             simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
             explicitinertial=True,
             mass=1.0,
             inertia=[1.0, 1.0, 1.0],
         )
         joint = full.joint(name)
-        bodies[body].add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
+        body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
+        bodies.append(body)
     with quiet_mujoco():
         model = spec.compile()
-    for option in _OPTIONS:
-        setattr(model.opt, option, getattr(full.opt, option))
-    disable = mujoco.mjtDisableBit
+    copy_joints(full, model)
+    off = mujoco.mjtDisableBit
     # looking for what the skeleton lacks takes a tenth of a step; a diverged candidate must stay diverged
-    idle = disable.mjDSBL_ACTUATION | disable.mjDSBL_SENSOR | disable.mjDSBL_EQUALITY | disable.mjDSBL_ISLAND
-    model.opt.disableflags = full.opt.disableflags | disable.mjDSBL_CONTACT | disable.mjDSBL_AUTORESET | idle
-    chosen = [full.joint(name).id for name in fusion.joints]
-    for prefix, names in (("jnt_", _JOINT_FIELDS), ("dof_", _DOF_FIELDS), ("qpos", ("0", "_spring"))):
-        for name in names:
-            getattr(model, prefix + name)[:] = getattr(full, prefix + name)[chosen]
+    idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY | off.mjDSBL_ISLAND
+    model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
     return model
 
 

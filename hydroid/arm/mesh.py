@@ -5,6 +5,7 @@ theorem, face by face). A surface that is open, inverted or in other units gives
 wrong ones: hence the checks.
 """
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,10 +34,7 @@ class MassProperties:
 
 
 def mass_properties(path: Path) -> MassProperties:
-    """Read a mesh and integrate over its inside.
-
-    Args:
-        path: an STL or OBJ file, in m, its origin in the link's joint.
+    """Read an STL or OBJ file, in m, its origin in the link's joint, and integrate over its inside.
 
     Raises:
         MeshError: missing, unreadable, empty, non-finite, in millimetres, away from its joint, open,
@@ -65,15 +63,11 @@ def _read(path: Path) -> trimesh.Trimesh:
         mesh = trimesh.load(path, force="mesh", process=False)  # processing would drop NaN faces
     except Exception as error:  # trimesh's readers raise whatever their format's parser does
         reason = str(error).strip().splitlines()
-        raise MeshError(
-            f"cannot be read ({reason[0] if reason else type(error).__name__})",
-            where=where,
-            hint="export it again, as binary STL",
-        ) from None
+        what = f"cannot be read ({reason[0] if reason else type(error).__name__})"
+        raise MeshError(what, where=where, hint="export it again, as binary STL") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise MeshError(
-            "holds no triangles", where=where, hint="export the solid, not a sketch or an assembly"
-        )
+        hint = "export the solid, not a sketch or an assembly"
+        raise MeshError("holds no triangles", where=where, hint=hint)
     return mesh
 
 
@@ -90,45 +84,31 @@ def _check_stl(path: Path) -> None:
         return
     if head.lstrip()[:5].lower() == b"solid":
         raise MeshError("is an ASCII STL", where=str(path), hint="export it again, as binary STL")
-    what = f"is no binary STL: it has {size} bytes"
-    what += (
-        f", and {faces} faces would need {84 + 50 * faces}" if len(head) == 84 else ", its head alone is 84"
-    )
+    needed = f", and {faces} faces would need {84 + 50 * faces}"
+    what = f"is no binary STL: it has {size} bytes{needed if len(head) == 84 else ', its head alone is 84'}"
     raise MeshError(what, where=str(path), hint="copy or export it again, as binary STL")
 
 
 def _check(mesh: trimesh.Trimesh, where: str) -> None:
-    if not np.isfinite(mesh.vertices).all():
-        raise MeshError("has vertices that are not finite", where=where, hint="export it again")
+    for wrong, what, hint in _faults(mesh):
+        if wrong:
+            raise MeshError(what, where=where, hint=hint)
+
+
+def _faults(mesh: trimesh.Trimesh) -> Generator[tuple[bool, str, str]]:
+    """Each fault's presence, name and hint; what follows supposes that the mesh has none of those before."""
+    yield not np.isfinite(mesh.vertices).all(), "has vertices that are not finite", "export it again"
     mesh.merge_vertices()  # an STL names a corner anew in every face
     extent = float(np.ptp(mesh.vertices, axis=0).max())
-    if extent > LARGEST_LINK:
-        raise MeshError(
-            f"is {extent:.4g} m long, which looks like millimetres",
-            where=where,
-            hint="export it in metres, or scale it by 0.001",
-        )
+    millimetres = f"is {extent:.4g} m long, which looks like millimetres"
+    yield extent > LARGEST_LINK, millimetres, "export it in metres, or scale it by 0.001"
     away = float(np.linalg.norm(mesh.vertices.mean(axis=0)))
-    if away > LARGEST_LINK:
-        raise MeshError(
-            f"lies {away:.4g} m from its origin", where=where, hint="put the origin in the link's joint"
-        )
-    if not mesh.is_watertight:
-        raise MeshError(
-            f"is not watertight: {_open_edges(mesh)} edges do not join exactly two faces",
-            where=where,
-            hint="close its holes in CAD, and export one solid",
-        )
-    if not mesh.is_winding_consistent:
-        raise MeshError(
-            "has faces that look both inward and outward", where=where, hint="make its normals consistent"
-        )
-    if mesh.volume < -SMALLEST_VOLUME:
-        raise MeshError("is inside out: its volume is negative", where=where, hint="flip its normals")
-    if mesh.volume < SMALLEST_VOLUME:
-        raise MeshError("encloses no volume", where=where, hint="give the solid a thickness, in metres")
-
-
-def _open_edges(mesh: trimesh.Trimesh) -> int:
-    _, faces_at_edge = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-    return int(np.count_nonzero(faces_at_edge != 2))
+    yield away > LARGEST_LINK, f"lies {away:.4g} m from its origin", "put the origin in the link's joint"
+    faces_at_edge = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
+    holes = f"is not watertight: {np.count_nonzero(faces_at_edge != 2)} edges do not join exactly two faces"
+    yield not mesh.is_watertight, holes, "close its holes in CAD, and export one solid"
+    mixed = "has faces that look both inward and outward"
+    yield not mesh.is_winding_consistent, mixed, "make its normals consistent"
+    inverted = mesh.volume < -SMALLEST_VOLUME
+    yield inverted, "is inside out: its volume is negative", "flip its normals"
+    yield mesh.volume < SMALLEST_VOLUME, "encloses no volume", "give the solid a thickness, in metres"

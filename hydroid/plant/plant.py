@@ -8,12 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydroid.arm.export import copy_model, write_fitted
-from hydroid.arm.locked import Fusion, lock
-from hydroid.arm.mjcf import arm_mjcf, dressed_model
-from hydroid.arm.model import load_model
-from hydroid.arm.payload import add_payload
-from hydroid.arm.quiet import quiet_mujoco
+from hydroid.arm.export import arm_mjcf, copy_model, dressed_model, write_fitted
+from hydroid.arm.locked import lock
+from hydroid.arm.model import add_payload, load_model, quiet_mujoco
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.hydraulics.actuator import ActuatorState
@@ -216,7 +213,7 @@ class Plant:
         motors, actuators = np.array([self._gain, self._balance]), None
         if candidate.actuators is not None:
             motors, actuators = None, drawing_values(candidate.actuators[0, self._active], names)
-        text = arm_mjcf(spec, self._fusion, model, motors, "meshes")
+        text = arm_mjcf(spec, self._locked, model, motors)
         write_fitted(folder, text, self.timestep, ", ".join(names), actuators)
 
     def _advance(self, command: Array) -> None:
@@ -237,10 +234,9 @@ class Plant:
         settings, candidate = self.identified.settings, self._candidate
         locked = lock(self._spec, settings.arm, self._moving, pose)
         locked.model.opt.timestep = self.timestep
-        self._fusion = Fusion(self._spec, settings.arm, self._moving, pose)
-        model = dressed_model(self._spec, self._fusion, locked)
+        model = dressed_model(self._spec, locked)
         self._armature = model.dof_armature.copy()
-        self._locked_pose, self._columns = pose, locked.columns
+        self._locked, self._locked_pose, self._columns = locked, pose, locked.columns
         self._values = model_values(locked, candidate)
         self._gain = candidate.gain[0, self._columns]
         if candidate.actuators is None:

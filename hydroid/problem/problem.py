@@ -14,8 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arm.model import load_model
-from hydroid.arm.payload import add_payload
+from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array

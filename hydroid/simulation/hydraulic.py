@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arm.quiet import quiet_mujoco
+from hydroid.arm.model import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.settings.arm import Arm

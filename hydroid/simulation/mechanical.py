@@ -12,7 +12,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from hydroid.arm.quiet import quiet_mujoco
+from hydroid.arm.model import quiet_mujoco
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation.candidates import Array, Candidates, Response, in_chunks
 from hydroid.simulation.scenario import Scenario

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from mujoco.batch import Batch
 
 from hydroid.arm.locked import lock
-from hydroid.arm.model import build_model, load_model
+from hydroid.arm.build import build_model
+from hydroid.arm.model import load_model
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm, load_arm
 

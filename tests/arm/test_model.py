@@ -5,7 +5,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from hydroid.arm.mesh import mass_properties
-from hydroid.arm.model import build_model, load_model, write_model
+from hydroid.arm.build import build_model, write_model
+from hydroid.arm.model import load_model
 from hydroid.errors import MeshError, ModelError
 from hydroid.settings.arm import Arm, load_arm
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hydroid.arm.pivots import pivots
+from hydroid.arm.build import pivots
 from hydroid.settings.arm import load_arm
 from hydroid.settings.linkage import triangle
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from hydroid.arm.quiet import quiet_mujoco
+from hydroid.arm.model import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.records import Records, linkages
 from hydroid.hydraulics.solenoid import curve_exists

@@ -8,7 +8,7 @@ import pytest
 from conftest import step_log
 
 from hydroid import fit, load_settings, read_logs
-from hydroid.arm.payload import add_payload
+from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
 from hydroid.log import read_log, write_log
 from hydroid.prediction import simulate_log

@@ -50,6 +50,8 @@ class FitSummary(Settings):
     stage: Literal["mech", "hyd"]
     estimate: dict[str, ParameterEstimate]
     """by parameter"""
+    joints: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    """joints that take commands, numbered from 1: those that the fit's logs drive or that it compared"""
     final: str | None = None
     """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""
     converged: bool | None = None

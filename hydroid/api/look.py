@@ -10,6 +10,7 @@ import numpy as np
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
+from hydroid.files import write_atomic
 from hydroid.identified import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
@@ -174,12 +175,14 @@ def view(
     if model.nominal:
         _require_hydraulics(model)
     commands = None if log is None else read_commands(log, model.settings, pose)
-    from hydroid.viewer import show
+    from hydroid.viewer.playback import make_playback
+    from hydroid.viewer.window import animation, show
 
-    if gif is None or commands is None:
-        show.view(model, commands, pose)
+    playback = make_playback(model, commands, pose)
+    if gif is None:
+        show(playback)
     else:
-        show.animate(model, commands, Path(gif))
+        write_atomic(Path(gif), animation(playback))
 
 
 def _require_hydraulics(model: IdentifiedModel) -> None:

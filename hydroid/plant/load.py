@@ -24,7 +24,8 @@ def load_plant(
             shipped name such as "article-hyd". Parameters that these do not fix are then nominal: as the
             hydraulics and the arm's file have them, and 0 for dampers and springs.
         overrides: settings to replace, by dotted key.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit drove or
+            compared, or those of the saved plant.
         period: how long one command is held [s].
         payload: mass in the gripper [kg].
 

@@ -17,10 +17,9 @@ from hydroid.hydraulics.actuator import ActuatorState
 from hydroid.hydraulics.records import JOINT_STATE, drawing_values, has_force_curve
 from hydroid.identified import IdentifiedModel, write_settings
 from hydroid.problem.stage import Stage
-from hydroid.simulation.actuators import ArmActuators
-from hydroid.simulation.rollout import HydraulicArm, compile_rollout
+from hydroid.simulation.hydraulic import ArmActuators
+from hydroid.simulation.rollout import HydraulicArm, SingleArm, compile_rollout
 from hydroid.simulation.scenario import model_values
-from hydroid.simulation.single import SingleArm
 
 Array = NDArray[np.float64]
 
@@ -30,9 +29,10 @@ class Plant:
 
     Args:
         identified: settings and parameters.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit compared.
-            With `other_joints: passive` in the settings all others move under their springs and dampers;
-            otherwise they are locked where `reset` puts them.
+        joints: numbers, from 1, of the joints that take commands; by default those that the fit drove or
+            compared, and without a fit those that the settings compare. With `other_joints: passive` in the
+            settings all others move under their springs and dampers; otherwise they are locked where `reset`
+            puts them.
         period: how long one command is held [s], a multiple of MuJoCo's step; by default the logs' period.
         payload: mass in the gripper [kg].
 
@@ -57,7 +57,8 @@ class Plant:
     ) -> None:
         settings = identified.settings
         arm = settings.arm
-        self.identified, self.joints = identified, tuple(sorted(set(joints or settings.outputs)))
+        fitted = () if identified.summary is None else identified.summary.joints
+        self.identified, self.joints = identified, tuple(sorted(set(joints or fitted or settings.outputs)))
         self._active = np.isin(np.arange(1, 1 + len(arm.joints)), self.joints)
         if np.sum(self._active) < len(self.joints):
             raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joints {self.joints}")
@@ -67,9 +68,8 @@ class Plant:
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
-            raise SettingsError(
-                f"must be a multiple of {self.timestep:g} s", where=f"period {self.period:g} s"
-            )
+            what = f"must be a multiple of {self.timestep:g} s"
+            raise SettingsError(what, where=f"period {self.period:g} s")
         self._spec = load_model(arm.model, arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
@@ -112,10 +112,9 @@ class Plant:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
         pressure = np.full((len(self._pose), 2), np.nan)
         if isinstance(self._arm, HydraulicArm):
-            seen = self._actuator.observe(
-                ActuatorState(self._state[None], self._commands), self.data.qpos[None]
-            )
-            pressure[self._active] = seen.pressure[0, self._active[self._columns]]
+            state = ActuatorState(self._state[None], self._commands)
+            observation = self._actuator.observe(state, self.data.qpos[None])
+            pressure[self._active] = observation.pressure[0, self._active[self._columns]]
         return pressure
 
     def reset(self, pose: str | ArrayLike | None = None) -> Array:
@@ -147,11 +146,9 @@ class Plant:
         with quiet_mujoco():
             self._balance = self._arm.start(self._values, 0, start_angle)
             if isinstance(self._arm, HydraulicArm):
-                self._actuator, state = self._actuators.start(
-                    self._candidate, start_angle, self._balance[None]
-                )
-                self._state = state.joints[0]
-                past = len(state.commands) - 1
+                balance = self._balance[None]
+                self._actuator, state = self._actuators.start(self._candidate, start_angle, balance)
+                self._state, past = state.joints[0], len(state.commands) - 1
                 self._commands = np.zeros((past + self._steps, len(self._columns)))
                 self._arm.attach(self._actuator, self._state, 0)
                 self._mass = self.data.M.copy()
@@ -185,9 +182,7 @@ class Plant:
         return self.angle
 
     def save(self, folder: str | Path) -> None:
-        """Write the plant to a folder that `load_plant` reads, and `export` it to `model/` there.
-
-        A payload is not saved.
+        """Write the plant, without payload, to a folder that `load_plant` reads; `export` it to `model/` there.
 
         Raises:
             RunError: the folder cannot be written.
@@ -195,7 +190,8 @@ class Plant:
         folder, settings = Path(folder), self.identified.settings
         copy_model(load_model(settings.arm.model, settings.arm), folder / "model")
         write_settings(folder, settings)
-        write_estimate(folder, self.identified.summarise())
+        summary = self.identified.summarise()
+        write_estimate(folder, summary.model_copy(update={"joints": self.joints}))
         self.export(folder / "model")
 
     def export(self, folder: Path) -> None:
@@ -248,8 +244,6 @@ class Plant:
         self.model, self.data = self._arm.model, self._arm.data
         self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
         # for compiled code: angles after the step; no observation, and no joint that follows a log
-        self._rolled, self._unseen = (
-            np.empty((1, len(self._columns))),
-            np.empty((0, len(self._columns)), JOINT_STATE),
-        )
+        joints = len(self._columns)
+        self._rolled, self._unseen = np.empty((1, joints)), np.empty((0, joints), JOINT_STATE)
         self._servo = np.empty((self._steps, 0))

@@ -85,6 +85,12 @@ class Problem:
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         self.bounds: NDArray[np.int64] = np.concatenate([self._segments(c) for c in self.channels])
 
+    @property
+    def active_joints(self) -> tuple[int, ...]:
+        """Joints that a log drives or that are compared, numbered from 1."""
+        driven = np.any([log.driven for log in self.logs], axis=0)
+        return tuple(sorted({*(np.flatnonzero(driven) + 1).tolist(), *self.settings.outputs}))
+
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that has bounds, those held fixed included."""
         return Problem(self.settings.freed(), self.logs, self._spread)
@@ -179,5 +185,5 @@ def make_simulation(
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
     if settings.stage == "mech":
-        return MechanicalSimulation(scenario, settings.simulation)
-    return HydraulicSimulation(scenario, settings.arm, settings.hydraulics, settings.simulation, pressures)
+        return MechanicalSimulation(scenario)
+    return HydraulicSimulation(scenario, settings.arm, settings.hydraulics, pressures)

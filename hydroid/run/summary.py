@@ -15,6 +15,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     return FitSummary(
         stage=problem.settings.stage,
         estimate=parameter_estimates(problem, fit.uncertainty),
+        joints=problem.active_joints,
         final=fit.final,
         converged=None if ending is None else ending.converged,
         ending=None if ending is None else ending.value,

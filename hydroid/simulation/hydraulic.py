@@ -11,19 +11,18 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.arm.locked import LockedArm
 from hydroid.arm.model import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
-from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
+from hydroid.hydraulics.records import JOINT_STATE, Records, has_force_curve, linkages
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.actuators import ArmActuators
-from hydroid.simulation.candidates import Array, Candidates, Response, in_chunks
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout
-from hydroid.simulation.scenario import Scenario
+from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
 
 
 @dataclass(frozen=True)
@@ -50,6 +49,59 @@ class _Start:
     state: ActuatorState
 
 
+class ArmActuators:
+    """What stage 2 adds to an arm.
+
+    Args:
+        arm: the arm's settings, for the cylinders' triangles.
+        locked: the arm that is stepped.
+        active: which of the arm's joints have hydraulics, shape (J,).
+        settings: of the hydraulics.
+        follows: columns of the moving joints that follow a log, which have a servo instead.
+
+    Attributes:
+        columns: all other moving joints, with and without actuator: they couple through their inertia.
+        joints: the same among the arm's joints, 0-based.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        locked: LockedArm,
+        active: NDArray[np.bool_],
+        settings: HydraulicSettings,
+        follows: NDArray[np.intp],
+    ) -> None:
+        self.columns = np.setdiff1d(np.arange(len(locked.columns)), follows)
+        self.joints = locked.columns[self.columns]
+        everyone = [int(j) for j in self.joints]
+        self._linkages = linkages(arm, everyone, [j for j in everyone if active[j]])
+        self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
+        self._period, self._settings = locked.model.opt.timestep, settings
+
+    def start(self, candidates: Candidates, pose: Array, balance: Array) -> tuple[Actuator, ActuatorState]:
+        """Return the actuators of n candidates, with a force-stroke curve each, and their state at rest.
+
+        `pose` is the moving joints' [rad], shape (V,); `balance` holds them there [N·m], shape (n, V).
+        """
+        assert candidates.actuators is not None
+        chosen: Records = candidates.actuators[:, self.joints]  # pyright: ignore[reportAssignmentType]
+        damping = candidates.damping[:, self.joints]
+        actuator = Actuator(chosen, self._linkages, damping, self._period, self._settings, self._entries)
+        angle = np.tile(pose[self.columns], (len(balance), 1))
+        return actuator, actuator.start(angle, balance[:, self.columns])
+
+
+def mass_entries(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (V, V)."""
+    entries = np.zeros((model.nv, model.nv), np.intp)
+    for i in range(model.nv):
+        for place in range(model.M_rowadr[i], model.M_rowadr[i] + model.M_rownnz[i]):
+            j = model.M_colind[place]
+            entries[i, j] = entries[j, i] = place
+    return entries
+
+
 class HydraulicSimulation:
     """Simulates candidates on one log with their actuators.
 
@@ -57,7 +109,6 @@ class HydraulicSimulation:
         scenario: what is simulated; its active joints have hydraulics.
         arm: the arm's settings, for the cylinders' triangles.
         hydraulics: settings of the chain.
-        settings: threads.
         pressures: active joints whose chamber pressures are wanted in the response, 0-based.
     """
 
@@ -66,12 +117,11 @@ class HydraulicSimulation:
         scenario: Scenario,
         arm: Arm,
         hydraulics: HydraulicSettings,
-        settings: SimulationSettings,
         pressures: Sequence[int] = (),
     ) -> None:
         compile_rollout()
-        self.scenario, self._steps = scenario, settings.steps_per_sample
-        self._threads = settings.threads or os.cpu_count() or 1
+        self.scenario, self._steps = scenario, scenario.settings.steps_per_sample
+        self._threads = scenario.settings.threads or os.cpu_count() or 1
         prescribed = scenario.prescribed
         self._follows = np.array([], np.intp) if prescribed is None else prescribed.columns
         self._actuators = ArmActuators(arm, scenario.arm, scenario.active, hydraulics, self._follows)
@@ -87,7 +137,7 @@ class HydraulicSimulation:
             Angles of the outputs, and the pressures asked for, at the log's samples; the first is the start.
             A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
-        return in_chunks(self._simulate_chunk, candidates, self.scenario.chunk)
+        return self.scenario.in_chunks(self._simulate_chunk, candidates)
 
     def trace(self, candidates: Candidates) -> Trace:
         """Simulate one candidate and keep what its actuators did."""

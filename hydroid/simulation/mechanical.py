@@ -13,21 +13,14 @@ from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
 from hydroid.arm.model import quiet_mujoco
-from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.candidates import Array, Candidates, Response, in_chunks
-from hydroid.simulation.scenario import Scenario
+from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
 
 
 class MechanicalSimulation:
-    """Simulates candidates on one log by `Batch.rollout`.
+    """Simulates candidates on one log by `Batch.rollout`."""
 
-    Args:
-        scenario: what is simulated.
-        settings: threads.
-    """
-
-    def __init__(self, scenario: Scenario, settings: SimulationSettings) -> None:
-        self.scenario, self._threads = scenario, settings.threads
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
         self._batch: ArmBatch | None = None
 
     def simulate(self, candidates: Candidates) -> Response:
@@ -36,12 +29,12 @@ class MechanicalSimulation:
         Returns:
             Angles of the outputs at the log's samples, shape (n, T, K); the first sample is the start pose.
         """
-        return in_chunks(self._simulate_chunk, candidates, self.scenario.chunk)
+        return self.scenario.in_chunks(self._simulate_chunk, candidates)
 
     def _simulate_chunk(self, candidates: Candidates) -> Response:
         scenario, n = self.scenario, len(candidates)
         if self._batch is None or self._batch.size < n:  # made once, and again only for more candidates
-            self._batch = ArmBatch(scenario.arm.model, n, self._threads)
+            self._batch = ArmBatch(scenario.arm.model, n, scenario.settings.threads)
             self._torque, self._angle = np.empty((2, n, *scenario.command.shape))
         balance = self._batch.start(scenario.values(candidates), scenario.arm.pose)
         torque, angle = self._torque[:n], self._angle[:n]
@@ -50,7 +43,10 @@ class MechanicalSimulation:
         if scenario.prescribed is not None:
             torque[:, :, scenario.prescribed.columns] = scenario.prescribed.torque
         feasible = self._batch.roll(torque, angle)
-        out = scenario.sampled(angle[:, :, scenario.outputs])
+        steps, outputs = scenario.settings.steps_per_sample, scenario.outputs
+        out = np.empty((n, 1 + len(scenario.command) // steps, len(outputs)))
+        out[:, 0] = scenario.arm.pose[outputs]
+        out[:, 1:] = angle[:, steps - 1 :: steps, outputs]
         out[~feasible] = np.nan
         return Response(out, feasible)
 
@@ -60,13 +56,7 @@ class MechanicalSimulation:
 
 
 class ArmBatch:
-    """Up to `size` candidates of one arm, stepped together on a thread pool.
-
-    Args:
-        model: the arm without the joints that do not move.
-        size: candidates of one call.
-        threads: threads that step them; 0 is one per core. Results do not depend on it.
-    """
+    """Up to `size` candidates of one arm, stepped together on some threads, 0: one per core."""
 
     def __init__(self, model: mujoco.MjModel, size: int, threads: int) -> None:
         self.size = size
@@ -79,14 +69,12 @@ class ArmBatch:
         self._expanded: dict[str, Array] = {}
 
     def start(self, values: dict[str, Array], pose: Array) -> Array:
-        """Put the candidates into `pose` at rest and return what holds them there.
+        """Put n <= size candidates into `pose` [rad], shape (V,), at rest.
 
-        Args:
-            values: what n <= size candidates change in the model, as `Scenario.values` returns it.
-            pose: angles of the moving joints [rad], shape (V,).
+        `values` is what they change in the model, as `Scenario.values` returns it.
 
         Returns:
-            tau0 = g(q0) of equation (1) [N·m], shape (n, V).
+            What holds them there, tau0 = g(q0) of equation (1) [N·m], shape (n, V).
         """
         n = len(values["body_mass"])
         ids = np.arange(n)

@@ -58,12 +58,7 @@ class Prescribed:
 
 
 def smooth(angle: Array, cutoff: float) -> Array:
-    """Low-pass angles, shape (T, K), without phase shift.
-
-    Args:
-        angle: noisy angles [rad].
-        cutoff: cut-off frequency [cycles per sample].
-    """
+    """Low-pass angles, shape (T, K), without phase shift; `cutoff` is in cycles per sample."""
     if cutoff >= 0.5 or len(angle) < 16:
         return angle
     sections = butter(2, 2 * cutoff, output="sos")

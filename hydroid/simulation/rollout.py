@@ -10,6 +10,7 @@ raising; a model that gets through `SingleArm.start` has none to expect.
 import ctypes
 import logging
 import threading
+from copy import copy
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,8 +25,7 @@ from numpy.typing import NDArray
 from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.kernel import SOURCE, Exchange, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
-from hydroid.simulation.candidates import Array
-from hydroid.simulation.single import SingleArm
+from hydroid.simulation.scenario import Array
 
 _log = logging.getLogger(__name__)
 
@@ -54,6 +54,45 @@ class Handles(NamedTuple):
     """joints that follow a log, (P,)"""
 
 
+class SingleArm:
+    """One arm in MuJoCo, which candidates take in turn.
+
+    Attributes:
+        model: a copy of the arm's, with the values of the candidate that was started last.
+        data: its state.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model, self.data = copy(model), mujoco.MjData(model)
+        self._armature = model.dof_armature.copy()
+
+    def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
+        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), as `ArmBatch.start` does.
+
+        Call it within `quiet_mujoco`.
+
+        Returns:
+            What holds it there, tau0 = g(q0) of equation (1) [N·m], shape (V,).
+        """
+        model, data = self.model, self.data
+        for name, value in values.items():
+            getattr(model, name)[:] = value[row]
+        model.dof_armature[:] = self._armature  # stage 2 steps with another
+        mujoco.mj_setConst(model, data)
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        data.warning.number[:] = 0
+        return data.qfrc_bias.copy()
+
+    @property
+    def healthy(self) -> bool:
+        """Whether the arm is finite and drew no warning of MuJoCo's since its start."""
+        finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
+        return bool(finite) and not self.data.warning.number.any()
+
+
 class HydraulicArm(SingleArm):
     """An arm that is stepped with its actuators by compiled code.
 
@@ -69,24 +108,12 @@ class HydraulicArm(SingleArm):
     ) -> None:
         super().__init__(model)
         m, d = self.model, self.data
-        model_address, data_address = _addresses(m, d)
+        live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
+        self._handles = Handles(*_addresses(m, d), *live, columns, model.dof_armature[columns], follows)
         self._steps = steps
-        self._handles = Handles(
-            model=model_address,
-            data=data_address,
-            angle=d.qpos,
-            velocity=d.qvel,
-            mass=d.M,
-            applied=d.qfrc_applied,
-            armature=m.dof_armature,
-            warnings=d.warning.number,
-            columns=columns,
-            own=model.dof_armature[columns],
-            follows=follows,
-        )
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
-        """Put one candidate into `pose` at rest and return what holds it there, as `SingleArm.start`."""
+        """Do as `SingleArm.start`."""
         balance = super().start(values, row, pose)
         self.model.dof_damping[self._handles.columns] = 0.0  # the actuators integrate it
         return balance
@@ -104,33 +131,24 @@ class HydraulicArm(SingleArm):
             seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
             servo: torque of the joints that follow a log at each step [N·m], shape (T steps, P).
         """
-        roll(
-            self._handles,
-            self._plugin,
-            self._row,
-            self._state,
-            commands,
-            servo,
-            self._steps,
-            angle,
-            seen,
-        )
+        plugin, state = self._plugin, self._state
+        roll(self._handles, plugin, self._row, state, commands, servo, self._steps, angle, seen)
 
 
 def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
     """Where MuJoCo keeps a model and its data: it tells every physics callback."""
-    told: dict[int, tuple[int, int]] = {}
+    addresses: dict[int, tuple[int, int]] = {}
 
     @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     def passive(m: int, d: int) -> None:
-        told[threading.get_ident()] = (m, d)  # other threads may be stepping
+        addresses[threading.get_ident()] = (m, d)  # other threads may be stepping
 
     mujoco.set_mjcb_passive(passive)
     try:
         mujoco.mj_forward(model, data)
     finally:
         mujoco.set_mjcb_passive(None)
-    return told[threading.get_ident()]
+    return addresses[threading.get_ident()]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,25 +158,16 @@ def roll(
     candidate: int,
     state: Any,
     commands: Any,
-    torque: Any,
+    servo: Any,
     steps: int,
     angle: Any,
     seen: Any,
     source: int = SOURCE,
 ) -> None:
-    """Roll one candidate out, up to the first warning of MuJoCo's.
+    """Roll one candidate of the plugin's population out, up to the first warning of MuJoCo's.
 
-    Args:
-        arm: `Handles`, at the start.
-        plugin: of the population.
-        candidate: which one of it.
-        state: its actuators, shape (J,) of JOINT_STATE.
-        commands: held during each step [%], with those before the start, shape (past + T steps, J).
-        torque: of the joints that follow a log, at each step [N·m], shape (T steps, P).
-        steps: in a sample.
-        angle: receives the angles after each of T samples [rad], shape (T, V).
-        seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
-        source: the kernel's, for numba's cache.
+    `arm` is `Handles` at the start, `state` its actuators, shape (J,) of JOINT_STATE; the other arrays are as
+    in `HydraulicArm.roll`. `source` is the kernel's, for numba's cache.
     """
     columns, joints = arm.columns, arm.columns.size
     pad, here, speed = make_pad(joints), np.empty(joints), np.empty(joints)
@@ -172,7 +181,7 @@ def roll(
             arm.applied[columns[j]] = exchange.torque[j]
             arm.armature[columns[j]] = arm.own[j] + exchange.armature[j]
         for i in range(arm.follows.size):
-            arm.applied[arm.follows[i]] = torque[k, i]
+            arm.applied[arm.follows[i]] = servo[k, i]
         _mj_step(arm.model, arm.data)
         if arm.warnings.any():
             return

@@ -1,30 +1,66 @@
-"""What is simulated of one log: which joints move, from where, under which commands."""
+"""What is simulated: one log's joints, start and commands, for a population of candidates."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arm.locked import LockedArm, lock
+from hydroid.arm.locked import Array, LockedArm, lock
+from hydroid.hydraulics.records import Records
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation.candidates import Array, Candidates
 from hydroid.simulation.prescribed import Prescribed
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Physical values of n candidates; J joints and L links in the arm's order.
+
+    gain [N·m/%], damping [N·m·s/rad], stiffness [N·m/rad], friction [N·m]: shape (n, J).
+    mass [kg]: shape (n, L). actuators: in stage 2, of all J joints.
+    """
+
+    gain: Array
+    damping: Array
+    stiffness: Array
+    friction: Array
+    mass: Array
+    actuators: Records | None = None
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Candidates":
+        values = (getattr(self, f.name) for f in fields(self))
+        chosen: list[Any] = [None if v is None else v[rows] for v in values]
+        return Candidates(*chosen)
+
+
+@dataclass(frozen=True)
+class Response:
+    """Simulated angles [rad], shape (n, T, K), of the K output joints.
+
+    A candidate that diverged has `feasible` False, shape (n,), and NaN throughout. `pressure` [Pa], shape
+    (n, T, L, 2), are those of chambers A and B of L joints, where they were asked for.
+    """
+
+    angle: Array
+    feasible: NDArray[np.bool_]
+    pressure: Array | None = None
 
 
 class Scenario:
     """A log made ready for simulation: its commands drive, from the pose in which it rests before them.
 
-    Joints that the log drives or that are compared are *active*; what the others do is a setting.
-
-    Args:
-        spec: the arm's MJCF model.
-        arm: the arm's settings.
-        log: the log.
-        outputs: joints whose angles are wanted, 0-based.
-        settings: what the other joints do, steps, memory.
+    Joints that the log drives, and `outputs` (0-based), whose angles are wanted, are *active*. A setting says
+    what the others do.
 
     Attributes:
+        settings: what the other joints do, steps, threads, memory.
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
         active: shape (J,).
         outputs: columns of the outputs among the moving joints, shape (K,).
@@ -35,7 +71,7 @@ class Scenario:
     def __init__(
         self, spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: SimulationSettings
     ) -> None:
-        self._settings = settings
+        self.settings = settings
         self.active = log.driven.copy()
         self.active[outputs] = True
         moving = self.active | (settings.other_joints != "locked")
@@ -64,22 +100,20 @@ class Scenario:
     def chunk(self) -> int:
         """Candidates simulated together: as many as the memory setting allows."""
         candidate = 2 * 8 * self.command.size  # torque in, angle out [bytes]
-        return max(1, self._settings.chunk_mib * 2**20 // max(candidate, 1))
+        return max(1, self.settings.chunk_mib * 2**20 // max(candidate, 1))
 
-    def sampled(self, angle: Array) -> Array:
-        """Return angles at the log's samples, start pose first, from those after each step.
-
-        Args:
-            angle: of the outputs after each step [rad], shape (n, steps, K).
-        """
-        steps = self._settings.steps_per_sample
-        out = np.empty((len(angle), 1 + angle.shape[1] // steps, len(self.outputs)))
-        out[:, 0] = self.arm.pose[self.outputs]
-        out[:, 1:] = angle[:, steps - 1 :: steps]
-        return out
+    def in_chunks(self, simulate: Callable[[Candidates], Response], candidates: Candidates) -> Response:
+        """Simulate candidates, `chunk` at a time: memory for the steps does not grow with their number."""
+        parts = [simulate(candidates[i : i + self.chunk]) for i in range(0, len(candidates), self.chunk)]
+        pressures = [p.pressure for p in parts if p.pressure is not None]
+        return Response(
+            np.concatenate([p.angle for p in parts]),
+            np.concatenate([p.feasible for p in parts]),
+            np.concatenate(pressures) if pressures else None,
+        )
 
 
-def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, NDArray[np.float64]]:
+def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, Array]:
     """Return the fields of mjModel that n candidates change, by name, shape (n, ...) each."""
     return arm.inertials(candidates.mass) | {
         "dof_damping": candidates.damping[:, arm.columns],

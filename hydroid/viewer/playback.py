@@ -1,10 +1,30 @@
 """A plant under the commands of a log, or under those of the viewer's sliders."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 
+from hydroid.errors import SettingsError
+from hydroid.identified import IdentifiedModel
 from hydroid.log import Log
 from hydroid.plant import Plant
+
+
+def make_playback(identified: IdentifiedModel, log: Log | None, pose: str | None = None) -> "Playback":
+    """Return the playback of a log, or one with all joints on sliders that starts in a pose.
+
+    Raises:
+        SettingsError: a log that commands nothing, or what `Plant` refuses.
+    """
+    settings = identified.settings
+    if log is None:
+        return Playback(Plant(identified, joints=range(1, 1 + len(settings.arm.joints))), pose=pose)
+    driven = [int(j) + 1 for j in np.flatnonzero(log.driven)]
+    if not driven:
+        raise SettingsError("commands nothing", where=log.source, hint="leave it out to use the sliders")
+    payload = settings.payloads.get(Path(log.source).name, 0.0)
+    return Playback(Plant(identified, joints=driven, payload=payload), log)
 
 
 class Playback:

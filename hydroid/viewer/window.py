@@ -15,16 +15,20 @@ from hydroid.errors import RunError
 from hydroid.plant import Plant
 from hydroid.viewer.playback import Playback
 
-FRAME = 1 / 60
-"""between two pictures of the viewer [s]"""
-LATE = 0.1
-"""a machine too slow by this [s] shows slow motion instead of jumps"""
-CLOSING = 5.0
-"""the longest that closing the window may take [s]"""
-GIF_FRAME = 0.1
-"""between two pictures of a file [s]"""
-SIZE = 480, 360
-"""of a file's pictures [px]"""
+FRAME = 1 / 60  # between two pictures of the viewer [s]
+LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
+CLOSING = 5.0  # the longest that closing the window may take [s]
+GIF_FRAME, SIZE = 0.1, (480, 360)  # between two pictures of a file [s]; their size [px]
+
+
+def show(playback: Playback) -> None:
+    """Show a playback in MuJoCo's viewer until its window is closed.
+
+    Raises:
+        RunError: no window can be opened, or the simulation diverged.
+    """
+    with window(playback.plant) as viewer:
+        play(playback, viewer)
 
 
 class Viewer(Protocol):
@@ -128,7 +132,6 @@ def animation(playback: Playback, camera: str = "corner") -> bytes:
             playback.advance(k * GIF_FRAME)
             renderer.update_scene(plant.data, camera if named else -1)
             frames.append(Image.fromarray(renderer.render()).quantize(128))
-    buffer = io.BytesIO()
-    pause = round(1e3 * GIF_FRAME)  # [ms]
+    buffer, pause = io.BytesIO(), round(1e3 * GIF_FRAME)  # [ms]
     frames[0].save(buffer, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
     return buffer.getvalue()

@@ -21,7 +21,7 @@ def save(mesh, path):
 
 def by_tetrahedra(path):
     """Volume, centre and inertia per kg from signed tetrahedra with the origin."""
-    corners = trimesh.load(path, force="mesh").triangles.view(np.ndarray).astype(float)
+    corners = trimesh.load_mesh(path).triangles.view(np.ndarray).astype(float)
     volumes = np.linalg.det(corners) / 6
     volume = volumes.sum()
     sums = corners.sum(axis=1)

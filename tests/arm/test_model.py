@@ -246,7 +246,7 @@ def test_another_arm_is_another_file(tmp_path):
 def test_a_mesh_that_mujoco_cannot_read_is_one_line(tmp_path):
     arm = planar(tmp_path)
     rod = trimesh.load(tmp_path / "fore.stl", force="mesh")
-    (tmp_path / "fore.stl").write_text(rod.export(file_type="stl_ascii"))
+    (tmp_path / "fore.stl").write_text(rod.export(file_obj=None, file_type="stl_ascii"))
     with pytest.raises(MeshError, match=r"fore\.stl: is an ASCII STL") as caught:
         build_model(arm)
     assert "\n" not in str(caught.value)

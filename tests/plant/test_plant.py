@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hydroid import load_settings, read_logs
+from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel, identified
@@ -18,17 +18,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.linkage import LinearActuator
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
-MECHANICAL = {
-    "K": 0.21,
-    "D": 250.0,
-    "S": 40.0,
-    "M1": 4.0,
-    "M2": 6.0,
-    "M3": 20.0,
-    "M4": 2.0,
-    "M5": 3.0,
-    "M6": 5.0,
-}
+MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0}
+MECHANICAL |= {f"M{k + 1}": mass for k, mass in enumerate([4.0, 6.0, 20.0, 2.0, 3.0, 5.0])}
 
 
 def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
@@ -53,12 +44,12 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def response(found: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
+def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
     """The angles that the population simulation gives [rad], shape (T, K)."""
-    settings = found.settings
+    settings = fitted.settings
     spec = load_model(settings.arm.model, settings.arm)
     simulation = make_simulation(spec, log, [j - 1 for j in joints], settings)
-    return simulation.simulate(Stage(settings).candidates(found.theta[None])).angle[0]
+    return simulation.simulate(Stage(settings).candidates(fitted.theta[None])).angle[0]
 
 
 @pytest.mark.parametrize("joints", [[2], [2, 3, 5], [1, 2, 3, 4, 5, 6, 7]])
@@ -72,10 +63,10 @@ def response(found: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
     ],
 )
 def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints):
-    found = model(stage, **changes)
-    log = log_of(found.settings, joints)
-    expected = response(found, log, joints)
-    plant = Plant(found, joints=joints)
+    fitted = model(stage, **changes)
+    log = log_of(fitted.settings, joints)
+    expected = response(fitted, log, joints)
+    plant = Plant(fitted, joints=joints)
     columns = [j - 1 for j in joints]
     angle: list[np.ndarray] = []
     for _ in range(2):  # and again after a reset
@@ -85,23 +76,23 @@ def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints)
     assert np.ptp(expected, axis=0).min() > np.deg2rad(0.2)
     if changes.get("simulation.other_joints") != "passive":
         still = np.delete(np.array(angle), columns, axis=1)
-        assert (still == np.delete(found.settings.arm.pose("study"), columns)).all()
+        assert (still == np.delete(fitted.settings.arm.pose("study"), columns)).all()
 
 
 @pytest.mark.parametrize("stage", ["mech", "hyd"])
 def test_the_whole_rig_log_bit_for_bit(stage):
-    found = model(stage, **{"hydraulics.delay": 0.05} if stage == "hyd" else {})
-    (log,) = read_logs([RIG], found.settings, lambda finding: None)
-    expected = response(found, log, [2])[:, 0]
-    plant = Plant(found)
+    fitted = model(stage, **{"hydraulics.delay": 0.05} if stage == "hyd" else {})
+    (log,) = read_logs([RIG], fitted.settings)
+    expected = response(fitted, log, [2])[:, 0]
+    plant = Plant(fitted)
     angle = [plant.reset(log.start)[1]] + [plant.step(command)[1] for command in log.command[:-1]]
     np.testing.assert_array_equal(angle, expected)
 
 
 @pytest.mark.parametrize("stage", ["mech", "hyd"])
 def test_a_slower_control_period_holds_the_command(stage):
-    found = model(stage)
-    fast, slow = Plant(found), Plant(found, period=0.05)
+    fitted = model(stage)
+    fast, slow = Plant(fitted), Plant(fitted, period=0.05)
     command = np.zeros(7)
     for k in range(40):
         command[1] = 50 * np.sin(k / 5)
@@ -111,8 +102,8 @@ def test_a_slower_control_period_holds_the_command(stage):
 
 
 def test_an_external_force_acts_as_in_plain_mujoco(tmp_path):
-    found = model()
-    plant = Plant(found)
+    fitted = model()
+    plant = Plant(fitted)
     plant.save(tmp_path)
     arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
     data = mujoco.MjData(arm)
@@ -122,15 +113,15 @@ def test_an_external_force_acts_as_in_plain_mujoco(tmp_path):
         plant.step(np.zeros(7))
         mujoco.mj_step(arm, data)
         assert plant.angle[1] == pytest.approx(data.qpos[0], abs=1e-9)
-    assert found.settings.arm.pose("study")[1] - plant.angle[1] > np.deg2rad(1)
+    assert fitted.settings.arm.pose("study")[1] - plant.angle[1] > np.deg2rad(1)
     plant.data.xfrc_applied[:] = 0.0
-    assert plant.reset()[1] == found.settings.arm.pose("study")[1]
+    assert plant.reset()[1] == fitted.settings.arm.pose("study")[1]
 
 
 def test_an_external_force_is_held_by_the_pressures():
-    found = model("hyd", **{"hydraulics.leakage": 0.0})
-    plant = Plant(found)
-    cylinder = found.settings.arm.joints[1].actuator
+    fitted = model("hyd", **{"hydraulics.leakage": 0.0})
+    plant = Plant(fitted)
+    cylinder = fitted.settings.arm.joints[1].actuator
     assert isinstance(cylinder, LinearActuator)
     area = np.array([900e-6, -800e-6])
 
@@ -157,14 +148,14 @@ def test_looking_at_positions_between_steps_changes_no_bit():
 
 
 def test_pressures_are_those_of_the_simulation():
-    found = model("hyd")
-    log = log_of(found.settings, [2], 1.0)
-    settings = found.settings
+    fitted = model("hyd")
+    log = log_of(fitted.settings, [2], 1.0)
+    settings = fitted.settings
     spec = load_model(settings.arm.model, settings.arm)
     simulation = make_simulation(spec, log, [1], settings, [1])
-    expected = simulation.simulate(Stage(settings).candidates(found.theta[None])).pressure
+    expected = simulation.simulate(Stage(settings).candidates(fitted.theta[None])).pressure
     assert expected is not None
-    plant = Plant(found)
+    plant = Plant(fitted)
     pressure = [plant.pressure]
     for command in log.command[:-1]:
         plant.step(command)
@@ -175,12 +166,12 @@ def test_pressures_are_those_of_the_simulation():
 
 
 def test_resets_to_other_poses_are_plants_made_there():
-    found = model("hyd")
-    plant = Plant(found)
+    fitted = model("hyd")
+    plant = Plant(fitted)
     command = [0, 40.0, 0, 0, 0, 0, 0]
-    for pose in ("rig", found.settings.arm.pose("home"), "study"):
+    for pose in ("rig", fitted.settings.arm.pose("home"), "study"):
         np.testing.assert_array_equal(plant.reset(pose)[0], plant.angle[0])
-        other = Plant(found)
+        other = Plant(fitted)
         other.reset(pose)
         for _ in range(30):
             np.testing.assert_array_equal(plant.step(command), other.step(command))
@@ -188,12 +179,13 @@ def test_resets_to_other_poses_are_plants_made_there():
 
 @pytest.mark.parametrize("stage", ["mech", "hyd"])
 def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
-    plant = Plant(model(stage))
+    plant = Plant(model(stage), joints=[2, 5])
     plant.save(tmp_path / "saved")
     (tmp_path / "saved").rename(tmp_path / "moved")
     again = load_plant(tmp_path / "moved")
+    assert again.joints == (2, 5)
     for _ in range(50):
-        command = [0, 70.0, 0, 0, 0, 0, 0]
+        command = [0, 70.0, 0, 0, -30.0, 0, 0]
         np.testing.assert_array_equal(again.step(command), plant.step(command))
     arm = plant.identified.settings.arm
     assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == {
@@ -204,11 +196,11 @@ def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
 @pytest.mark.parametrize("joints", [[2], [2, 5]])
 def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_path):
     """Stage 1 on the demo's log: from the XML, with the commands as controls and nothing else."""
-    found = model()
-    (log,) = read_logs([RIG], found.settings, lambda finding: None)
+    fitted = model()
+    (log,) = read_logs([RIG], fitted.settings)
     log.command[:, 4] = 0.3 * log.command[:, 1] if 5 in joints else 0.0
-    expected = response(found, log, joints)
-    plant = Plant(found, joints=joints)
+    expected = response(fitted, log, joints)
+    plant = Plant(fitted, joints=joints)
     plant.reset(log.start)
     plant.save(tmp_path)
     arm = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "fitted.xml"))
@@ -237,6 +229,21 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     assert "area_a: 900.0" in (tmp_path / "model" / "actuators.yaml").read_text().replace(
         "900.0000000000001", "900.0"
     )
+
+
+def test_a_plant_of_a_run_takes_commands_for_the_joints_that_the_fit_drove(tmp_path):
+    """The fit compares the shoulder alone, and one of its logs drives the elbow too."""
+    changes = {
+        "search.algorithm": "ga",
+        "search.ga.generations": 1,
+        "search.ga.population": 6,
+        "refinement": None,
+    }
+    settings = load_settings("fit-mech", {"start_pose": "study"} | changes)
+    logs = [log_of(settings, joints, 1.0) for joints in ([2], [2, 3])]
+    result = fit(settings, logs, tmp_path / "run")
+    assert load_plant(tmp_path / "run").joints == Plant(result.model).joints == (2, 3)
+    assert load_plant(tmp_path / "run", joints=[2]).joints == (2,)
 
 
 def test_a_shipped_config_of_stage_2_is_a_plant_at_nominal_values():
@@ -283,8 +290,8 @@ def test_wrong_joints_periods_poses_and_curves_are_refused():
 
 
 def test_a_payload_pulls_the_arm_down():
-    found = model("hyd")
-    empty, loaded = Plant(found), Plant(found, payload=20.0)
+    fitted = model("hyd")
+    empty, loaded = Plant(fitted), Plant(fitted, payload=20.0)
     command = [0, 60.0, 0, 0, 0, 0, 0]
     for _ in range(60):
         empty.step(command)

@@ -17,10 +17,9 @@ from hydroid.hydraulics.records import linkages, nominal_parameters
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import Candidates, HydraulicSimulation
-from hydroid.simulation.actuators import mass_entries
-from hydroid.simulation.rollout import compile_rollout
+from hydroid.simulation.hydraulic import mass_entries
+from hydroid.simulation.rollout import SingleArm, compile_rollout
 from hydroid.simulation.scenario import Scenario
-from hydroid.simulation.single import SingleArm
 
 JOINTS = range(7)
 SHOULDER = [1]
@@ -29,7 +28,7 @@ SHOULDER = [1]
 def simulation(spec, arm, log, outputs=SHOULDER, hydraulics=None, **settings) -> HydraulicSimulation:
     chosen = SimulationSettings(**settings)
     scenario = Scenario(spec, arm, log, list(outputs), chosen)
-    return HydraulicSimulation(scenario, arm, hydraulics or HydraulicSettings(), chosen)
+    return HydraulicSimulation(scenario, arm, hydraulics or HydraulicSettings())
 
 
 def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:

@@ -16,7 +16,7 @@ SHOULDER = [1]
 
 def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> MechanicalSimulation:
     chosen = SimulationSettings(**settings)
-    return MechanicalSimulation(Scenario(spec, arm, log, list(outputs), chosen), chosen)
+    return MechanicalSimulation(Scenario(spec, arm, log, list(outputs), chosen))
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
@@ -101,7 +101,8 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
 @pytest.mark.parametrize("other", ["locked", "passive"])
 def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, study_log, other):
     one = candidates(arm, 3)
-    scaled = Candidates(*(1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)))
+    forces = [1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)]
+    scaled = Candidates(*forces[:4], mass=forces[4])
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
 

@@ -1,6 +1,6 @@
 """The arm in motion: what is shown is the plant, at the pace of the clock."""
 
-from dataclasses import replace
+import io
 
 import numpy as np
 import pytest
@@ -8,12 +8,11 @@ from conftest import step_log
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel, load_identified
-from hydroid.log import Log, write_log
+from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.settings.arm import Arm
-from hydroid.viewer.playback import Playback
-from hydroid.viewer.show import animate
-from hydroid.viewer.window import LATE, play
+from hydroid.viewer.playback import Playback, make_playback
+from hydroid.viewer.window import LATE, animation, play
 
 SHOULDER = 1
 
@@ -150,17 +149,16 @@ def test_a_playback_that_diverges_says_when(slide: Playback):
         slide.advance(0.02)
 
 
-def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, tmp_path, arm: Arm):
+def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, arm: Arm):
     """Rendered without a display, where this machine can."""
     Image = pytest.importorskip("PIL.Image")
     log = step_log(arm.pose("study"), [80.0], dwell=0.61)
-    write_log(tmp_path / "log.csv", log, nominal.settings.log)
     try:
-        animate(nominal, tmp_path / "log.csv", None, tmp_path / "arm.gif", print)
+        picture = animation(make_playback(nominal, log))
     except RunError as error:
         assert "no picture can be rendered" in str(error)
         pytest.skip(str(error))
-    with Image.open(tmp_path / "arm.gif") as gif:
+    with Image.open(io.BytesIO(picture)) as gif:
         assert gif.n_frames == 7
         first = np.asarray(gif.convert("RGB"), float)
         gif.seek(6)
@@ -169,8 +167,6 @@ def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, tmp_path, arm: 
     assert np.unique(first.reshape(-1, 3), axis=0).shape[0] > 20  # and it is a picture, not one colour
 
 
-def test_a_log_without_commands_is_refused(nominal: IdentifiedModel, tmp_path, arm: Arm):
-    log = step_log(arm.pose("study"), [0.0])
-    write_log(tmp_path / "log.csv", replace(log, source="still"), nominal.settings.log)
+def test_a_log_without_commands_is_refused(nominal: IdentifiedModel, arm: Arm):
     with pytest.raises(SettingsError, match="commands nothing"):
-        animate(nominal, tmp_path / "log.csv", None, tmp_path / "arm.gif", print)
+        make_playback(nominal, step_log(arm.pose("study"), [0.0]))

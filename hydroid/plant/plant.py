@@ -182,7 +182,7 @@ class Plant:
         return self.angle
 
     def save(self, folder: str | Path) -> None:
-        """Write the plant, without payload, to a folder that `load_plant` reads; `export` it to `model/` there.
+        """Write the plant, without payload, to a folder that `load_plant` reads; `export` to `model/` there.
 
         Raises:
             RunError: the folder cannot be written.

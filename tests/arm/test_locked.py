@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mujoco.batch import Batch
 
-from hydroid.arm.locked import lock
 from hydroid.arm.build import build_model
+from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm, load_arm

@@ -4,8 +4,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from hydroid.arm.mesh import mass_properties
 from hydroid.arm.build import build_model, write_model
+from hydroid.arm.mesh import mass_properties
 from hydroid.arm.model import load_model
 from hydroid.errors import MeshError, ModelError
 from hydroid.settings.arm import Arm, load_arm

@@ -40,7 +40,9 @@ def test_moment_arm_is_the_derivative_of_the_length(case):
 @pytest.mark.parametrize("joint", LINEAR, ids=lambda joint: joint.name)
 def test_the_rod_runs_out_steadily_from_one_stop_to_the_other(joint):
     travel = np.ptp(joint.actuator.length(np.radians(joint.range)))
-    assert np.all(np.diff(joint.actuator.length(np.radians(np.linspace(joint.range[0], joint.range[1], 200)))) > 0)
+    assert np.all(
+        np.diff(joint.actuator.length(np.radians(np.linspace(joint.range[0], joint.range[1], 200)))) > 0
+    )
     assert 0.8 * joint.actuator.stroke < 1e3 * travel < 1.02 * joint.actuator.stroke
 
 

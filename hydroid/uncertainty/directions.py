@@ -1,10 +1,9 @@
-"""Directions: which combinations of the parameters the data determine, and why they do not determine others.
+"""Directions: combinations of parameters that the data determine, or do not, with the reason.
 
 A direction is a set of relative changes made together. Where its effect on the response is below the noise,
-it is unidentifiable: the data allow any change along it, however small the output error is. The patterns with
-a known cause are tested first: a parameter without effect, the four coil parameters, the currents' scale, a
-common scale of all parameters that the equation of motion is linear in. A direction that none of them
-explains is described by its components.
+it is unidentifiable. Patterns with a known cause are tested first: a parameter without effect, the four coil
+parameters, the currents' scale, a common scale of all parameters that the equation of motion is linear in.
+Any other direction is described by its components.
 """
 
 from collections.abc import Mapping
@@ -23,7 +22,7 @@ MIN_COMPONENT = 0.1
 EQUAL_WITHIN = 0.05
 """components that differ by less than this part of the largest are equal"""
 NEW_ABOVE = 0.5
-"""part of a pattern outside the directions already found, below which it is nothing new"""
+"""part of a pattern outside the directions already named, above which it is a new one"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +30,12 @@ class Direction:
     """One unidentifiable direction, or several of one kind.
 
     Attributes:
-        kind: why it is not determined.
+        kind: why the data do not determine it.
         parameters: relative changes along the weakest, by name, of those that take part.
         changes: relative changes of the free parameters along each, the largest +1, shape (m, p).
         relative_sd: standard deviation of the largest relative change along the weakest; inf where the data
             do not depend on it.
-        numbers: what stays determined, as in `Pattern`.
+        numbers: that stay identifiable, as in `Pattern`.
     """
 
     kind: DirectionKind
@@ -86,17 +85,15 @@ def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiabili
         new = _new(pattern.changes, rest)
         # a single direction is kept whole, with what it shares with those before it
         single = len(pattern.changes) == len(new) == 1
-        weak = _weakest_first(
-            uncertainty.root, pattern.changes / np.linalg.norm(pattern.changes) if single else new
-        )
+        candidates = pattern.changes / np.linalg.norm(pattern.changes) if single else new
+        weak = _weakest_first(uncertainty.root, candidates)
         if len(weak):
             named.append(_direction(pattern, names, uncertainty.root, weak))
             rest = _without(rest, new if single else weak)
     left = int(np.sum(singular < 1 / WEAK_ABOVE)) - (len(names) - len(rest))
     for changes in _weakest_first(uncertainty.root, rest)[: max(left, 0)]:
-        named.append(
-            _direction(_combination(names, _scaled(changes)), names, uncertainty.root, changes[None])
-        )
+        pattern = _combination(names, _scaled(changes))
+        named.append(_direction(pattern, names, uncertainty.root, pattern.changes))
     return Identifiability(names, singular, axes, tuple(named))
 
 

@@ -1,4 +1,4 @@
-"""Patterns: directions that the equations make suspect, and the numbers that stay determined along them."""
+"""Patterns: directions that the equations suggest, and the numbers that stay identifiable along them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ COIL = ("force_1", "force_2", "stroke_1", "stroke_2")
 CURRENTS = ("current_max", "current_min")
 RATED = "rated_current"
 STEP = 1e-5
-"""relative step of the derivatives in `_null`"""
+"""relative step of the differences in `_null`"""
 NULL_TOLERANCE = 1e-6
 """singular values below this part of the largest are zero there"""
 
@@ -30,11 +30,11 @@ class DirectionKind(StrEnum):
     SINGLE = "single parameter"
     """one parameter whose effect is below the noise"""
     COMMON_SCALE = "common scale"
-    """all parameters change by one factor, or masses by what makes up for a fixed one"""
+    """all parameters change by one factor; masses may deviate to compensate for a fixed one"""
     SOLENOID = "solenoid combination"
     """the four coil parameters act through two numbers only"""
     CURRENT_SCALE = "current scale"
-    """the currents' common factor trades with the coil parameters"""
+    """the coil parameters compensate for a common factor of the currents"""
     COMBINATION = "combination"
     """any other combination"""
 
@@ -44,10 +44,10 @@ class Pattern:
     """Directions to test.
 
     Attributes:
-        kind: why they are suspected.
+        kind: the reason.
         parameters: names of those that take part.
         changes: relative changes of the p free parameters along each direction, shape (m, p).
-        numbers: what stays determined, by symbol: `delta` [mm]; `k_i0`, `k_imax`, `k_imin`, each a k·i²
+        numbers: that stay identifiable, by symbol: `delta` [mm]; `k_i0`, `k_imax`, `k_imin`, each a k·i²
             [N·mm²].
     """
 
@@ -68,19 +68,17 @@ def patterns(problem: Problem, uncertainty: Uncertainty) -> Iterator[Pattern]:
 def _alone(uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
     """Parameters without effect, and those whose own effect is below the noise."""
     idle = uncertainty.jacobian.without_effect[uncertainty.free]
-    for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
-        if none:
-            yield Pattern(DirectionKind.NO_EFFECT, (name,), direction[None])
-    for name, none, direction in zip(names, idle, np.eye(len(names)), strict=True):
-        if not none and np.linalg.norm(uncertainty.root @ direction) < 1 / WEAK_ABOVE:
-            yield Pattern(DirectionKind.SINGLE, (name,), direction[None])
+    weak = ~idle & (np.linalg.norm(uncertainty.root, axis=0) < 1 / WEAK_ABOVE)
+    for kind, suspects in ((DirectionKind.NO_EFFECT, idle), (DirectionKind.SINGLE, weak)):
+        for i in np.flatnonzero(suspects):
+            yield Pattern(kind, (names[i],), np.eye(len(names))[[i]])
 
 
 def _common_scale(problem: Problem, uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
     """A common factor on all parameters that the equation of motion (1) is linear in.
 
-    A fixed mass, such as the jaws', does not change with them. The free masses then differ from the common
-    factor by what makes up for it best.
+    A fixed mass, such as the jaws', keeps its value. The free masses then deviate from the common factor so
+    that they compensate for it best.
     """
     settings, idle = problem.settings.parameters, uncertainty.jacobian.without_effect[uncertainty.free]
     linear = np.array([settings[name].quantity in MECHANICAL_UNITS for name in names]) & ~idle
@@ -120,27 +118,20 @@ def _solenoids(problem: Problem, uncertainty: Uncertainty, names: Sequence[str])
                 yield Pattern(kind, who, _spread(trade, who, names), numbers)
 
 
-def _acting(at: Mapping[str, float]) -> tuple[float, float, float, float]:
+def _acting(at: Mapping[str, float]) -> list[float]:
     """Return δ [mm], k i0², k I_max², k I_min² [N·mm²], through which coil and currents act."""
     k, gap = force_curve(at["force_1"], at["force_2"], at["stroke_1"], at["stroke_2"], at[RATED])
-    currents = (RATED, *CURRENTS)
-    return (float(gap), *(float(k) * at[q] ** 2 for q in currents))  # pyright: ignore[reportReturnType]
+    return [float(gap), *(float(k) * at[q] ** 2 for q in (RATED, *CURRENTS))]
 
 
 def _null(at: Mapping[str, float], free: Sequence[str], held: Sequence[int]) -> Array:
     """Relative changes of `free` that leave the numbers `held` of `_acting` as they are, (m, len(free))."""
     if not free:
         return np.empty((0, 0))
-    columns = []
-    for quantity in free:
-        high, low = (
-            np.log(_acting({**at, quantity: at[quantity] * (1 + step)}))[held] for step in (STEP, -STEP)
-        )
-        columns.append((high - low) / (2 * STEP))
-    matrix = np.array(columns).T
-    _, values, directions = np.linalg.svd(matrix)
-    rank = int(np.sum(values > NULL_TOLERANCE * values[0]))
-    return directions[rank:]
+    changed = [[{**at, q: at[q] * (1 + step)} for q in free] for step in (STEP, -STEP)]
+    high, low = (np.log([_acting(one) for one in side])[:, held] for side in changed)
+    _, values, directions = np.linalg.svd((high - low).T / (2 * STEP))
+    return directions[int(np.sum(values > NULL_TOLERANCE * values[0])) :]
 
 
 def _spread(changes: Array, parameters: Sequence[str], names: Sequence[str]) -> Array:

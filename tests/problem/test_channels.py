@@ -28,11 +28,11 @@ def hydraulic():
     changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": {"equal": 3}}
     settings = load_settings("fit-hyd", changes)
     log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
-    return settings, settings.arm, simulate_log(settings, log, HYDRAULIC, "truth")
+    return settings, simulate_log(settings, log, HYDRAULIC, "truth")
 
 
 def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
-    settings, arm, log = hydraulic
+    settings, log = hydraulic
     problem = Problem(settings, [log])
     assert [c.quantity for c in problem.channels] == ["angle", "pressure_a", "pressure_b"]
     truth = problem.parameters.vector(HYDRAULIC, "truth")
@@ -43,19 +43,18 @@ def test_the_truth_leaves_no_residual_in_any_channel(hydraulic):
 
 
 def test_a_pressure_error_counts_its_weight(hydraulic):
-    settings, arm, log = hydraulic
+    settings, log = hydraulic
     off = replace(log, pressure=log.pressure + 3e5)
-    truth_of = lambda problem: problem.parameters.vector(HYDRAULIC, "truth")[None]  # noqa: E731
     problem = Problem(settings, [off])
-    rows = problem.residuals(truth_of(problem))[0]
+    rows = problem.residuals(problem.parameters.vector(HYDRAULIC, "truth")[None])[0]
     for channel in problem.channels[1:]:
         assert np.rad2deg(rows[channel.rows]) == pytest.approx(0.1 * 3.0)
     assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
 
 
-def test_the_level_that_angles_leave_open_is_felt_by_pressures(hydraulic):
-    """With both areas changed in proportion the angle stays near; a pressure gauge sees the difference."""
-    settings, arm, log = hydraulic
+def test_pressures_depend_on_the_areas_level(hydraulic):
+    """With both areas changed in proportion the angle hardly changes, but the pressures do."""
+    settings, log = hydraulic
     problem = Problem(settings, [log])
     truth = problem.parameters.vector(HYDRAULIC, "truth")
     moved = truth.copy()
@@ -66,7 +65,7 @@ def test_the_level_that_angles_leave_open_is_felt_by_pressures(hydraulic):
 
 
 def test_pressures_do_not_change_the_angles(hydraulic):
-    settings, arm, log = hydraulic
+    settings, log = hydraulic
     without = settings.model_copy(
         update={"objective": settings.objective.model_copy(update={"pressure_weight": 0})}
     )
@@ -77,7 +76,7 @@ def test_pressures_do_not_change_the_angles(hydraulic):
 
 
 def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
-    settings, _, log = hydraulic
+    settings, log = hydraulic
     columns = {"log.joints": {j: {"pressure": None} for j in (1, 3, 4, 5, 6, 7)}}
     settings = load_settings("fit-hyd", FIXED | PRESSURE | columns)
     write_log(tmp_path / "log.csv", log, settings.log)
@@ -91,11 +90,11 @@ def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
 def mechanical(**changes):
     settings = load_settings("article-mech", {"objective.segments": {"equal": 2}} | changes)
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0])
-    return settings, settings.arm, log, {"K": 0.2} | MECHANICAL
+    return settings, log, {"K": 0.2} | MECHANICAL
 
 
 def test_weights_scale_the_residuals_of_their_joint():
-    settings, arm, log, truth = mechanical(outputs=[2, 3])
+    settings, log, truth = mechanical(outputs=[2, 3])
     weighted, *_ = mechanical(outputs=[2, 3], **{"objective.weights": {3: 0.25}})
     one, other = Problem(settings, [log]), Problem(weighted, [log])
     theta = one.parameters.vector(truth, "truth")[None]
@@ -117,18 +116,21 @@ def test_a_payload_pulls_on_the_shoulder_with_its_weight_times_its_lever(arm, sp
 
 
 def test_a_payload_slows_the_arm_of_its_log_alone():
-    settings, arm, log, truth = mechanical(payloads={"steps": 5.0})
+    settings, log, truth = mechanical(payloads={"steps": 5.0})
     other = replace(log, source="elsewhere/other.csv")
     loaded, bare = (simulate_log(settings, x, truth, "t").angle[50, 1] for x in (log, other))
     assert abs(loaded - log.angle[0, 1]) < abs(bare - log.angle[0, 1])
     with pytest.raises(SettingsError, match="no place for a payload"):
         simulate_log(
-            settings.model_copy(update={"arm": arm.model_copy(update={"payload": None})}), log, truth, "t"
+            settings.model_copy(update={"arm": settings.arm.model_copy(update={"payload": None})}),
+            log,
+            truth,
+            "t",
         )
 
 
 def test_a_payload_of_no_log_is_refused(tmp_path):
-    settings, arm, log, truth = mechanical(payloads={"heavy.csv": 5.0})
+    settings, log, truth = mechanical(payloads={"heavy.csv": 5.0})
     write_log(tmp_path / "light.csv", simulate_log(settings, log, truth, "t"), settings.log)
     with pytest.raises(SettingsError, match="none of the logs"):
         fit(settings, read_logs([tmp_path / "light.csv"], settings), tmp_path / "out")

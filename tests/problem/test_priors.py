@@ -27,11 +27,11 @@ PARAMETERS = ParameterSet(
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
-def priors(**statements) -> Priors:
-    return Priors({n: PriorSettings.model_validate(s) for n, s in statements.items()}, PARAMETERS)
+def priors(**settings) -> Priors:
+    return Priors({n: PriorSettings.model_validate(s) for n, s in settings.items()}, PARAMETERS)
 
 
-def random_sets(n: int) -> np.ndarray:
+def random_candidates(n: int) -> np.ndarray:
     return PARAMETERS.from_unit(np.random.default_rng(0).random((n, 3)))
 
 
@@ -46,60 +46,45 @@ def test_scores_are_distances_in_standard_deviations():
     assert scores == pytest.approx(np.array([[0.0, 10.0, 4.0, 2.0]]))
 
 
-def test_a_search_stays_where_every_statement_nearly_holds():
+def test_a_search_stays_where_every_prior_nearly_holds():
     known = priors(
         sum={"of": ["a", "b", "c"], "value": 10.0, "sd": 0.5},
         ratio={"ratio": ["a", "b"], "value": 2.0, "sd": 0.01},
         prior={"of": "d", "value": 400.0, "sd": 50.0},
     )
-    moved = known.project(random_sets(200))
+    moved = known.project(random_candidates(200))
     assert np.all(np.abs(known.scores(moved)) <= REACH * 1.001)
     assert np.all(moved[:, PARAMETERS.free] >= PARAMETERS.lower[PARAMETERS.free])
     assert np.all(moved[:, PARAMETERS.free] <= PARAMETERS.upper[PARAMETERS.free])
     assert np.all(moved[:, 2] == 2.0)
 
 
-def test_an_exact_statement_holds_to_a_ten_thousandth():
-    known = priors(sum={"of": ["a", "b"], "value": 8.0})
-    moved = known.project(random_sets(100))
+def test_a_constraint_holds_to_a_ten_thousandth():
+    moved = priors(sum={"of": ["a", "b"], "value": 8.0}).project(random_candidates(100))
     assert moved[:, 0] + moved[:, 1] == pytest.approx(8.0, abs=1e-3)
 
 
 def test_projection_is_idempotent_and_row_by_row():
     known = priors(sum={"of": ["a", "b"], "value": 8.0, "sd": 0.1}, d={"of": "d", "value": 300, "sd": 1})
-    sets = random_sets(50)
-    moved = known.project(sets)
+    candidates = random_candidates(50)
+    moved = known.project(candidates)
     assert known.project(moved) == pytest.approx(moved, rel=1e-12)
-    assert np.array_equal(known.project(sets[7:8]), moved[7:8])
+    assert np.array_equal(known.project(candidates[7:8]), moved[7:8])
+    inside = np.array([[4.0, 4.0, 2.0, 300.0]])
+    assert np.array_equal(known.project(inside), inside)
 
 
-def test_where_all_holds_nothing_moves():
-    sets = np.array([[4.0, 4.0, 2.0, 300.0]])
-    assert np.array_equal(priors(sum={"of": ["a", "b"], "value": 8.0, "sd": 0.1}).project(sets), sets)
-
-
-def test_statements_about_fixed_parameters_only_say_nothing():
-    assert len(priors(c={"of": "c", "value": 1.0, "sd": 0.1})) == 0
-
-
-@pytest.mark.parametrize(
-    ("statement", "says"),
-    [
-        ({"of": ["a", "x"], "value": 1.0}, "no parameter 'x'"),
-        ({"of": ["a", "b"], "value": 50.0, "sd": 0.5}, "cannot hold within the bounds"),
-        ({"ratio": ["a", "c"], "value": 1.0, "sd": 0.1}, None),
-    ],
-)
-def test_what_cannot_be_is_refused(statement, says):
-    if says is None:
-        assert len(priors(wrong=statement)) == 1
-        return
-    with pytest.raises(SettingsError, match=says):
-        priors(wrong=statement)
+def test_priors_that_cannot_hold_are_refused():
+    with pytest.raises(SettingsError, match="no parameter 'x'"):
+        priors(wrong={"of": ["a", "x"], "value": 1.0})
+    with pytest.raises(SettingsError, match="cannot hold within the bounds"):
+        priors(wrong={"of": ["a", "b"], "value": 50.0, "sd": 0.5})
+    assert len(priors(c={"of": "c", "value": 1.0, "sd": 0.1})) == 0  # about a fixed parameter only
+    assert len(priors(ratio={"ratio": ["a", "c"], "value": 1.0, "sd": 0.1})) == 1
 
 
 @pytest.mark.parametrize(
-    "statement",
+    "prior",
     [
         {"value": 1.0},
         {"of": "a", "ratio": ["a", "b"], "value": 1.0},
@@ -110,13 +95,13 @@ def test_what_cannot_be_is_refused(statement, says):
         {"of": "a", "value": 1.0, "sd": 0.0},
     ],
 )
-def test_a_statement_that_says_nothing_is_refused(statement):
+def test_an_incomplete_prior_is_refused(prior):
     with pytest.raises(ValueError, match="validation error"):
-        PriorSettings.model_validate(statement)
+        PriorSettings.model_validate(prior)
 
 
 def masses_problem(known: dict) -> tuple[Problem, np.ndarray]:
-    """Stage 1 from the shoulder alone: K, D, S and the masses can be scaled together but for the jaws."""
+    """Stage 1 from the shoulder alone: K, D, S and the masses but for the jaws have a common scale."""
     settings = load_settings("article-mech", {"priors": known, "objective.segments": {"equal": 2}})
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0])
     log = simulate_log(settings, log, TRUTH, "truth")
@@ -127,8 +112,8 @@ def masses_problem(known: dict) -> tuple[Problem, np.ndarray]:
     return problem, problem.parameters.vector(TRUTH, "truth")
 
 
-def test_the_refinement_weighs_what_is_known_against_the_logs():
-    """Of a direction that the logs do not tell, the refinement believes what is known."""
+def test_a_refinement_weighs_priors_against_the_logs():
+    """Along a direction that the logs do not determine, the prior decides."""
     known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
     problem, truth = masses_problem(known)
     result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda n: None)
@@ -137,7 +122,7 @@ def test_the_refinement_weighs_what_is_known_against_the_logs():
     assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105
 
 
-def test_the_search_keeps_to_what_is_known():
+def test_a_search_stays_at_a_prior_of_the_total_mass():
     known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 42.5, "sd": 0.1}}
     problem, _ = masses_problem(known)
     unit = np.random.default_rng(1).random((30, 9))

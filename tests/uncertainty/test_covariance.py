@@ -136,7 +136,7 @@ def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
     assert flags(uncertainty(fixed, theta)) == expected
 
 
-def test_a_statement_is_one_more_measurement():
+def test_a_prior_is_one_more_measurement():
     columns = slow(3)
     columns[1] = columns[0]
     theta, rng = np.array([1.0, 2.0, 4.0]), np.random.default_rng(4)
@@ -144,9 +144,9 @@ def test_a_statement_is_one_more_measurement():
     known = {"sum": {"of": ["a", "c"], "value": 5.0, "sd": 0.05}}
     problem = Linear(columns, measured, theta, known=known, noise_deg=0.1)
     found = uncertainty(problem, theta)
-    statement = np.array([[1.0, 0.0, 1.0]]) / 0.05
-    information = columns @ columns.T / (0.1 * DEG) ** 2 + statement.T @ statement
-    # the residual's level, by which the statement was weighed, is the noise to about 2 %
+    prior = np.array([[1.0, 0.0, 1.0]]) / 0.05
+    information = columns @ columns.T / (0.1 * DEG) ** 2 + prior.T @ prior
+    # the residual's level, which weighs the prior, is the noise to about 2 %
     np.testing.assert_allclose(
         found.standard_deviation, np.sqrt(np.diag(np.linalg.inv(information))), rtol=1e-3
     )
@@ -164,7 +164,7 @@ def test_a_bound_takes_the_interval():
     assert np.isfinite(found.interval[:2]).all()
 
 
-def test_a_derivative_that_depends_on_its_step_is_said():
+def test_a_derivative_that_depends_on_its_step_is_doubted():
     problem, theta = white_problem()
     smooth = problem.residuals
     jump = 1e-5 * problem.columns[0]
@@ -172,7 +172,7 @@ def test_a_derivative_that_depends_on_its_step_is_said():
     found = jacobian(problem, theta)
     assert found.doubt[0] > 0.01
     assert (found.doubt[1:] < 1e-6).all()
-    # the wider of the two steps counts: it feels the jump less
+    # the wider of the two steps counts: the jump changes it less
     error = found.slopes[0] + theta[0] * problem.columns[0]
     np.testing.assert_allclose(error, -jump / 2e-3 * np.sign(error @ -jump), rtol=1e-3, atol=1e-6)
 
@@ -196,7 +196,6 @@ def test_the_autocovariance_and_its_whitening_belong_together(reflection):
     noise = Noise(60, 2.0, np.array(reflection))
     covariance = toeplitz(noise.autocovariance)
     white = noise.whitened(np.eye(60))  # rows L^-1 e_i
-    np.testing.assert_allclose(white.T @ white @ np.ones(60), white.T @ (white @ np.ones(60)))
     np.testing.assert_allclose(white @ white.T @ covariance, np.eye(60), atol=1e-9)
     rows = slow(3, 60)
     np.testing.assert_allclose(noise.covariance_of(rows), rows @ covariance @ rows.T, rtol=1e-9)
@@ -274,7 +273,7 @@ def test_the_profile_of_a_linear_problem_is_its_parabola():
         profile(problem, found, "z")
 
 
-def test_the_profile_of_what_is_not_determined_has_no_end():
+def test_the_profile_of_an_unidentifiable_parameter_is_unlimited():
     columns = slow(3)
     columns[1] = columns[0]
     problem = Linear(columns, THETA @ columns + np.random.default_rng(0).normal(0, DEG, 1000), THETA)
@@ -294,7 +293,7 @@ def test_a_profile_from_no_optimum_finds_the_better_one():
 
 
 @pytest.mark.parametrize("phi", [0.0, AR1])
-def test_the_bootstrap_spreads_as_the_linear_look_says(phi):
+def test_the_bootstrap_spreads_as_the_linear_covariance(phi):
     columns, rng = slow(3, 6000, seed=7), np.random.default_rng(11)
     measured = THETA @ columns + ar1(rng, 6000, phi, 0.1 * DEG)
     theta = least_squares(columns, measured)

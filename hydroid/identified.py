@@ -28,8 +28,8 @@ class IdentifiedModel:
         theta: the parameters in the order and units of the settings, shape (P,).
         source: where the estimate came from, for messages.
         summary: the fit's own account of the estimate, where a fit made it.
-        nominal: parameters without a value, which the settings and the arm's file stand for; they are no longer
-            among the settings' parameters.
+        nominal: names of parameters without a value. The settings and the arm's file give their effect; they
+            are not among the settings' parameters.
     """
 
     settings: FitSettings
@@ -81,7 +81,7 @@ def load_identified(
     """Read an estimate and the settings it belongs to.
 
     Args:
-        source: a run folder, a folder that a plant was saved in, an `estimate.yaml`, or a YAML file of values by
+        source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
             name; None: no values.
         config: settings, a path or a shipped name; left out: those beside the estimate, or `default`.
         overrides: settings to replace, by dotted key.

@@ -33,8 +33,8 @@ def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
 def predict_log(model: IdentifiedModel, log: Log) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 
-    Joints that the simulation locks stay where they start; prescribed ones keep their logged motion. Stage 2 gives
-    the chamber pressures of driven joints too, where `log.pressure` maps columns for them.
+    Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
+    chamber pressures of driven joints, where `log.pressure` maps columns for them.
 
     Raises:
         RunError: the simulation diverged.
@@ -67,7 +67,7 @@ def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], sou
     return predict_log(identified(settings, values, source), log)
 
 
-def trace(model: IdentifiedModel, log: Log) -> str:
+def trace_csv(model: IdentifiedModel, log: Log) -> str:
     """Return a CSV of the driven joints' actuators, in bar, L/min, mm and N (N·m of a rotary actuator)."""
     settings, stage = model.settings, Stage(model.settings)
     outputs = [int(j) for j in np.flatnonzero(log.driven)]

@@ -61,7 +61,7 @@ class FitResult:
 
 @dataclass(frozen=True, eq=False)
 class FitRuns:
-    """The runs of `fit_mech` or `fit_hyd`: their folder, their results, and the page of their spread, if several."""
+    """The runs of `fit_mech` or `fit_hyd`: their folder, their results and, if several, their spread."""
 
     out: Path
     results: tuple[FitResult, ...]
@@ -108,7 +108,7 @@ class _Task:
     """How one run is made."""
 
     resume: bool = False
-    progress: "Progress" = Silent()
+    progress: "Progress" = field(default_factory=Silent)
     workers: "Spread | None" = None
     findings: "Sequence[Finding]" = field(default_factory=tuple)
 
@@ -184,8 +184,8 @@ def fit_hyd(
     Args:
         logs: as of `fit_mech`.
         out: as of `fit_mech`.
-        mech: stage 1: its run folder, whose arm and log layout count where `config` has none; or a YAML file of
-            its values.
+        mech: stage 1: its run folder, whose arm and log layout count where `config` has none; or a YAML
+            file of its values.
         config: as of `fit_mech`.
         overrides: as of `fit_mech`; they have the last word.
         options: as of `fit_mech`.

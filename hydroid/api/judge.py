@@ -1,4 +1,4 @@
-"""Judge a fit: `validate` it on other logs; `identifiability`, `sensitivity` and `surface` at its estimate."""
+"""Judge a fit: `validate` on other logs; `identifiability`, `sensitivity`, `surface` at its estimate."""
 
 from collections.abc import Sequence
 from pathlib import Path

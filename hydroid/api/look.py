@@ -1,4 +1,4 @@
-"""Look at logs, at an actuator and at the arm in motion: `check`, `view`, `plot_actuator`; and read inputs."""
+"""Look at logs, actuators and the moving arm: `check`, `plot_actuator`, `view`; and read inputs."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -97,7 +97,7 @@ def read_commands(path: str | Path, settings: FitSettings, pose: str | None = No
 
 @dataclass(frozen=True, eq=False)
 class LogCheck:
-    """What `check` found in one file: the log, None where it cannot be used, and all findings, errors first."""
+    """What `check` found in one file: the log, None if it is unusable, and all findings, errors first."""
 
     path: Path
     log: "Log | None"
@@ -163,7 +163,8 @@ def view(
     Args:
         model: the identified arm.
         log: whose commands drive; None: the viewer's sliders.
-        pose: pose of the arm's file to start from; by default the first of the log, or the settings' start pose.
+        pose: name of the start pose in the arm's file; by default the log's first angles, or the settings'
+            start pose.
         gif: a file to write; needs a log and no display.
 
     Raises:

@@ -48,15 +48,15 @@ def simulate(
         if out is not None and Path(out).resolve() == Path(commands).resolve():
             raise SettingsError("would overwrite the commands", where=str(out), hint="name another file")
         commands = read_commands(commands, model.settings)
-    from hydroid import prediction
+    from hydroid.prediction import predict_log, trace_csv
 
-    result = prediction.predict_log(model, commands)
+    result = predict_log(model, commands)
     noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(noise_deg), result.angle.shape)
     result = replace(result, angle=result.angle + noise)
     if out is not None:
         write_log(Path(out), result, model.settings.log)
     if trace is not None:
-        write_atomic(Path(trace), prediction.trace(model, commands))
+        write_atomic(Path(trace), trace_csv(model, commands))
     return result
 
 

@@ -31,7 +31,7 @@ def design(
     Args:
         model: at the present estimate.
         logs: records whose information is there already.
-        out: folder for the report, for commands.csv (every angle in the start pose) and for predicted.csv (the
+        out: folder for the report, commands.csv (every angle in the start pose) and predicted.csv (the
             simulated motion, which is no measurement); None: nothing is written.
         seed: the same seed gives the same experiment.
         progress: called with what is done, how much of it, and how much there is.

@@ -4,7 +4,6 @@ Nothing heavy is imported before a command runs, so that `--help` answers at onc
 """
 
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import typer
@@ -13,7 +12,7 @@ from typer.core import TyperGroup
 from hydroid.cli import fit, judge, look, model, options, plan, stopping
 
 STOPPED = 130
-"""exit status of what Ctrl-C or a signal ended, as shells have it"""
+"""exit status of a command that Ctrl-C or a signal stopped, as in shells"""
 GROUPS = {
     "look": "Look at logs, at the arm and at its actuators",
     "fit": "Fit parameters to logs",
@@ -39,7 +38,7 @@ class Grouped(TyperGroup):
 app = typer.Typer(
     name="hydroid",
     cls=Grouped,
-    help="Estimate the physical parameters of a hydraulic manipulator from logs of commands and joint angles.",
+    help="Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles.",
     epilog="Start with: hydroid check LOG.csv, then hydroid fit-mech LOG.csv",
     no_args_is_help=True,
     add_completion=False,
@@ -48,46 +47,28 @@ app = typer.Typer(
 )
 
 
-def _add(group: str, function: Callable[..., None], summary: str, example: str) -> None:
-    name = function.__name__.replace("_", "-")
-    epilog = f"Example: hydroid {name} {example}"
-    register = app.command(name, rich_help_panel=group, short_help=summary, epilog=epilog)
-    register(options.command(function))
+COMMANDS = (
+    ("look", look.check, "find faults in logs", "LOG.csv"),
+    ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
+    ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),
+    ("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech"),
+    ("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd"),
+    ("fit", fit.collect, "merge runs with different seeds", "'runs/array/seed-*'"),
+    ("judge", judge.validate, "test fits on other logs", "OTHER.csv --fit runs/mech --fit runs/hyd"),
+    ("judge", judge.identifiability, "find what the logs determine", "LOG.csv --fit runs/hyd --profile F1"),
+    ("judge", judge.sensitivity, "draw the effect of each parameter", "LOG.csv --fit runs/mech"),
+    ("judge", judge.surface, "draw the error over two parameters", "LOG.csv --fit runs/mech --over K,D"),
+    ("plan", plan.design, "design the next experiment", "LOG.csv --fit runs/mech --duration 30"),
+    ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),
+    ("model", model.build_model, "make an arm's MJCF model from its meshes", "--arm my-arm.yaml"),
+)
+"""group, function, summary and example of each command"""
 
-
-_add("look", look.check, "what is wrong or odd about logs", "LOG.csv")
-_add("look", look.view, "the arm in motion, in a window or a GIF", "LOG.csv --fit runs/hyd")
-_add("look", look.plot_actuator, "the curves of an actuator", "--fit runs/hyd --joint 2")
-_add("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech")
-_add("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd")
-_add("fit", fit.collect, "merge runs with different seeds", "runs/array/seed-*")
-_add(
-    "judge",
-    judge.validate,
-    "fits on logs they were not fitted to",
-    "OTHER.csv --fit runs/mech --fit runs/hyd",
-)
-_add(
-    "judge",
-    judge.identifiability,
-    "which parameters the logs determine",
-    "LOG.csv --fit runs/hyd --profile F1",
-)
-_add("judge", judge.sensitivity, "outputs against parameters over time", "LOG.csv --fit runs/mech")
-_add("judge", judge.surface, "the error over two parameters", "LOG.csv --fit runs/mech --over K,D")
-_add(
-    "plan",
-    plan.design,
-    "start pose and commands that determine most",
-    "LOG.csv --fit runs/mech --duration 30",
-)
-_add(
-    "model",
-    model.simulate,
-    "what the model does under commands",
-    "COMMANDS.csv --fit runs/hyd --out predicted.csv",
-)
-_add("model", model.build_model, "an arm's MJCF from its meshes", "--arm my-arm.yaml")
+for _group, _function, _summary, _example in COMMANDS:
+    _name = _function.__name__.replace("_", "-")
+    app.command(
+        _name, rich_help_panel=_group, short_help=_summary, epilog=f"Example: hydroid {_name} {_example}"
+    )(options.command(_function))
 
 
 def _version(wanted: bool) -> None:
@@ -108,7 +89,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 
 def main() -> None:
-    """Run a command: exit 0 done, 2 for what the user can mend, 130 when stopped."""
+    """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
     from hydroid.cli.output import show_error, show_usage_error
     from hydroid.errors import HydroidError
 

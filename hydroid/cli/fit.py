@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Output, Repair, Set, overrides
+from hydroid.cli.options import Config, Folder, Output, Repair, Set, overrides
 from hydroid.cli.output import rows, show
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ _PYMOO = "pymoo:"
 FitLogs = Annotated[
     list[Path] | None,
     typer.Argument(
-        metavar="LOG.csv...", help="Logs to fit together; with --resume, the run's own if left out."
+        metavar="LOG.csv...", help="Logs to fit together [default with --resume: the logs of the run]."
     ),
 ]
 
@@ -36,41 +36,47 @@ class FitFlags:
 
     algorithm: Annotated[
         str | None,
-        typer.Option(help="ga (simple), nsga2, cmaes, multistart, or pymoo's, such as pymoo:NSGA3."),
+        typer.Option(
+            help="Search: ga, nsga2, cmaes, multistart, or one of the library pymoo, such as pymoo:NSGA3."
+        ),
     ] = None
     seed: Annotated[
-        int | None, typer.Option(help="Seed of the search; the same seed gives the same bits.")
+        int | None, typer.Option(help="Seed of the search. The same seed gives exactly the same result.")
     ] = None
     runs: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Repeat with this many seeds, from --seed on.")
+        int, typer.Option(min=1, max=10_000, help="Number of runs, with the seeds SEED, SEED + 1, ...")
     ] = 1
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")
     ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out, or begin it.")] = False
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the stopped run in --out; start it if there is none.")
+    ] = False
     refinement: Annotated[
         bool | None,
-        typer.Option("--refinement/--no-refinement", help="Refine the search's estimate by least squares."),
+        typer.Option(
+            "--refinement/--no-refinement", help="After the search, refine its estimate by least squares."
+        ),
     ] = None
     threads: Annotated[
         int | None,
         typer.Option(
-            min=0, max=1024, help="Number of threads (0: one per core; one per worker with --dask)."
+            min=0, max=1024, help="Number of threads; 0: one per core, or with --dask one per worker."
         ),
     ] = None
     dask: Annotated[
         str | None,
         typer.Option(
             metavar="local[:N]|slurm|ADDRESS",
-            help="Simulate in N processes of this machine, in Slurm jobs (settings: cluster), or on the workers "
-            "of a Dask scheduler (address or scheduler file). The result is the same.",
+            help="Simulate in N processes of this machine, in Slurm jobs (see the setting cluster), or on "
+            "the workers of the Dask scheduler at ADDRESS. The result is the same.",
         ),
     ] = None
     dask_insecure: Annotated[
         bool,
         typer.Option(
             "--dask-insecure",
-            help="Accept a --dask address without TLS: anyone who reaches its port can run code as you.",
+            help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.",
         ),
     ] = False
     workers: Annotated[str | None, typer.Option("--workers", hidden=True, callback=_renamed)] = None
@@ -108,8 +114,8 @@ class FitFlags:
 def fit_mech(flags: FitFlags, output: Output, logs: FitLogs = None, config: Config = "fit-mech") -> None:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
-    Writes a run folder: report.html, estimate.yaml, tables, figures, the fitted arm, checkpoint. Judge the estimate
-    with `hydroid validate` on a log it was not fitted to.
+    Writes a run folder with report.html, estimate.yaml, tables, figures and the fitted arm. Then test the
+    estimate on a log that it was not fitted to: `hydroid validate`.
     """
     from hydroid.api.fit import fit_mech
 
@@ -125,19 +131,20 @@ def fit_hyd(
         Path | None,
         typer.Option(
             metavar="RUN|YAML",
-            help="Stage 1: its run folder, whose arm and log layout count where --config has none, or its values.",
+            help="Stage 1: its run folder, or a YAML file of its values. The folder also gives the arm and "
+            "the log layout if --config has none.",
         ),
     ] = None,
     config: Config = "fit-hyd",
     joint: Annotated[
         bool | None,
-        typer.Option("--joint/--no-joint", help="Then refine the parameters of both stages together."),
+        typer.Option("--joint/--no-joint", help="At the end, refine the parameters of both stages together."),
     ] = None,
 ) -> None:
-    """Estimate the hydraulic actuator with the arm fixed at the estimate of stage 1 (stage 2).
+    """Estimate the hydraulic actuators, with the arm as estimated in stage 1 (stage 2).
 
-    Areas, currents, calibration and solenoid of the chain from command to torque. Writes a run folder as fit-mech
-    does.
+    The parameters are the piston areas, currents, calibration and solenoid: all that is between command and
+    torque. Writes a run folder as fit-mech does.
     """
     from hydroid.api.fit import fit_hyd
 
@@ -147,15 +154,15 @@ def fit_hyd(
 
 
 def collect(
-    runs: Annotated[list[str], typer.Argument(metavar="RUN...", help="Run folders, or patterns of them.")],
+    runs: Annotated[
+        list[str], typer.Argument(metavar="RUN...", help="Run folders, or a pattern such as 'runs/seed-*'.")
+    ],
     output: Output,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and tables.")] = Path(
-        "runs/collected"
-    ),
+    out: Folder = Path("runs/collected"),
 ) -> None:
-    """Merge runs of the same logs and settings with different seeds: median and spread of their estimates.
+    """Merge runs of the same fit with different seeds: median and spread of their estimates.
 
-    Runs that are not finished or are damaged are named and left out. Nothing is copied.
+    Unfinished runs and damaged runs are left out, with a warning.
     """
     from hydroid.api.fit import collect
     from hydroid.report.spread import final_spread

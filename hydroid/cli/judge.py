@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Estimate, Logs, Output, Set, names, overrides
+from hydroid.cli.options import Estimate, Folder, Logs, Output, OwnConfig, Set, names, overrides
 from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
@@ -29,14 +29,17 @@ def validate(
     output: Output,
     fit: Annotated[
         list[Path],
-        typer.Option("--fit", "--params", metavar="RUN|YAML", help="An estimate; repeat for several."),
+        typer.Option(
+            "--fit",
+            "--params",
+            metavar="RUN|YAML",
+            help="An estimate: a run folder, a saved plant or a YAML file; repeat for several.",
+        ),
     ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and figures.")] = Path(
-        "runs/validation"
-    ),
+    out: Folder = Path("runs/validation"),
     setting: Set = None,
 ) -> None:
-    """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots."""
+    """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots."""
     from hydroid.api.judge import validate
     from hydroid.identified import load_identified
 
@@ -52,26 +55,32 @@ def identifiability(
     fit: Annotated[
         Path | None,
         typer.Option(
-            "--fit", "--params", metavar="RUN|YAML", help="An estimate [default: the middle of the bounds]."
+            "--fit",
+            "--params",
+            metavar="RUN|YAML",
+            help="An estimate: a run folder, a saved plant or a YAML file "
+            "[default: the middle of the bounds].",
         ),
     ] = None,
-    config: Annotated[
-        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-STAGE].")
-    ] = None,
-    stage: Annotated[Stage, typer.Option(help="The shipped settings to use without --config.")] = Stage.MECH,
+    config: OwnConfig = None,
+    stage: Annotated[
+        Stage, typer.Option(help="Without other settings, use those of this stage (fit-mech or fit-hyd).")
+    ] = Stage.MECH,
     profile: Annotated[
-        str, typer.Option(metavar="K,D", help="Profile likelihood of these; costs a refinement per point.")
+        str,
+        typer.Option(
+            metavar="K,D", help="Parameters to profile. Each point of a profile takes a refinement."
+        ),
     ] = "",
-    bootstrap: Annotated[int, typer.Option(min=0, max=100_000, help="Refits with redrawn residuals.")] = 0,
+    bootstrap: Annotated[int, typer.Option(min=0, max=100_000, help="Number of bootstrap refits.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and figures.")] = Path(
-        "runs/identifiability"
-    ),
+    out: Folder = Path("runs/identifiability"),
     setting: Set = None,
 ) -> None:
-    """Find which combinations of parameters the logs determine, at an estimate or at given values.
+    """Find which parameters, and which combinations of them, the logs determine.
 
-    Prints standard deviations and 95 % intervals, and each combination that the logs do not determine.
+    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
+    do not determine.
     """
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
@@ -102,14 +111,12 @@ def sensitivity(
     logs: Logs,
     estimate: Estimate,
     output: Output,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page, figures and CSV.")] = Path(
-        "runs/sensitivity"
-    ),
+    out: Folder = Path("runs/sensitivity"),
 ) -> None:
-    """Draw how every output depends on every free parameter against time (article, figure 10).
+    """Draw the effect of each free parameter on each output over time (article, figure 10).
 
-    For each output: its change per 1 % of each parameter at the estimate, and the response for 20 values of each
-    parameter within its bounds (PNG, SVG, CSV).
+    One figure shows the change of the output when a parameter of the estimate grows by 1 %. The other shows
+    the response for 20 values of the parameter within its bounds. Both are also written as CSV.
     """
     from hydroid.api.judge import sensitivity
     from hydroid.api.look import read_logs
@@ -126,20 +133,21 @@ def surface(
     estimate: Estimate,
     output: Output,
     over: Annotated[list[str], typer.Option(metavar="K,D", help="Two parameters; repeat for several pairs.")],
-    points: Annotated[int, typer.Option(min=3, max=301, help="Points of the grid in each direction.")] = 31,
+    points: Annotated[int, typer.Option(min=3, max=301, help="Grid points along each axis.")] = 31,
     around: Annotated[
         float | None,
         typer.Option(
-            min=0.001, max=1000, metavar="PCT", help="Grid ±PCT % around the estimate [default: the bounds]."
+            min=0.001,
+            max=1000,
+            metavar="PCT",
+            help="Draw ±PCT % around the estimate [default: from bound to bound].",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page, figures and CSV.")] = Path(
-        "runs/surface"
-    ),
+    out: Folder = Path("runs/surface"),
 ) -> None:
-    """Draw the error over two parameters, all others held at the estimate (article, figure 11).
+    """Draw the error as a function of two parameters, with the others at the estimate (article, figure 11).
 
-    The error is the settings' norm over the whole record; --set objective.norm=2 draws the rms error.
+    The error is the norm objective.norm of the whole record. Use --set objective.norm=2 for the rms error.
     """
     from hydroid.api.judge import surface
     from hydroid.api.look import read_logs

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Logs, NominalEstimate, Output, Repair, Set, overrides
+from hydroid.cli.options import Config, Folder, Logs, NominalEstimate, Output, Repair, Set, overrides
 from hydroid.cli.output import show
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def check(
     logs: Logs, output: Output, config: Config = "fit-mech", setting: Set = None, repair: Repair = False
 ) -> None:
-    """List everything that is wrong or odd about logs; exit 2 where one cannot be used."""
+    """List the faults of logs and anything unusual in them. The exit status is 2 if a log is unusable."""
     from hydroid.api.look import check, load_settings
 
     results = check(logs, load_settings(config, overrides(setting)), repair=repair)
@@ -33,18 +33,19 @@ def view(
     estimate: NominalEstimate,
     output: Output,
     log: Annotated[
-        Path | None, typer.Argument(metavar="LOG.csv", help="Commands; without them, the viewer's sliders.")
+        Path | None,
+        typer.Argument(metavar="LOG.csv", help="Log whose commands drive the arm [default: the sliders]."),
     ] = None,
     pose: Annotated[
-        str | None, typer.Option(help="Start pose of the arm's file [default: the log's first angles].")
+        str | None, typer.Option(help="Name of the start pose in the arm's file [default: start of the log].")
     ] = None,
     gif: Annotated[
-        Path | None, typer.Option(metavar="OUT.gif", help="Write the motion to a file; needs no display.")
+        Path | None, typer.Option(metavar="OUT.gif", help="Write the motion to a GIF instead of a window.")
     ] = None,
 ) -> None:
-    """Show the arm in motion in MuJoCo's viewer, in real time.
+    """Show the moving arm in MuJoCo's viewer, in real time.
 
-    The motor sliders of the right panel ("Control") are the commands in %; Backspace starts again.
+    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
     """
     if gif is not None:
         _render_without_display()
@@ -63,10 +64,10 @@ def view(
 def plot_actuator(
     estimate: NominalEstimate,
     output: Output,
-    joint: Annotated[int, typer.Option(help="Joint, 1 = azimuth, 2 = shoulder ...")] = 2,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figures.")] = Path("runs/actuator"),
+    joint: Annotated[int, typer.Option(help="Number of the joint: 1 azimuth, 2 shoulder ...")] = 2,
+    out: Folder = Path("runs/actuator"),
 ) -> None:
-    """Draw an actuator's calibration, current, force, spool, opening, flow and torque (PNG and SVG)."""
+    """Draw the curves of an actuator: calibration, current, force, spool, opening, flow and torque."""
     from hydroid.api.look import plot_actuator
 
     files = plot_actuator(_model(estimate, output), joint, out)

@@ -11,7 +11,7 @@ from hydroid.cli.output import show
 
 def simulate(
     commands: Annotated[
-        Path, typer.Argument(metavar="COMMANDS.csv", help="Commands; angles give the start pose.")
+        Path, typer.Argument(metavar="COMMANDS.csv", help="Commands. Its first angles are the start pose.")
     ],
     estimate: Estimate,
     output: Output,
@@ -20,7 +20,7 @@ def simulate(
         typer.Option(metavar="LOG.csv", help="The log to write [default: runs/COMMANDS-simulated.csv]."),
     ] = None,
     pose: Annotated[
-        str | None, typer.Option(help="Start pose of the arm's file, for commands without angles.")
+        str | None, typer.Option(help="Name of the start pose in the arm's file [default: start of the log].")
     ] = None,
     noise_deg: Annotated[
         float, typer.Option(min=0, max=90, help="Standard deviation of Gaussian noise on the angles [deg].")
@@ -28,10 +28,10 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     trace: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Also write pressures, flows, spool and force (stage 2)."),
+        typer.Option(metavar="CSV", help="Also write pressures, flows, spool position and force (stage 2)."),
     ] = None,
 ) -> None:
-    """Simulate commands with an estimate and write a log: a prediction, or data to test a fit with."""
+    """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit."""
     from hydroid.api.look import read_commands
     from hydroid.api.model import simulate
     from hydroid.errors import SettingsError
@@ -50,13 +50,14 @@ def simulate(
 def build_model(
     output: Output,
     arm: Annotated[
-        str, typer.Option(help="The arm: a YAML file, or the name of a shipped one.")
+        str, typer.Option(help="The arm: a YAML file, or the name of a shipped arm.")
     ] = "hydrolek",
     meshes: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the meshes [default: as the arm says].")
+        Path | None, typer.Option(metavar="DIR", help="Folder of the meshes [default: as in the arm's file].")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="MODEL.xml", help="MJCF to write [default: as the arm says].")
+        Path | None,
+        typer.Option(metavar="MODEL.xml", help="MJCF file to write [default: as in the arm's file]."),
     ] = None,
 ) -> None:
     """Compute each link's centre of mass and inertia from its mesh and write the arm's MJCF model."""

@@ -12,9 +12,20 @@ from hydroid.cli import stopping
 from hydroid.cli.output import log_lines
 
 Logs = Annotated[
-    list[Path], typer.Argument(metavar="LOG.csv...", help="Logs: commands [%] and joint angles.")
+    list[Path], typer.Argument(metavar="LOG.csv...", help="Logs of commands [%] and joint angles.")
 ]
-Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped one.")]
+Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped config.")]
+OwnConfig = Annotated[
+    str | None,
+    typer.Option(
+        "--config",
+        help="Settings: a YAML file, or the name of a shipped config [default: config.yaml in the folder of "
+        "the estimate, or else fit-mech].",
+    ),
+]
+Folder = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder for the report, tables and figures.")
+]
 Fit = Annotated[
     Path,
     typer.Option(
@@ -28,7 +39,9 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace a setting, such as search.ga.generations=80."),
 ]
-Repair = Annotated[bool, typer.Option("--repair", help="Fill short gaps of the logs, and say how many.")]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Fill short gaps (up to log.repair_s) in the logs, and report them.")
+]
 
 
 @dataclass(kw_only=True)
@@ -37,7 +50,9 @@ class Output:
 
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON (docs/json.md).")] = False
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")] = False
-    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Print the lines of run.log too.")] = False
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="Also print the lines that go to run.log.")
+    ] = False
 
     @property
     def silent(self) -> bool:
@@ -47,18 +62,16 @@ class Output:
 
 @dataclass(kw_only=True)
 class Estimate:
-    """The estimate that a command is about, and its settings."""
+    """The estimate that a command uses, and its settings."""
 
     fit: Fit
-    config: Annotated[
-        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-mech].")
-    ] = None
+    config: OwnConfig = None
     setting: Set = None
 
 
 @dataclass(kw_only=True)
 class NominalEstimate:
-    """The same with nominal values where none are given."""
+    """The same, with nominal values where none are given."""
 
     fit: Annotated[
         Path | None,
@@ -66,11 +79,13 @@ class NominalEstimate:
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate, as everywhere [default: nominal values of the arm and the settings].",
+            help="An estimate: a run folder, a saved plant, or a YAML file of values [default: the nominal "
+            "values of the arm and the settings].",
         ),
     ] = None
     config: Annotated[
-        str | None, typer.Option(help="Settings [default: those beside the estimate, or fit-hyd].")
+        str | None,
+        typer.Option(help="Settings [default: config.yaml in the folder of the estimate, or else fit-hyd]."),
     ] = None
     setting: Set = None
 
@@ -115,7 +130,7 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def overrides(texts: list[str] | None, **flags: Any) -> dict[str, Any]:
-    """Return the settings to replace: those of `--set` and, where not None, those of options by dotted key."""
+    """Return the settings to replace, by dotted key: those of `--set`, and the options that are not None."""
     from hydroid.settings.load import parse_override
 
     changes = dict(parse_override(text) for text in texts or [])

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from hydroid.cli.options import Estimate, Output, names, overrides
+from hydroid.cli.options import Estimate, Folder, Output, names, overrides
 from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
@@ -18,25 +18,27 @@ def design(
     output: Output,
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG.csv...]", help="Logs that are there already: their information counts."),
+        typer.Argument(metavar="LOG.csv...", help="Existing logs, whose information is counted in."),
     ] = None,
-    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the experiment.")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the experiment [s].")] = None,
     joints: Annotated[
-        str | None, typer.Option(metavar="2,3", help="Joints that may be driven [default: the outputs].")
+        str | None, typer.Option(metavar="2,3", help="Joints to drive [default: the compared joints].")
     ] = None,
     criterion: Annotated[
-        str | None, typer.Option(metavar="E|D", help="E: the weakest direction; D: all on average.")
+        str | None,
+        typer.Option(metavar="E|D", help="Minimise the largest (E) or the average (D) uncertainty."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same experiment.")] = 1,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for commands.csv, table and figures.")
-    ] = Path("runs/design"),
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search for commands.")] = 1,
+    out: Folder = Path("runs/design"),
 ) -> None:
-    """Choose the start pose, joints and commands that determine most what is known least.
+    """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
-    The limits (design.speed_deg_s, design.margin_deg, design.command_pct) are checked on the simulated response
-    only. The machine moves otherwise as far as it differs from the model, and collisions are not looked for: watch
-    the first run with a hand on the stop. The config defines the outputs, the free parameters and the limits.
+    SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
+    design.margin_deg, design.command_pct) are checked in simulation only, and the real arm may move
+    further or faster. Collisions are not checked.
+
+    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
+    settings define the compared joints, the free parameters and the limits.
     """
     from hydroid.api.look import read_logs
     from hydroid.api.plan import design

@@ -8,6 +8,7 @@ from hydroid.arm.mesh import mass_properties
 from hydroid.assets import assets
 
 FOLDER = assets() / "meshes"
+pytestmark = pytest.mark.slow  # manifold3d cuts all meshes twice
 
 
 @pytest.fixture(scope="module")

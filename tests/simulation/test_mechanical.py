@@ -107,14 +107,6 @@ def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, stu
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
 
 
-def test_the_first_link_has_no_effect_on_the_shoulder(spec, arm, study_log):
-    one = candidates(arm, 3)
-    mass = one.mass.copy()
-    mass[:, 0] *= 3.0
-    run = simulation(spec, arm, study_log, other_joints="passive").simulate
-    np.testing.assert_allclose(run(replace(one, mass=mass)).angle, run(one).angle, atol=1e-12)
-
-
 @pytest.mark.parametrize("other", ["locked", "passive", "measured"])
 def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other):
     parameters = candidates(arm, 11)
@@ -169,13 +161,6 @@ def test_prescribed_joints_give_the_shoulder_the_motion_they_had(spec, arm):
     locked = simulation(spec, arm, only_shoulder).simulate(parameters).angle[0, :, 0]
     assert errors[0] < 0.02 * np.abs(locked - free[:, 1]).max()
     assert errors[0] < np.deg2rad(0.01)
-
-
-def test_prescribed_joints_that_stand_still_are_locked_joints(spec, arm, study_log):
-    parameters = candidates(arm, 2)
-    locked = simulation(spec, arm, study_log).simulate(parameters).angle
-    still = simulation(spec, arm, study_log, other_joints="measured").simulate(parameters).angle
-    np.testing.assert_allclose(still, locked, atol=1e-6)
 
 
 def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):

@@ -104,7 +104,7 @@ def uncertainty_from(
     interval = np.stack([theta - half, theta + half], axis=1)
     status: list[ParameterStatus] = []
     for i, parameter in enumerate(parameters):
-        bound = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
+        bound: Side | None = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
         if bound is not None and not unidentifiable[i]:
             interval[i] = np.nan
         doubt, diverges = float(derivatives.doubt[i]), not np.isfinite(derivatives.slopes[i]).all()

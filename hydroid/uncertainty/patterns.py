@@ -70,7 +70,7 @@ def _alone(uncertainty: Uncertainty, names: Sequence[str]) -> Iterator[Pattern]:
     idle = uncertainty.jacobian.without_effect[uncertainty.free]
     weak = ~idle & (np.linalg.norm(uncertainty.root, axis=0) < 1 / WEAK_ABOVE)
     for kind, suspects in ((DirectionKind.NO_EFFECT, idle), (DirectionKind.SINGLE, weak)):
-        for i in np.flatnonzero(suspects):
+        for i in np.flatnonzero(suspects).tolist():
             yield Pattern(kind, (names[i],), np.eye(len(names))[[i]])
 
 

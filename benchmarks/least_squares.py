@@ -19,14 +19,14 @@ import scipy.optimize
 from mujoco import minimize
 from pseudo_random import pseudo_random_log
 
+from hydroid import load_settings, read_logs
 from hydroid.estimate import read_values
 from hydroid.fitting.fit import fit
 from hydroid.fitting.refinement import refine
-from hydroid.jobs import load_settings, read_logs
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
-from hydroid.simulating import simulate_log
 
 ROOT = Path(__file__).parents[1]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
@@ -103,7 +103,7 @@ METHODS: dict[str, Callable[[Counter, np.ndarray], str]] = {
 def searched(config: str, changes: dict[str, object]) -> tuple[Problem, np.ndarray]:
     """A problem on the rig's log, and the estimate of a short search."""
     settings = load_settings(config, changes | {"refinement": None})
-    problem = Problem(settings, read_logs([LOG], settings, lambda finding: None))
+    problem = Problem(settings, read_logs([LOG], settings))
     return problem, fit(problem, lambda state, memo: None, Silent()).best.theta
 
 
@@ -124,7 +124,7 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
 
     def article() -> tuple[Problem, np.ndarray]:
         settings = load_settings("article-mech")
-        values = read_values(TRUTH)
+        values, _ = read_values(TRUTH)
         log = simulate_log(settings, pseudo_random_log(settings.arm.pose("study"), [2]), values, str(TRUTH))
         problem = Problem(settings, [log])
         return problem, problem.parameters.from_unit(np.random.default_rng(0).random((1, 9)))[0]

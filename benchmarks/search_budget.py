@@ -21,10 +21,11 @@ from pseudo_random import pseudo_random_log
 from hydroid import load_settings, read_logs
 from hydroid.estimate import read_values
 from hydroid.fitting.fit import Fit, fit
+from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Memo, Problem
+from hydroid.problem.problem import Problem
 
 LOGS = Path(__file__).parents[1] / "examples" / "logs"
 PROBLEMS = (
@@ -41,7 +42,7 @@ EXACT = np.deg2rad(1e-4)
 @cache
 def stage_1(log: str) -> dict[str, float]:
     """Values of stage 1's estimate on a log, the gain left out."""
-    problem = make(log, {"search.nsga2.generations": 20})
+    problem = make(log, {"search.nsga2.generations": 0})
     result = fit(problem, lambda state, memo: None, Silent())
     values = problem.parameters.mapping(result.best.theta)
     return {name: value for name, value in values.items() if name != "K"}
@@ -107,7 +108,7 @@ def main() -> None:
     parser.add_argument("--nsga2", type=int, nargs="*", default=[0, 5, 15])
     parser.add_argument("--problems", nargs="+", choices=PROBLEMS, default=list(PROBLEMS))
     chosen = parser.parse_args()
-    print("| problem | search | generations | simulations: search | refinement | reached | converged | worst |")
+    print("| problem | search | generations | simulated | refining | reached | converged | worst [deg] |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name in chosen.problems:
         table(name, {"ga": chosen.ga, "nsga2": chosen.nsga2}, chosen.seeds)

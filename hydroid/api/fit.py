@@ -328,8 +328,9 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
     checkpoint = folder.begin_or_continue(problem.settings, problem.logs)
     result = run_fit(problem, folder.save, progress, checkpoint, folder.refinements())
     folder.write_estimate(problem, result)
+    began = time.monotonic()
     write_page(fit_page(folder.identity(), problem, result), folder.path)
-    folder.status("done")
+    folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
     return result
 
 

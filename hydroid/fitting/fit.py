@@ -1,7 +1,8 @@
 """A fit: search, the estimates taken from it, refinement, and the uncertainty of the last estimate."""
 
 import logging
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,8 +11,7 @@ from numpy.typing import NDArray
 
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import Checkpoint as RefinementCheckpoint
-from hydroid.fitting.refinement import NoCheckpoint, Refinement, refine
+from hydroid.fitting.refinement import Checkpoints, Refinement, refine
 from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.objectives import overall_objective, segment_objectives
@@ -51,7 +51,8 @@ class Fit:
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
     objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty,
-    identifiability: what the logs say about the final estimate.
+    identifiability: what the logs say about the final estimate. seconds: wall-clock time of "search",
+    "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
     estimates: dict[str, Estimate]
@@ -61,6 +62,7 @@ class Fit:
     refinements: dict[str, Refinement]
     uncertainty: Uncertainty
     identifiability: Identifiability
+    seconds: Mapping[str, float]
 
     @property
     def refinement(self) -> Refinement | None:
@@ -110,7 +112,7 @@ def fit(
     save: Callable[[SearchState, Memo], None],
     watch: Watcher,
     checkpoint: Checkpoint | None = None,
-    refinements: Callable[[str], RefinementCheckpoint] = lambda name: NoCheckpoint(),
+    refinements: Checkpoints | None = None,
 ) -> Fit:
     """Search, take the estimates, refine the best of them.
 
@@ -119,12 +121,12 @@ def fit(
         save: keeps the search's state now and then.
         watch: takes how far the fit is.
         checkpoint: where an interrupted search was.
-        refinements: from a name to where the refinement of that name stores how far it is.
+        refinements: how far interrupted refinements were; takes how far these are.
 
     Raises:
         RunError: every simulated candidate diverged.
     """
-    settings = problem.settings
+    settings, began = problem.settings, time.perf_counter()
     memo = Memo(problem)
     if checkpoint is not None:
         memo.restore(*checkpoint.memo)
@@ -141,16 +143,24 @@ def fit(
         candidates = _from_front(theta, evaluation, memo, settings.search.compromise)
     estimates = _usable_first(_estimates(problem, candidates))
     start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
+    searched = time.perf_counter()
     results, last, final = dict[str, Refinement](), problem, next(iter(estimates))
     for name in _refined(problem):
         last = problem.freed() if name == "joint" else problem
         assert settings.refinement is not None
-        result = refine(last, start.theta, settings.refinement, watch.refining, refinements(name))
+        result = refine(last, start.theta, settings.refinement, watch.refining, refinements, name)
         if not result.ending.converged:
             _log.warning("the refinement of the estimate %s did not converge: %s", name, result.ending.value)
         estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
         results[name], start, final = result, estimates[name], name
+    refined = time.perf_counter()
     told = uncertainty(last, estimates[final].theta)
+    directions = identifiability(last, told)
+    seconds = {
+        "search": searched - began,
+        "refinement": refined - searched,
+        "uncertainty": time.perf_counter() - refined,
+    }
     return Fit(
         estimates,
         final,
@@ -158,7 +168,8 @@ def fit(
         state.history,
         results,
         told,
-        identifiability(last, told),
+        directions,
+        seconds,
     )
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydroid.fitting.memo import Memo
-from hydroid.fitting.refinement import Checkpoint, NoCheckpoint, refine
+from hydroid.fitting.refinement import Checkpoints, refine
 from hydroid.fitting.search import HISTORY, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
@@ -37,7 +37,7 @@ class Multistart:
         settings: of the search: the seed, and how each start is fitted.
         memo: takes the points reached.
         progress: takes the number of simulations of the start under way.
-        checkpoint: from a name to where the refinement of that name stores how far it is.
+        checkpoints: of the refinements.
     """
 
     single = True
@@ -48,9 +48,9 @@ class Multistart:
         settings: SearchSettings,
         memo: Memo,
         progress: Callable[[int], None],
-        checkpoint: Callable[[str], Checkpoint] = lambda name: NoCheckpoint(),
+        checkpoints: Checkpoints | None = None,
     ) -> None:
-        self._problem, self._memo, self._progress, self._checkpoint = problem, memo, progress, checkpoint
+        self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
         self._seed, self._settings = settings.seed, settings.multistart
         longest = max(log.duration for log in problem.logs)
         self._parts = [problem.first(h) for h in self._settings.horizons if h < longest]
@@ -98,7 +98,8 @@ class Multistart:
                 theta,
                 settings,
                 lambda n, before=simulated: self._progress(before + n),
-                self._checkpoint(f"start {done + 1} part {part + 1}"),
+                self._checkpoints,
+                f"start {done + 1} part {part + 1}",
             )
             theta = problem.parameters.from_unit(result.point[None])[0]
             simulated += result.evaluations

@@ -2,9 +2,9 @@
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from hydroid.fitting import search
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import Ending, State, start, step
+from hydroid.search.least_squares import start, step
+from hydroid.search.least_squares_state import Ending, State
 from hydroid.settings.search import RefinementSettings
 from hydroid.uncertainty.noise import prior_weight
 
@@ -22,30 +23,10 @@ SETTLED = 0.02
 """relative change of the noise below which another round would change nothing"""
 
 Arrays = dict[str, NDArray[Any]]
+Checkpoints = MutableMapping[str, Arrays]
+"""how far refinements are, by name"""
 
 _log = logging.getLogger(__name__)
-
-
-class Checkpoint(Protocol):
-    """Where a refinement stores how far it is."""
-
-    def load(self) -> Arrays | None:
-        """Return what was saved last; None where nothing was."""
-        ...
-
-    def save(self, arrays: Arrays) -> None:
-        """Store arrays in place of what was saved before."""
-        ...
-
-
-class NoCheckpoint:
-    """Stores nothing."""
-
-    def load(self) -> None:
-        """Return nothing."""
-
-    def save(self, arrays: Arrays) -> None:
-        """Ignore the arrays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +90,8 @@ def refine(
     theta: Array,
     settings: RefinementSettings,
     progress: Callable[[int], None],
-    checkpoint: Checkpoint | None = None,
+    checkpoints: Checkpoints | None = None,
+    name: str = "refined",
 ) -> Refinement:
     """Improve an estimate by bounded least squares.
 
@@ -121,13 +103,14 @@ def refine(
         theta: where to start, shape (P,).
         settings: when to end.
         progress: takes the number of simulations so far.
-        checkpoint: where it continues from, and stores how far it is; a result is stored too.
+        checkpoints: where it continues from, and stores how far it is; a result is stored too.
+        name: of this refinement among them.
 
     Raises:
         RunError: the checkpoint cannot be written.
     """
-    checkpoint = checkpoint or NoCheckpoint()
-    stored = checkpoint.load()
+    checkpoints = {} if checkpoints is None else checkpoints
+    stored = checkpoints.get(name)
     if stored is not None and "descent.weight" not in stored:
         values = {n: v if v.ndim else v.item() for n, v in stored.items()}
         return Refinement(**values | {"ending": Ending[values["ending"]]})
@@ -138,16 +121,16 @@ def refine(
             descent = after
             progress(descent.evaluations + descent.state.evaluations)
             if time.monotonic() - saved > search.SAVE_EVERY:
-                checkpoint.save(descent.arrays())
+                checkpoints[name] = descent.arrays()
                 saved, last = time.monotonic(), descent
     except BaseException:
         if descent is not last:
-            checkpoint.save(descent.arrays())
+            checkpoints[name] = descent.arrays()
         raise
     result = descent.result()
     _log.info("refinement of %d parameters: %s", result.point.size, result)
     values = asdict(result) | {"ending": result.ending.name}
-    checkpoint.save({n: np.asarray(v) for n, v in values.items()})
+    checkpoints[name] = {n: np.asarray(v) for n, v in values.items()}
     return result
 
 

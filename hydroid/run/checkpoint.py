@@ -4,7 +4,7 @@ import hashlib
 import io
 import json
 import logging
-from dataclasses import dataclass
+from collections import UserDict
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +69,8 @@ def read_checkpoint(file: Path, run: str) -> Checkpoint | None:
         return earlier
 
 
-class RefinementCheckpoints:
-    """How far the refinements of a run are, by name, in one file.
+class RefinementCheckpoints(UserDict[str, Arrays]):
+    """How far the refinements of a run are, by name; every change is written to one file.
 
     A damaged file is put aside with a warning. The refinements are then done again, to the same bits.
 
@@ -79,57 +79,31 @@ class RefinementCheckpoints:
         run: id of the run.
 
     Raises:
-        RunError: the file is another run's.
+        RunError: the file is another run's; on a change, it cannot be written.
     """
 
     def __init__(self, file: Path, run: str) -> None:
+        super().__init__()
         self._file, self._run = file, run
-        self._arrays: Arrays = {}
         if not file.exists():
             return
         try:
-            self._arrays = _read(file, run)
+            arrays = _read(file, run)
         except RunError as error:
             if error.what == ANOTHER:
                 raise
             _log.warning("%s: %s; its refinements are done again", error.where, error.what)
             file.replace(file.with_suffix(".damaged.npz"))
+            return
+        for key, array in arrays.items():
+            name, _, part = key.partition("/")
+            self.data.setdefault(name, {})[part] = array
 
-    def __call__(self, name: str) -> "RefinementCheckpoint":
-        """Return the checkpoint of one refinement."""
-        return RefinementCheckpoint(self, name)
-
-    def load(self, name: str) -> Arrays | None:
-        """Return what was stored under a name."""
-        found = {n.split("/")[1]: a for n, a in self._arrays.items() if n.split("/")[0] == name}
-        return found or None
-
-    def save(self, name: str, arrays: Arrays) -> None:
-        """Store arrays under a name, in place of what was there.
-
-        Raises:
-            RunError: the file cannot be written.
-        """
-        others = {n: a for n, a in self._arrays.items() if n.split("/")[0] != name}
-        self._arrays = others | {f"{name}/{n}": a for n, a in arrays.items()}
+    def __setitem__(self, name: str, arrays: Arrays) -> None:
+        self.data[name] = arrays
+        content = {f"{n}/{part}": a for n, several in self.data.items() for part, a in several.items()}
         with undisturbed():
-            write_atomic(self._file, _content(self._arrays, self._run))
-
-
-@dataclass(frozen=True)
-class RefinementCheckpoint:
-    """The checkpoint of one refinement in the file of all."""
-
-    _all: RefinementCheckpoints
-    _name: str
-
-    def load(self) -> Arrays | None:
-        """Return what was saved last; None where nothing was."""
-        return self._all.load(self._name)
-
-    def save(self, arrays: Arrays) -> None:
-        """Store arrays in place of what was saved before."""
-        self._all.save(self._name, arrays)
+            write_atomic(self._file, _content(content, self._run))
 
 
 def _search(file: Path, run: str) -> Checkpoint:

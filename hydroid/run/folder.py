@@ -3,7 +3,7 @@
 import hashlib
 import json
 import logging
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,9 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
 DESCRIPTION = "run.json"
-"""name of the file that describes the run: versions, seed, hashes of its logs and files, status"""
+"""name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
+CHANGING = ("status", "seconds")
+"""its entries that change while the run goes on"""
 
 _log = logging.getLogger(__name__)
 
@@ -136,6 +138,10 @@ class RunFolder:
         """Record whether the run is running, interrupted or done."""
         self._describe(self.identity() | {"status": word})
 
+    def done(self, seconds: Mapping[str, float]) -> None:
+        """Record that the run is done, and the wall-clock time of its parts [s]."""
+        self._describe(self.identity() | {"status": "done", "seconds": dict(seconds)})
+
     def interrupt(self) -> str:
         """Record the status `interrupted`, and return what is kept, empty where nothing was written."""
         if not self.exists:
@@ -169,7 +175,7 @@ class RunFolder:
 
     def _id(self) -> str:
         """A digest that distinguishes this run's checkpoints from those of others."""
-        identity = {key: value for key, value in self.identity().items() if key != "status"}
+        identity = {key: value for key, value in self.identity().items() if key not in CHANGING}
         return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
     def _refuse_other_files(self) -> None:

@@ -49,7 +49,12 @@ def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     assert estimate | {"out": "run"} == found
     for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.tex", "figures/response.svg"):
         assert (run / name).stat().st_size > 0
-    assert json.loads((run / "run.json").read_text())["status"] == "done"
+    described = json.loads((run / "run.json").read_text())
+    assert described["status"] == "done"
+    assert set(described["seconds"]) == {"search", "refinement", "uncertainty", "report"}
+    # a refinement that ends at its limit of one step says so
+    assert found["converged"] is False
+    assert "refinement of the estimate refined did not converge: the iteration limit" in done.stderr
 
     done = hydroid("validate", short, "--fit", "run", "--json", "--out", "val", cwd=tmp_path)
     (row,) = json.loads(done.stdout)["results"]

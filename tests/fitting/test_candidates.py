@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import step_log
+from small_fits import TRUTH, Watcher
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
@@ -13,7 +14,6 @@ from hydroid.problem.problem import Evaluation, Problem
 from hydroid.report.fit_report import fit_page, objective_table, parameter_table
 from hydroid.report.phrases import fit_warnings
 
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 STEPS = 2**16 - 1
 """of a parameter's 16 bits"""
 
@@ -33,14 +33,6 @@ class Fragile(Problem):
         for response in responses:
             response.angle[self.bad(theta)] = np.nan
         return responses
-
-
-class Watcher:
-    def generation(self, row) -> None:
-        pass
-
-    def refining(self, simulated: int) -> None:
-        pass
 
 
 def make(kind=Fragile, **changes) -> Problem:

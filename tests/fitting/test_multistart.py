@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_fits import Watcher
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import fit
@@ -15,22 +16,6 @@ from hydroid.run.folder import RunFolder
 
 TRUTH = {"K2": 0.2, "D2": 231.8, "S2": 53.4, "K3": 0.3, "D3": 150.0, "S3": 40.0, "M3": 22.5}
 JOINTS = {"K": "gain", "D": "damping", "S": "stiffness"}
-
-
-class Watcher:
-    """Keeps the rows; stops a run after so many starts, or in the middle of the one after them."""
-
-    def __init__(self, stop_after: int | None = None, simulations: int = 0) -> None:
-        self.rows, self.told = [], []
-        self.stop_after, self.simulations = stop_after, simulations
-
-    def generation(self, row) -> None:
-        self.rows.append(row)
-
-    def refining(self, simulated: int) -> None:
-        self.told.append(simulated)
-        if len(self.rows) == self.stop_after and simulated > self.simulations:
-            raise KeyboardInterrupt
 
 
 def parameters(factor: float) -> dict:
@@ -64,11 +49,11 @@ def make(factor: float = 10.0, noise_deg: float = 0.0, **changes):
     log = simulate_log(settings, log, TRUTH, "truth")
     noise = np.random.default_rng(0).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
     noise[0] = 0.0
-    return settings, settings.arm, replace(log, angle=log.angle + noise)
+    return settings, replace(log, angle=log.angle + noise)
 
 
 def test_the_first_seconds_count_from_the_first_command():
-    _, _, log = make()
+    _, log = make()
     part = log.first(1.0)
     assert part.time[-1] == pytest.approx(0.5 + 1.0)
     np.testing.assert_array_equal(part.command, log.command[:151])
@@ -77,7 +62,7 @@ def test_the_first_seconds_count_from_the_first_command():
 
 
 def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time():
-    settings, arm, log = make()
+    settings, log = make()
     problem = Problem(settings, [log])
     theta = random_start(problem, np.random.default_rng(0))[None]
     part = problem.first(1.0)
@@ -86,7 +71,7 @@ def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time():
 
 
 def test_starts_fill_the_bounds_evenly_by_decades_where_these_are_wide():
-    settings, arm, log = make(factor=100.0, **{"parameters.S2.bounds": [0.0, 500.0]})
+    settings, log = make(factor=100.0, **{"parameters.S2.bounds": [0.0, 500.0]})
     problem = Problem(settings, [log])
     rng = np.random.default_rng(1)
     drawn = np.array([random_start(problem, rng) for _ in range(2000)])
@@ -101,7 +86,7 @@ def test_starts_fill_the_bounds_evenly_by_decades_where_these_are_wide():
 
 def test_starts_hold_what_is_known():
     known = {"priors": {"elbow": {"of": "D3", "value": 150.0, "sd": 1.0}}}
-    settings, arm, log = make(**known)
+    settings, log = make(**known)
     problem = Problem(settings, [log])
     rng = np.random.default_rng(2)
     drawn = np.array([random_start(problem, rng) for _ in range(20)])
@@ -109,7 +94,7 @@ def test_starts_hold_what_is_known():
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise():
-    settings, arm, log = make(**{"search.multistart.gain_tolerance": 1e-9})
+    settings, log = make(**{"search.multistart.gain_tolerance": 1e-9})
     problem = Problem(settings, [log])
     watcher = Watcher()
     search = Multistart(problem, settings.search, Memo(problem), watcher.refining)
@@ -121,7 +106,7 @@ def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise():
 
 
 def test_a_fit_to_noise_gains_no_more_than_its_parameters_can():
-    settings, arm, log = make(noise_deg=0.02, **{"search.multistart.starts": 2})
+    settings, log = make(noise_deg=0.02, **{"search.multistart.starts": 2})
     problem = Problem(settings, [log])
     watcher = Watcher()
     result = fit(problem, lambda state, memo: None, watcher)
@@ -134,19 +119,10 @@ def test_a_fit_to_noise_gains_no_more_than_its_parameters_can():
     assert result.history[-1, 1] == result.history[-1, 2] > result.history[0, 1]
 
 
-def test_starts_with_one_output_end_at_one_response():
-    """From the shoulder alone few combinations are known: no one point, but one response."""
-    settings, arm, log = make(outputs=[2], **{"search.multistart.starts": 2})
-    problem = Problem(settings, [log])
-    search = Multistart(problem, settings.search, Memo(problem), lambda simulated: None)
-    state = search.run(None, lambda state, memo: None, lambda row: None)
-    assert state.population.objectives.max() < np.deg2rad(0.02)
-
-
 @pytest.mark.parametrize("simulations", [0, 60])
 def test_a_resumed_run_ends_bit_for_bit_where_it_would_have(tmp_path: Path, simulations):
     few = {"starts": 3, "iterations": 4, "horizons": [0.25, 2.0]}
-    settings, arm, log = make(noise_deg=0.05, refinement=None, **{"search.multistart": few})
+    settings, log = make(noise_deg=0.05, refinement=None, **{"search.multistart": few})
     problem = Problem(settings, [log])
     whole = fit(problem, lambda state, memo: None, Watcher())
     folder = RunFolder(tmp_path / "run")
@@ -156,7 +132,7 @@ def test_a_resumed_run_ends_bit_for_bit_where_it_would_have(tmp_path: Path, simu
         fit(
             problem,
             folder.save,
-            Watcher(stop_after=1, simulations=simulations),
+            Watcher(stop_at=1, simulations=simulations),
             refinements=folder.refinements(),
         )
     watcher = Watcher()

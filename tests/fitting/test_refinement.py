@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import step_log
+from small_fits import TRUTH
 
 from hydroid import load_settings
 from hydroid.errors import RunError
@@ -16,7 +17,6 @@ from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import RefinementCheckpoints
 from hydroid.settings.search import RefinementSettings
 
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 SHORT = RefinementSettings(iterations=6)
 
 
@@ -63,36 +63,36 @@ def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
-        refine(problem, begin(problem), SHORT, stop_after(limit), RefinementCheckpoints(file, "a")("x"))
-    parts = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a")("x"))
+        refine(problem, begin(problem), SHORT, stop_after(limit), RefinementCheckpoints(file, "a"))
+    parts = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a"))
     assert equal(parts, whole)
     assert problem.simulated == whole.evaluations
-    again = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a")("x"))
+    again = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a"))
     assert equal(again, whole)
     assert problem.simulated == whole.evaluations  # the result itself is kept
 
 
 def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = RefinementCheckpoints(tmp_path / "refinement.npz", "a")
-    refine(problem, begin(problem), SHORT, lambda n: None, checkpoints("one"))
-    other = refine(problem, 1.1 * begin(problem), SHORT, lambda n: None, checkpoints("another"))
+    refine(problem, begin(problem), SHORT, lambda n: None, checkpoints, "one")
+    other = refine(problem, 1.1 * begin(problem), SHORT, lambda n: None, checkpoints, "another")
     assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda n: None))
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
 def test_a_damaged_checkpoint_is_put_aside_and_the_refinement_done_again(tmp_path, keep, caplog):
     file = tmp_path / "refinement.npz"
-    RefinementCheckpoints(file, "a")("x").save({"point": np.arange(100.0)})
-    assert RefinementCheckpoints(file, "a")("x").load() is not None
+    RefinementCheckpoints(file, "a")["x"] = {"point": np.arange(100.0)}
+    assert "x" in RefinementCheckpoints(file, "a")
     content = file.read_bytes()
     file.write_bytes(content[: int(keep * len(content))])
-    assert RefinementCheckpoints(file, "a")("x").load() is None
+    assert "x" not in RefinementCheckpoints(file, "a")
     assert "is damaged" in caplog.text
     assert not file.exists()
 
 
 def test_the_checkpoint_of_another_run_is_refused(tmp_path):
-    RefinementCheckpoints(tmp_path / "r.npz", "a")("x").save({"point": np.arange(3.0)})
+    RefinementCheckpoints(tmp_path / "r.npz", "a")["x"] = {"point": np.arange(3.0)}
     with pytest.raises(RunError, match="another run"):
         RefinementCheckpoints(tmp_path / "r.npz", "b")
 

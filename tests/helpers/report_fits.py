@@ -12,7 +12,7 @@ from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.search.least_squares import Ending
+from hydroid.search.least_squares_state import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty_from
@@ -116,6 +116,7 @@ def make_fit(
         {"refined": refined} if "refined" in names else {},
         uncertain,
         identifiability(problem, uncertain),
+        {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from search_runs import advance, evaluate, same
+from search_runs import advance, evaluate
 
 from hydroid.errors import SettingsError
 from hydroid.search.algorithm import Population
@@ -57,14 +57,6 @@ def test_the_elite_is_kept_and_not_evaluated_again(elitism):
         best = np.sort(population.objectives[:, 0])[:elitism]  # numpy sorts nan last
         assert np.array_equal(successor.objectives[:elitism, 0], best, equal_nan=True)
         population = successor
-
-
-def test_without_elitism_all_is_new():
-    ga = SimpleGa(GaSettings(population=10, elitism=0), 3)
-    rng = np.random.default_rng(0)
-    population = advance(ga, sphere, None, rng, 0)
-    offspring = evaluate(ga, ga.ask(population, rng), sphere)
-    assert same(ga.tell(population, offspring), offspring)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -140,18 +140,6 @@ def scored(values):
     return Population(np.zeros((len(values), 3)), np.array(values, dtype=float))
 
 
-def test_a_population_that_diverges_throughout_does_not_count_as_converged():
-    calls = []
-
-    def late(points):
-        calls.append(len(points))
-        values = distances(ENDS[:1])(points)
-        return values if len(calls) > 4 else np.full_like(values, np.nan)
-
-    population = advance(build("cmaes"), late, None, np.random.default_rng(0), 30)
-    assert population.objectives[0] < 0.01
-
-
 @pytest.mark.parametrize("name", ["cmaes", *SINGLE, *SEVERAL])
 def test_the_seed_alone_decides_every_bit(name: str, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)

@@ -1,0 +1,55 @@
+"""Small fits for tests: the article's true values, a watcher, and fits of a simulated log in folders."""
+
+from pathlib import Path
+
+from conftest import step_log
+
+from hydroid import load_settings, read_logs
+from hydroid.fitting.fit import Fit, fit
+from hydroid.log import write_log
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.run.folder import RunFolder
+
+TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+class Watcher:
+    """Keeps the rows; interrupts a fit after so many, or in the refinement after them."""
+
+    def __init__(self, stop_at: int | None = None, simulations: int | None = None) -> None:
+        self.rows, self.stop_at, self.simulations = [], stop_at, simulations
+
+    def generation(self, row) -> None:
+        self.rows.append(row)
+        if len(self.rows) == self.stop_at and self.simulations is None:
+            raise KeyboardInterrupt
+
+    def refining(self, simulated: int) -> None:
+        if self.simulations is not None and len(self.rows) == self.stop_at and simulated > self.simulations:
+            raise KeyboardInterrupt
+
+
+class Study:
+    """The article's stage 1 on five simulated seconds, three segments, and small populations."""
+
+    def __init__(self, folder: Path, **changes) -> None:
+        sizes = {"ga": 10, "nsga2": 8, "cmaes": 8, "pymoo": 8}
+        small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
+        self.settings = load_settings("article-mech", small | {"objective.segments": {"equal": 3}} | changes)
+        log = step_log(self.settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
+        self.log = simulate_log(self.settings, log, TRUTH, "truth")
+        self.path = folder / "log.csv"
+        write_log(self.path, self.log, self.settings.log)
+        self.problem = Problem(self.settings, [self.log])
+
+    def fit(self) -> Fit:
+        """A fit that stores nothing."""
+        return fit(self.problem, lambda state, memo: None, Watcher())
+
+    def fit_in(self, folder: RunFolder, watcher: Watcher) -> Fit:
+        """A fit in a folder, continued where the folder has a checkpoint."""
+        checkpoint = folder.begin_or_continue(self.settings, read_logs([self.path], self.settings))
+        result = fit(self.problem, folder.save, watcher, checkpoint, folder.refinements())
+        folder.write_estimate(self.problem, result)
+        return result

@@ -30,7 +30,7 @@ class Silent:
     def generation(self, row: np.ndarray) -> None:
         """Ignore a generation."""
 
-    def refining(self, simulated: int) -> None:
+    def refining(self, simulated: int, rms: float) -> None:
         """Ignore the refinement."""
 
 

@@ -83,7 +83,7 @@ def study(phi: float, logs: int, seconds: float, *, start: bool) -> None:
         rng = np.random.default_rng([seed, int(1000 * phi)])
         one = Problem(settings, [with_noise(clean, phi, rng, start=start)])
         first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-        found = refine(one, first, settings.refinement, lambda _: None)
+        found = refine(one, first, settings.refinement, lambda n, rms: None)
         theta = one.parameters.from_unit(found.point[None])[0]
         told = uncertainty(one, theta)
         estimates.append(theta[free])

@@ -113,13 +113,13 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
 
     def stage_2() -> tuple[Problem, np.ndarray]:
         mech, theta = searched("fit-mech", ga)
-        point = refine(mech, theta, RefinementSettings(), lambda n: None).point
+        point = refine(mech, theta, RefinementSettings(), lambda n, rms: None).point
         values = mech.parameters.mapping(mech.parameters.from_unit(point[None])[0])
         return searched("fit-hyd", ga | {f"parameters.{n}.fixed": v for n, v in values.items() if n != "K"})
 
     def joint() -> tuple[Problem, np.ndarray]:
         problem, theta = stage_2()
-        point = refine(problem, theta, RefinementSettings(), lambda n: None).point
+        point = refine(problem, theta, RefinementSettings(), lambda n, rms: None).point
         return problem.freed(), problem.parameters.from_unit(point[None])[0]
 
     def article() -> tuple[Problem, np.ndarray]:
@@ -143,7 +143,7 @@ class Silent:
     def generation(self, row: np.ndarray) -> None:
         """Ignore a generation."""
 
-    def refining(self, simulated: int) -> None:
+    def refining(self, simulated: int, rms: float) -> None:
         """Ignore a simulation."""
 
 

@@ -55,7 +55,7 @@ class FitSummary(Settings):
     final: str | None = None
     """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""
     converged: bool | None = None
-    """whether the last refinement converged; null: there was none"""
+    """whether every refinement converged; null: there was none"""
     ending: str | None = None
     """why the last refinement ended"""
     rms_deg: float | None = None

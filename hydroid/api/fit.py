@@ -74,7 +74,7 @@ class Silent:
     def generation(self, row: "Array") -> None:
         """Do nothing."""
 
-    def refining(self, simulated: int) -> None:
+    def refining(self, simulated: int, rms: float) -> None:
         """Do nothing."""
 
 

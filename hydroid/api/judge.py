@@ -6,30 +6,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydroid.api.look import read_logs
+from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel
-from hydroid.log import Log
 from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
+    from hydroid.api.look import LogSources
     from hydroid.report.uncertainty_report import UncertaintyStudy
     from hydroid.report.validation_report import Validation
     from hydroid.uncertainty.sweep import Surface, Sweep
 
 
 def validate(
-    models: Sequence[IdentifiedModel], logs: Sequence[str | Path], out: str | Path | None = "runs/validation"
+    models: ModelSource | Sequence[ModelSource],
+    logs: "LogSources",
+    out: str | Path | None = "runs/validation",
 ) -> "Study[list[Validation]]":
     """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots.
 
-        study = hydroid.validate([hydroid.load_identified("runs/a")], ["b.csv"])
+        study = hydroid.validate("runs/a", "b.csv")
         print(study.result[0].indices[2].rms)  # of joint 2 [rad]
 
     Args:
-        models: identified arms, each of which reads the logs with its own settings.
-        logs: CSV files.
+        models: a run folder, a YAML file of values or an identified model, or several of them. Each reads the
+            logs with its own settings.
+        logs: CSV files or logs, one or several.
         out: folder for the page, the table and the figures; None: nothing is written.
 
     Returns:
@@ -39,13 +42,15 @@ def validate(
         LogError: a log cannot be used.
         RunError: a simulation diverged, or the folder cannot be written.
     """
-    read = [read_logs(logs, model.settings) for model in models]
+    several = [models] if isinstance(models, str | Path | IdentifiedModel) else models
+    opened = [open_model(model) for model in several]
+    read = [read_logs(logs, model.settings) for model in opened]
     from hydroid.fitting.validation import error_indices
     from hydroid.prediction import predict
     from hydroid.report.validation_report import Validation, validation_page
 
     results: list[Validation] = []
-    for model, each in zip(models, read, strict=True):
+    for model, each in zip(opened, read, strict=True):
         outputs = model.settings.outputs
         for log in each:
             response = predict(model, log, outputs)
@@ -58,8 +63,8 @@ def validate(
 
 
 def identifiability(
-    model: IdentifiedModel,
-    logs: Sequence[Log],
+    model: ModelSource,
+    logs: "LogSources",
     out: str | Path | None = "runs/identifiability",
     *,
     profile: Sequence[str] = (),
@@ -68,13 +73,12 @@ def identifiability(
 ) -> "Study[UncertaintyStudy]":
     """Find which combinations of parameters logs determine, at an estimate or at given values.
 
-        model = hydroid.load_identified("runs/a")
-        study = hydroid.identifiability(model, hydroid.read_logs(["a.csv"], model.settings), profile=["K"])
+        study = hydroid.identifiability("runs/a", "a.csv", profile=["K"])
         print(study.result.uncertainty.interval)
 
     Args:
-        model: the identified arm (`middle_of_bounds` gives one before any fit).
-        logs: the logs.
+        model: as of `validate` (`middle_of_bounds` gives one before any fit).
+        logs: CSV files or logs, one or several.
         out: folder for the page, tables and figures; None: nothing is written.
         profile: names of parameters whose profile likelihood is wanted.
         bootstrap: number of refits with redrawn residuals, 0 for none, and the seed.
@@ -88,7 +92,8 @@ def identifiability(
     from hydroid.report.uncertainty_report import UncertaintyStudy, uncertainty_page
     from hydroid.uncertainty import covariance, directions, intervals
 
-    problem = Problem(model.settings, list(logs))
+    model = open_model(model)
+    problem = Problem(model.settings, read_logs(logs, model.settings))
     if not np.isfinite(problem.residuals(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=model.source)
     uncertainty = covariance.uncertainty(problem, model.theta)
@@ -104,20 +109,19 @@ def identifiability(
 
 
 def sensitivity(
-    model: IdentifiedModel,
-    logs: Sequence[Log],
+    model: ModelSource,
+    logs: "LogSources",
     out: str | Path | None = "runs/sensitivity",
     *,
     progress: Progress = no_progress,
 ) -> "Study[Sweep]":
     """Find how every output depends on every free parameter against time (article, figure 10).
 
-        model = hydroid.load_identified("runs/a")
-        study = hydroid.sensitivity(model, hydroid.read_logs(["a.csv"], model.settings))
+        study = hydroid.sensitivity("runs/a", "a.csv")
 
     Args:
-        model: the identified arm.
-        logs: the logs.
+        model: as of `validate`.
+        logs: CSV files or logs, one or several.
         out: folder for the page, figures and CSV; None: nothing is written.
         progress: called with what is done, how much of it, and how much there is.
 
@@ -128,14 +132,15 @@ def sensitivity(
     from hydroid.report.sensitivity_report import sensitivity_page
     from hydroid.uncertainty.sweep import sweep
 
-    problem = Problem(model.settings, list(logs))
+    model = open_model(model)
+    problem = Problem(model.settings, read_logs(logs, model.settings))
     result = sweep(problem, model.theta, progress)
     return Study(result, sensitivity_page(problem, model.theta, result)).write(out)
 
 
 def surface(
-    model: IdentifiedModel,
-    logs: Sequence[Log],
+    model: ModelSource,
+    logs: "LogSources",
     over: Sequence[tuple[str, str]],
     out: str | Path | None = "runs/surface",
     *,
@@ -144,12 +149,11 @@ def surface(
 ) -> "Study[list[Surface]]":
     """Compute the error over two parameters, all others held at the estimate (article, figure 11).
 
-        model = hydroid.load_identified("runs/a")
-        study = hydroid.surface(model, hydroid.read_logs(["a.csv"], model.settings), [("K", "D")])
+        study = hydroid.surface("runs/a", "a.csv", [("K", "D")])
 
     Args:
-        model: the identified arm.
-        logs: the logs.
+        model: as of `validate`.
+        logs: CSV files or logs, one or several.
         over: pairs of parameters.
         out: folder for the page, figures and CSV; None: nothing is written.
         grid: points in each direction, and the relative reach around the estimate (0.2 for ±20 %; None: the
@@ -167,6 +171,7 @@ def surface(
     from hydroid.report.objectives import surface_page
     from hydroid.uncertainty import sweep as sweeps
 
-    problem = Problem(model.settings, list(logs))
+    model = open_model(model)
+    problem = Problem(model.settings, read_logs(logs, model.settings))
     results = [sweeps.surface(problem, model.theta, pair, *grid, progress) for pair in over]
     return Study(results, surface_page(results, model.settings.objective)).write(out)

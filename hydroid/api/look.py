@@ -11,18 +11,28 @@ import numpy as np
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
-from hydroid.identified import IdentifiedModel
+from hydroid.identified import IdentifiedModel, load_identified
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
 if TYPE_CHECKING:
     from hydroid.log import Finding, Log
 
+    LogSources = str | Path | Log | Sequence[str | Path | Log]
+
 NOTE = 25
 """level of the logging module between INFO and WARNING, for notes on a log"""
 logging.addLevelName(NOTE, "NOTE")
 
 _log = logging.getLogger(__name__)
+
+
+ModelSource = str | Path | IdentifiedModel
+
+
+def open_model(model: ModelSource) -> IdentifiedModel:
+    """Return a model as it is, or read it from a run folder, a saved plant or a YAML file of values."""
+    return model if isinstance(model, IdentifiedModel) else load_identified(model)
 
 
 def load_settings(config: str | Path, overrides: Mapping[str, Any] | None = None) -> FitSettings:
@@ -40,13 +50,13 @@ def load_settings(config: str | Path, overrides: Mapping[str, Any] | None = None
     return load(find_config(config), FitSettings, dict(overrides or {}))
 
 
-def read_logs(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> "list[Log]":
+def read_logs(logs: "LogSources", settings: FitSettings, *, repair: bool = False) -> "list[Log]":
     """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
 
         logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
 
     Args:
-        logs: CSV files.
+        logs: CSV files, or logs that were read before; one or several.
         settings: of the fit; joints that a log does not measure stand in its `start_pose`.
         repair: fill holes up to `log.repair_s`.
 
@@ -57,14 +67,17 @@ def read_logs(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool
 
 
 def read_with_findings(
-    logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False
+    logs: "LogSources", settings: FitSettings, *, repair: bool = False
 ) -> "tuple[list[Log], list[Finding]]":
     """Do as `read_logs`, and return the warnings and notes too."""
-    from hydroid.log import read_log
+    from hydroid.log import Log, read_log
 
     read: list[Log] = []
     found: list[Finding] = []
-    for path in logs:
+    for path in [logs] if isinstance(logs, str | Path | Log) else logs:
+        if isinstance(path, Log):
+            read.append(path)
+            continue
         log, findings = read_log(
             Path(path), settings.log, _ranges(settings), outputs=settings.outputs, repair=repair
         )
@@ -122,13 +135,13 @@ def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = F
     return [LogCheck(path, *check_log(path, settings.log, _ranges(settings), **how)) for path in paths]
 
 
-def plot_actuator(model: IdentifiedModel, joint: int = 2, out: str | Path = "runs/actuator") -> list[Path]:
+def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/actuator") -> list[Path]:
     """Draw the curves of one actuator: calibration, current, force, spool, opening, flow and torque.
 
-        hydroid.plot_actuator(hydroid.load_identified("runs/hyd"), joint=2)
+        hydroid.plot_actuator("runs/hyd", joint=2)
 
     Args:
-        model: of stage 2.
+        model: of stage 2: a run folder, a YAML file of values or an identified model.
         joint: numbered from 1.
         out: folder for the figures.
 
@@ -139,6 +152,7 @@ def plot_actuator(model: IdentifiedModel, joint: int = 2, out: str | Path = "run
         SettingsError: no such joint, no hydraulics, or no force-stroke curve.
         RunError: `out` cannot be written.
     """
+    model = open_model(model)
     _require_hydraulics(model)
     from hydroid.problem.stage import Stage
     from hydroid.report.actuator_report import actuator_page, joint_actuator
@@ -150,18 +164,18 @@ def plot_actuator(model: IdentifiedModel, joint: int = 2, out: str | Path = "run
 
 
 def view(
-    model: IdentifiedModel,
-    log: str | Path | None = None,
+    model: ModelSource,
+    log: "str | Path | Log | None" = None,
     *,
     pose: str | None = None,
     gif: str | Path | None = None,
 ) -> None:
     """Show the arm in MuJoCo's viewer in real time until its window is closed, or write its motion to a GIF.
 
-        hydroid.view(hydroid.load_identified("runs/a"), "a.csv", gif="a.gif")
+        hydroid.view("runs/a", "a.csv", gif="a.gif")
 
     Args:
-        model: the identified arm.
+        model: a run folder, a YAML file of values or an identified model.
         log: whose commands drive; None: the viewer's sliders.
         pose: name of the start pose in the arm's file; by default the log's first angles, or the settings'
             start pose.
@@ -173,9 +187,12 @@ def view(
     """
     if gif is not None and log is None:
         raise SettingsError("needs a log: a file has no sliders", where=str(gif))
+    model = open_model(model)
     if model.nominal:
         _require_hydraulics(model)
-    commands = None if log is None else read_commands(log, model.settings, pose)
+    from hydroid.log import Log
+
+    commands = log if log is None or isinstance(log, Log) else read_commands(log, model.settings, pose)
     from hydroid.viewer.playback import make_playback
     from hydroid.viewer.window import animation, show
 

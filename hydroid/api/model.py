@@ -5,16 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.api.look import read_commands
+from hydroid.api.look import ModelSource, open_model, read_commands
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
-from hydroid.identified import IdentifiedModel
 from hydroid.log import Log, write_log
 from hydroid.settings.arm import load_arm
 
 
 def simulate(
-    model: IdentifiedModel,
+    model: ModelSource,
     commands: str | Path | Log,
     out: str | Path | None = None,
     *,
@@ -24,10 +23,10 @@ def simulate(
 ) -> Log:
     """Simulate commands: a prediction, or data to test a fit with.
 
-        log = hydroid.simulate(hydroid.load_identified("runs/a"), "commands.csv", "predicted.csv")
+        log = hydroid.simulate("runs/a", "commands.csv", "predicted.csv")
 
     Args:
-        model: the identified arm.
+        model: a run folder, a YAML file of values or an identified model.
         commands: a CSV of commands, whose first angles are the start pose; or a log (see `read_commands`).
         out: the log to write; None: none.
         noise_deg: standard deviation of Gaussian noise on every angle [deg].
@@ -42,6 +41,7 @@ def simulate(
         LogError: the commands cannot be used.
         RunError: the simulation diverged, or a file cannot be written.
     """
+    model = open_model(model)
     if trace is not None and model.settings.stage != "hyd":
         raise SettingsError("stage mech has no pressures to trace", where=model.source, hint="set stage: hyd")
     if not isinstance(commands, Log):

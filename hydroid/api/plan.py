@@ -1,21 +1,21 @@
 """Plan the next experiment: `design`."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
-from hydroid.identified import IdentifiedModel
-from hydroid.log import Log, write_log
+from hydroid.log import write_log
 from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
+    from hydroid.api.look import LogSources
     from hydroid.experiment.design import Design
 
 
 def design(
-    model: IdentifiedModel,
-    logs: Sequence[Log] = (),
+    model: ModelSource,
+    logs: "LogSources" = (),
     out: str | Path | None = "runs/design",
     *,
     seed: int = 1,
@@ -29,8 +29,8 @@ def design(
     Limits and length are the settings `design`. They are checked on the simulated response only.
 
     Args:
-        model: at the present estimate.
-        logs: records whose information is there already.
+        model: at the present estimate: a run folder, a YAML file of values or an identified model.
+        logs: CSV files or logs whose information is there already.
         out: folder for the report, commands.csv (every angle in the start pose) and predicted.csv (the
             simulated motion, which is no measurement); None: nothing is written.
         seed: the same seed gives the same experiment.
@@ -43,8 +43,9 @@ def design(
     from hydroid.experiment import design as experiment
     from hydroid.report.design_report import design_page
 
+    model = open_model(model)
     settings = model.settings
-    result = experiment.design(settings, model.theta, list(logs), seed, progress)
+    result = experiment.design(settings, model.theta, read_logs(logs, settings), seed, progress)
     if out is not None:
         write_log(Path(out) / "commands.csv", result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.predicted, settings.log)

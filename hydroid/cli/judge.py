@@ -85,7 +85,7 @@ def identifiability(
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
     from hydroid.identified import load_identified, middle_of_bounds
-    from hydroid.report.phrases import direction_phrases
+    from hydroid.report.phrases import direction_phrases, profile_warnings
 
     default, changes = f"fit-{stage.value}", overrides(setting)
     if fit is None:
@@ -103,8 +103,13 @@ def identifiability(
         )
     phrases = direction_phrases(study.result.problem, study.result.identifiability)
     content = _uncertainty(study.result, phrases)
-    points = [f"- {phrase}" for phrase in phrases]
-    show(output, lambda: content, [study.table, *points, str(out / "identifiability.html")])
+    warnings = profile_warnings(study.result.profiles)
+    lines = [*(f"- {phrase}" for phrase in phrases), *warnings]
+    show(
+        output,
+        lambda: content | {"warnings": list(warnings)},
+        [study.table, *lines, str(out / "identifiability.html")],
+    )
 
 
 def sensitivity(

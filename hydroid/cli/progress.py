@@ -2,7 +2,7 @@
 
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
@@ -30,7 +30,7 @@ class Progress:
         self._quiet, self._label, self._bar = quiet, label, None
         self._shown = time.monotonic()
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -86,10 +86,9 @@ class FitProgress(Progress):
             f"best {best * self._scale:.4g}{self._unit}, {rate:.0f} simulations/s",
         )
 
-    def refining(self, simulated: int, rms: float | None = None) -> None:
+    def refining(self, simulated: int, rms: float) -> None:
         """Take the number of simulations of the refinement, and the rms error [rad] so far."""
-        error = "" if rms is None else f"rms error {rms * DEGREES:.4g} deg"
-        self("refinement, simulations", simulated, None, error)
+        self("refinement, simulations", simulated, None, f"rms error {rms * DEGREES:.4g} deg")
 
 
 def _new_bar(label: str) -> tuple[Any, Any]:

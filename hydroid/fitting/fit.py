@@ -102,8 +102,8 @@ class Watcher(Protocol):
         """Take a row of HISTORY."""
         ...
 
-    def refining(self, simulated: int) -> None:
-        """Take the number of simulations the refinement has made."""
+    def refining(self, simulated: int, rms: float) -> None:
+        """Take the number of simulations of the refinement, and its rms error [rad] so far."""
         ...
 
 

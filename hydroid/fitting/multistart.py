@@ -36,7 +36,7 @@ class Multistart:
         problem: what is minimised.
         settings: of the search: the seed, and how each start is fitted.
         memo: takes the points reached.
-        progress: takes the number of simulations of the start under way.
+        progress: takes the number of simulations of the start under way, and its rms error [rad].
         checkpoints: of the refinements.
     """
 
@@ -47,7 +47,7 @@ class Multistart:
         problem: Problem,
         settings: SearchSettings,
         memo: Memo,
-        progress: Callable[[int], None],
+        progress: Callable[[int, float], None],
         checkpoints: Checkpoints | None = None,
     ) -> None:
         self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
@@ -97,7 +97,7 @@ class Multistart:
                 problem,
                 theta,
                 settings,
-                lambda n, before=simulated: self._progress(before + n),
+                lambda n, rms, before=simulated: self._progress(before + n, rms),
                 self._checkpoints,
                 f"start {done + 1} part {part + 1}",
             )

@@ -89,7 +89,7 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[int], None],
+    progress: Callable[[int, float], None],
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Refinement:
@@ -102,7 +102,7 @@ def refine(
         problem: the problem.
         theta: where to start, shape (P,).
         settings: when to end.
-        progress: takes the number of simulations so far.
+        progress: takes the number of simulations and the rms error [rad] so far.
         checkpoints: where it continues from, and stores how far it is; a result is stored too.
         name: of this refinement among them.
 
@@ -119,7 +119,8 @@ def refine(
     try:
         while (after := _next(problem, descent, settings)) is not None:
             descent = after
-            progress(descent.evaluations + descent.state.evaluations)
+            error = problem.rms(descent.state.residual[None, : problem.measured.size])[0]
+            progress(descent.evaluations + descent.state.evaluations, float(error))
             if time.monotonic() - saved > search.SAVE_EVERY:
                 checkpoints[name] = descent.arrays()
                 saved, last = time.monotonic(), descent

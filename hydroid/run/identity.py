@@ -33,6 +33,18 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
     }
 
 
+def _other_logs(before: dict[str, str], now: dict[str, str]) -> str:
+    """Say how the logs' contents differ, empty if they do not; the files may have moved."""
+    if list(before.values()) == list(now.values()):
+        return ""
+    if len(before) != len(now):
+        return f"{len(before)} of them, now {len(now)}"
+    if sorted(before.values()) == sorted(now.values()):
+        return f"their order was {', '.join(before)}"
+    changed = next((b, n) for b, n in zip(before, now, strict=True) if before[b] != now[n])
+    return f"{changed[1]} is not the {changed[0]} of the run, or its content has changed"
+
+
 def own_hashes(folder: Path) -> dict[str, str]:
     """Return hashes of the settings and the model in a run folder, by file."""
     files = [folder / name for name in (CONFIG, ARM, MODEL)]
@@ -57,10 +69,12 @@ def refuse_other_run(
     """
     other = "choose another folder"
     now = identity(settings, logs)
-    for key in ("hydroid", "mujoco", "logs"):
+    for key in ("hydroid", "mujoco"):
         if then.get(key) != now[key]:
-            what = f"holds a run with other {key}: {then.get(key)}, now {now[key]}"
+            what = f"holds a run of {key} {then.get(key)}, this is {now[key]}"
             raise RunError(what, where=str(folder), hint=other)
+    if difference := _other_logs(then.get("logs", {}), now["logs"]):
+        raise RunError(f"holds a run of other logs: {difference}", where=str(folder), hint=other)
     hashes = own_hashes(folder)
     for name, known in then.get("files", {}).items():
         if hashes.get(name) != known:

@@ -17,7 +17,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         estimate=parameter_estimates(problem, fit.uncertainty),
         joints=problem.active_joints,
         final=fit.final,
-        converged=None if ending is None else ending.converged,
+        converged=None if ending is None else fit.converged,
         ending=None if ending is None else ending.value,
         rms_deg=finite(np.degrees(fit.best.rms)),
         seed=problem.settings.search.seed,

@@ -184,4 +184,4 @@ def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
         if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
             return []
         kind = inner
-    return list(kind.model_fields)
+    return [field.alias or name for name, field in kind.model_fields.items()]

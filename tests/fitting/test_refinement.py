@@ -48,7 +48,7 @@ def equal(one: Refinement, other: Refinement) -> bool:
 
 
 def stop_after(limit: int):
-    def progress(simulated: int) -> None:
+    def progress(simulated: int, rms: float) -> None:
         if simulated > limit:
             raise KeyboardInterrupt
 
@@ -59,24 +59,24 @@ def stop_after(limit: int):
 def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit):
     file = tmp_path / "refinement.npz"
     problem.simulated = 0
-    whole = refine(problem, begin(problem), SHORT, lambda n: None)
+    whole = refine(problem, begin(problem), SHORT, lambda n, rms: None)
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
         refine(problem, begin(problem), SHORT, stop_after(limit), RefinementCheckpoints(file, "a"))
-    parts = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a"))
+    parts = refine(problem, begin(problem), SHORT, lambda n, rms: None, RefinementCheckpoints(file, "a"))
     assert equal(parts, whole)
     assert problem.simulated == whole.evaluations
-    again = refine(problem, begin(problem), SHORT, lambda n: None, RefinementCheckpoints(file, "a"))
+    again = refine(problem, begin(problem), SHORT, lambda n, rms: None, RefinementCheckpoints(file, "a"))
     assert equal(again, whole)
     assert problem.simulated == whole.evaluations  # the result itself is kept
 
 
 def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     checkpoints = RefinementCheckpoints(tmp_path / "refinement.npz", "a")
-    refine(problem, begin(problem), SHORT, lambda n: None, checkpoints, "one")
-    other = refine(problem, 1.1 * begin(problem), SHORT, lambda n: None, checkpoints, "another")
-    assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda n: None))
+    refine(problem, begin(problem), SHORT, lambda n, rms: None, checkpoints, "one")
+    other = refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None, checkpoints, "another")
+    assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None))
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
@@ -106,9 +106,9 @@ def test_a_start_that_was_interrupted_goes_on_within_it(problem, tmp_path):
         made = Multistart(problem, settings, Memo(problem), progress, checkpoints)
         return made.run(None, lambda state, memo: None, lambda row: None)
 
-    whole = search(lambda n: None, RefinementCheckpoints(tmp_path / "whole.npz", "a"))
+    whole = search(lambda n, rms: None, RefinementCheckpoints(tmp_path / "whole.npz", "a"))
     with pytest.raises(KeyboardInterrupt):
         search(stop_after(30), RefinementCheckpoints(tmp_path / "parts.npz", "a"))
-    parts = search(lambda n: None, RefinementCheckpoints(tmp_path / "parts.npz", "a"))
+    parts = search(lambda n, rms: None, RefinementCheckpoints(tmp_path / "parts.npz", "a"))
     np.testing.assert_array_equal(parts.population.chromosomes, whole.population.chromosomes)
     np.testing.assert_array_equal(parts.history, whole.history)

@@ -116,7 +116,7 @@ def test_a_refinement_weighs_priors_against_the_logs():
     """Along a direction that the logs do not determine, the prior decides."""
     known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
     problem, truth = masses_problem(known)
-    result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda n: None)
+    result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda n, rms: None)
     theta = problem.parameters.from_unit(result.point[None])
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)
     assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105

@@ -48,7 +48,7 @@ class Watcher:
         if row[0] == self.stop_at:
             raise KeyboardInterrupt
 
-    def refining(self, simulated: int) -> None:
+    def refining(self, simulated: int, rms: float) -> None:
         pass
 
 
@@ -273,6 +273,18 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
             settings.model_copy(update={"arm": arm.model_copy(update={"model": model})}),
             read_logs([path], settings),
         )
+
+
+def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, made, tmp_path):
+    settings, _, path, _ = made
+    moved = tmp_path / "moved.csv"
+    moved.write_bytes(path.read_bytes())
+    folder.check(settings, read_logs(moved, settings))
+    with pytest.raises(RunError, match="other logs: 1 of them, now 2"):
+        folder.check(settings, read_logs([moved, path], settings))
+    moved.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
+    with pytest.raises(RunError, match=r"moved.csv is not the .*log.csv of the run"):
+        folder.check(settings, read_logs(moved, settings))
 
 
 def test_two_in_one_folder_the_second_is_refused(made, tmp_path):

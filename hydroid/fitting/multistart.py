@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hydroid.fitting.memo import Memo
-from hydroid.fitting.refinement import Checkpoints, refine
+from hydroid.fitting.refinement import Checkpoints, Refinement, refine
 from hydroid.fitting.search import HISTORY, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
@@ -91,7 +91,7 @@ class Multistart:
         settings = RefinementSettings(
             iterations=self._settings.iterations, gain_tolerance=self._settings.gain_tolerance
         )
-        theta, simulated = self.start(done), 0
+        theta, simulated, results = self.start(done), 0, list[Refinement]()
         for part, problem in enumerate([*self._parts, self._problem]):
             result = refine(
                 problem,
@@ -103,6 +103,8 @@ class Multistart:
             )
             theta = problem.parameters.from_unit(result.point[None])[0]
             simulated += result.evaluations
+            results.append(result)
+        result = results[-1]
         rms = np.sqrt(2 * result.cost / (self._problem.measured.size + len(self._problem.priors)))
         population = Population(result.point[None], np.array([[rms]]))
         history = np.empty((0, len(HISTORY)))

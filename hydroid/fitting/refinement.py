@@ -112,8 +112,9 @@ def refine(
     checkpoints = {} if checkpoints is None else checkpoints
     stored = checkpoints.get(name)
     if stored is not None and "descent.weight" not in stored:
-        values = {n: v if v.ndim else v.item() for n, v in stored.items()}
-        return Refinement(**values | {"ending": Ending[values["ending"]]})
+        values: dict[str, Any] = {n: v if v.ndim else v.item() for n, v in stored.items()}
+        values["ending"] = Ending[values["ending"]]
+        return Refinement(**values)
     descent = _begin(problem, theta) if stored is None else _Descent.from_arrays(stored)
     saved, last = time.monotonic(), descent
     try:

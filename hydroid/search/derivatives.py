@@ -23,7 +23,7 @@ def derivatives(residuals: Residuals, point: Float, row: Float, width: float) ->
     """
     h = width * np.where(point > 0.5, -1.0, 1.0)
     columns = _quotients(residuals, point, row, h, np.ones(point.size, dtype=bool))
-    failed = ~np.isfinite(columns).all(axis=1)
+    failed = np.logical_not(np.isfinite(columns).all(axis=1))
     if failed.any():
         columns[failed] = _quotients(residuals, point, row, -h, failed)
     length = np.linalg.norm(columns, axis=1)

@@ -74,7 +74,8 @@ class State:
     @staticmethod
     def from_arrays(arrays: dict[str, NDArray[Any]]) -> "State":
         """Return the state that `arrays` stored."""
-        values = {
+        values: dict[str, Any] = {
             f.name: arrays[f.name] if arrays[f.name].ndim else arrays[f.name].item() for f in fields(State)
         }
-        return State(**values | {"ending": Ending[values["ending"]] if values["ending"] else None})
+        values["ending"] = Ending[values["ending"]] if values["ending"] else None
+        return State(**values)

@@ -28,7 +28,7 @@ class LinearModel:
     def reduced(self, row: Float) -> tuple[Float, Float]:
         """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
         p = len(self._moving)
-        both = np.linalg.qr(np.column_stack([self.jacobian[:, self._moving], row]), mode="r")
+        both = np.asarray(np.linalg.qr(np.column_stack([self.jacobian[:, self._moving], row]), mode="r"))
         return both[:p, :p], both[:p, p]
 
     def step(self, damping: float, row: Float | None = None) -> Float:

@@ -15,13 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hydroid.api.fit import FitOptions as FitOptions
     from hydroid.api.fit import FitResult as FitResult
-    from hydroid.api.fit import FitRuns as FitRuns
-    from hydroid.api.fit import collect as collect
     from hydroid.api.fit import fit as fit
-    from hydroid.api.fit import fit_hyd as fit_hyd
-    from hydroid.api.fit import fit_mech as fit_mech
     from hydroid.api.judge import identifiability as identifiability
     from hydroid.api.judge import sensitivity as sensitivity
     from hydroid.api.judge import surface as surface
@@ -36,6 +31,11 @@ if TYPE_CHECKING:
     from hydroid.api.model import build_model as build_model
     from hydroid.api.model import simulate as simulate
     from hydroid.api.plan import design as design
+    from hydroid.api.stages import FitOptions as FitOptions
+    from hydroid.api.stages import FitRuns as FitRuns
+    from hydroid.api.stages import collect as collect
+    from hydroid.api.stages import fit_hyd as fit_hyd
+    from hydroid.api.stages import fit_mech as fit_mech
     from hydroid.api.study import Study as Study
     from hydroid.errors import HydroidError as HydroidError
     from hydroid.identified import IdentifiedModel as IdentifiedModel
@@ -51,7 +51,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _NAMES = {
-    "hydroid.api.fit": "FitOptions FitResult FitRuns collect fit fit_hyd fit_mech",
+    "hydroid.api.fit": "FitResult fit",
+    "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",
     "hydroid.api.judge": "identifiability sensitivity surface validate",
     "hydroid.api.look": "LogCheck check load_settings plot_actuator read_commands read_logs view",
     "hydroid.api.model": "build_model simulate",

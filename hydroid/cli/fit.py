@@ -11,7 +11,7 @@ from hydroid.cli.options import Config, Folder, Output, Repair, Set, overrides
 from hydroid.cli.output import rows, show
 
 if TYPE_CHECKING:
-    from hydroid.api.fit import FitOptions, FitRuns
+    from hydroid.api.stages import FitOptions, FitRuns
 
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 """keys of the table of several runs"""
@@ -98,7 +98,7 @@ class FitFlags:
 
     def options(self, output: Output) -> "FitOptions":
         """Return what else the options ask for."""
-        from hydroid.api.fit import FitOptions
+        from hydroid.api.stages import FitOptions
         from hydroid.cli.progress import FitProgress
 
         return FitOptions(
@@ -117,7 +117,7 @@ def fit_mech(flags: FitFlags, output: Output, logs: FitLogs = None, config: Conf
     Writes a run folder with report.html, estimate.yaml, tables, figures and the fitted arm. Then test the
     estimate on a log that it was not fitted to: `hydroid validate`.
     """
-    from hydroid.api.fit import fit_mech
+    from hydroid.api.stages import fit_mech
 
     changes, how = flags.changes(), flags.options(output)
     _show(fit_mech(logs or [], flags.out, config=config, overrides=changes, options=how), output)
@@ -146,7 +146,7 @@ def fit_hyd(
     The parameters are the piston areas, currents, calibration and solenoid: all that is between command and
     torque. Writes a run folder as fit-mech does.
     """
-    from hydroid.api.fit import fit_hyd
+    from hydroid.api.stages import fit_hyd
 
     changes = flags.changes() | ({} if joint is None else {"joint_refinement": joint})
     how = flags.options(output)
@@ -164,7 +164,7 @@ def collect(
 
     Unfinished runs and damaged runs are left out, with a warning.
     """
-    from hydroid.api.fit import collect
+    from hydroid.api.stages import collect
     from hydroid.report.spread import final_spread
 
     study = collect(runs, out)

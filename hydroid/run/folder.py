@@ -108,7 +108,7 @@ class RunFolder:
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
-            what = f"no run can be read ({getattr(error, 'strerror', None) or 'it is damaged'})"
+            what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
             raise RunError(what, where=str(file), hint="name a folder that a fit has made") from None
         hashes = [content.get(key, {}) for key in ("logs", "files")] if isinstance(content, dict) else [None]
         if not all(isinstance(h, dict) and all(isinstance(v, str) for v in h.values()) for h in hashes):

@@ -79,7 +79,7 @@ def test_an_example_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatc
     def quick(config: str, overrides: dict[str, object] | None = None):
         return original(config, QUICK | (overrides or {}))
 
-    monkeypatch.setattr("hydroid.api.fit.load_settings", quick)
+    monkeypatch.setattr("hydroid.api.stages.load_settings", quick)
     monkeypatch.setattr("hydroid.load_settings", quick)
     monkeypatch.setattr("hydroid.report.page.write_page", lambda *_: [])
     exec(compile(code, name, "exec"), {"hydroid": hydroid})

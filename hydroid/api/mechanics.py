@@ -36,7 +36,7 @@ def with_mechanics(
         settings = load(find_config(config), FitSettings, changes)
         free = [name for name in _mechanical(settings) if settings.parameters[name].fixed is None]
         if free:
-            hint = "give the run of stage 1 (--mech RUN), or set their `fixed` values in the config"
+            hint = "give --mech RUN of stage 1, or set their `fixed` values in the config"
             raise SettingsError(f"stage 2 needs stage 1's {', '.join(free)}", hint=hint)
         return changes
     values, summary = read_values(Path(mech))

@@ -228,7 +228,7 @@ def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
 
 def test_the_second_stage_needs_the_first(short: Path, tmp_path: Path):
     done = hydroid("fit-hyd", short, cwd=tmp_path, code=2)
-    assert "run of stage 1 (mech)" in done.stderr
+    assert "give --mech RUN of stage 1" in done.stderr
     (tmp_path / "mech.yaml").write_text("D: 80.0\n")
     done = hydroid("fit-hyd", short, "--mech", "mech.yaml", cwd=tmp_path, code=2)
     assert "M6" in done.stderr

@@ -38,7 +38,7 @@ PINS = ("F1", "x1", "x2")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--algorithm", default="nsga2")
     parser.add_argument("--unpinned", action="store_true")

@@ -46,7 +46,7 @@ def study(algorithm: str, seed: int) -> tuple[Problem, Fit, np.ndarray, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--algorithms", nargs="+", default=["ga", "nsga2"])
     arguments = parser.parse_args()

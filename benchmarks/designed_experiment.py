@@ -89,7 +89,7 @@ def refit(arm, settings, log: Log, truth: np.ndarray, count: int) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--random", type=int, default=20)
     parser.add_argument("--improvements", type=int, default=200)
     parser.add_argument("--fits", type=int, default=50)

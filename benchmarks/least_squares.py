@@ -148,7 +148,7 @@ class Silent:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", nargs="+", choices=list(problems()))
     chosen = parser.parse_args().only or list(problems())
     print("| problem | parameters | method | simulations | until 0.1 % | rms [deg] | ending |")

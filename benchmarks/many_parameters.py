@@ -159,7 +159,7 @@ def show_intervals(problem: Problem, best: Fit) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--starts", type=int, default=10)
     parser.add_argument("--peer-starts", type=int, default=3)
     parser.add_argument("--duration", type=float, default=60.0)

@@ -98,7 +98,7 @@ def table(stage: str, workers: dict[str, DaskWorkers], rounds: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
     print(f"{os.cpu_count()} cores; medians of {arguments.rounds} rounds; load {os.getloadavg()[0]:.1f}")

@@ -102,7 +102,7 @@ def table(name: str, generations: dict[str, list[int]], seeds: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--ga", type=int, nargs="*", default=[0, 5])
     parser.add_argument("--nsga2", type=int, nargs="*", default=[0, 5, 15])

@@ -55,7 +55,7 @@ def main() -> None:
         print("| seed | search, nine | search, eight | refined, eight | no effect | simulations | seconds |")
         print("| --- | --- | --- | --- | --- | --- | --- |")
         rows: list[np.ndarray] = []
-        worst = 0.0
+        worst, names = 0.0, np.array([], str)
         for seed in range(1, arguments.seeds + 1):
             problem, result, truth, seconds = study(algorithm, seed)
             names = np.array(problem.parameters.names)

@@ -111,6 +111,7 @@ def main() -> None:
 
     def predicted(experiment) -> np.ndarray:
         told = seeing.information(experiment)
+        assert told is not None, "the experiment's simulation diverged"
         return np.sqrt(np.diag(np.linalg.inv(known + told)))
 
     designed = predicted(found.best.experiment)

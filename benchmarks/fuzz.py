@@ -2,8 +2,8 @@
 
     python benchmarks/fuzz.py [--inputs 4000] [--only KIND]
 
-A file is made from the name of its kind and a number, so a failure is repeated with `--only KIND --first N
---inputs 1`. Each batch runs in a process of its own. A batch that takes too long, crashes, ends with a traceback,
+A file is made from the name of its kind and a number: `--only KIND --first N --inputs 1` repeats a failure.
+Each batch runs in a process of its own. A batch that takes too long, crashes, ends with a traceback,
 or misreads a log counts as failed, and is named.
 """
 

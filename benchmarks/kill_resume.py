@@ -26,10 +26,9 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from hydroid.api import fit  # noqa: F401  # what a run imports, once for all
 from hydroid.cli.app import main as hydroid
 from hydroid.fitting import search
-from hydroid.report import fit_report, page  # noqa: F401
+from hydroid.report import page
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600

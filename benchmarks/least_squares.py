@@ -10,9 +10,10 @@ three found, final rms error, and how it ended.
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -79,9 +80,8 @@ def scipy_trf(count: Counter, start: np.ndarray) -> str:
         return ((count(x + np.diag(h)) - residual(x)) / h[:, None]).T
 
     inside = np.clip(start, 1e-10, 1 - 1e-10)
-    result = scipy.optimize.least_squares(
-        residual, inside, jacobian, bounds=(0, 1), x_scale="jac", ftol=1e-8, xtol=1e-14, gtol=None
-    )
+    options: dict[str, Any] = {"jac": jacobian, "x_scale": "jac", "ftol": 1e-8, "xtol": 1e-14, "gtol": None}
+    result = scipy.optimize.least_squares(residual, inside, bounds=(0, 1), **options)
     return str(result.message)
 
 
@@ -100,9 +100,9 @@ METHODS: dict[str, Callable[[Counter, np.ndarray], str]] = {
 }
 
 
-def searched(config: str, changes: dict[str, object]) -> tuple[Problem, np.ndarray]:
+def searched(config: str, changes: Mapping[str, object]) -> tuple[Problem, np.ndarray]:
     """A problem on the rig's log, and the estimate of a short search."""
-    settings = load_settings(config, changes | {"refinement": None})
+    settings = load_settings(config, {**changes, "refinement": None})
     problem = Problem(settings, read_logs([LOG], settings))
     return problem, fit(problem, lambda state, memo: None, Silent()).best.theta
 

@@ -26,7 +26,7 @@ def pseudo_random_log(
 
     def upto(end: int) -> Log:
         angle = np.tile(pose, (end, 1))
-        return Log("pseudo-random", np.arange(end) * period, command[:end], angle, period)
+        return Log("pseudo-random", np.arange(end, dtype=float) * period, command[:end], angle, period)
 
     for joint in joints:
         start = 0

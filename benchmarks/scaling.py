@@ -11,7 +11,7 @@ import argparse
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
 
@@ -41,7 +41,7 @@ def random_candidates(problem: Problem, n: int) -> np.ndarray:
 
 
 def medians(
-    calls: dict[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.perf_counter
+    calls: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, float]:
     """Seconds of each call, in turn; the first round warms up."""
     took: dict[str, list[float]] = {name: [] for name in calls}

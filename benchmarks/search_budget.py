@@ -76,7 +76,7 @@ def fits(name: str, algorithm: str, several: list[int], seed: int) -> dict[int, 
     for generations in several:
         search = {"algorithm": algorithm, "seed": seed, f"{algorithm}.generations": generations}
         problem = make(name, {f"search.{key}": value for key, value in search.items()})
-        one = result[generations] = fit(problem, save, Silent(), *last)
+        one = result[generations] = fit(problem, save, Silent(), last[0] if last else None)
         told = f"{name} {algorithm} {generations} seed {seed}: {np.rad2deg(one.best.rms):.6g} deg"
         print(told, "" if one.converged else "not converged", file=sys.stderr, flush=True)
     return result

@@ -95,7 +95,7 @@ def _check(mesh: trimesh.Trimesh, where: str) -> None:
             raise MeshError(what, where=where, hint=hint)
 
 
-def _faults(mesh: trimesh.Trimesh) -> Generator[tuple[bool, str, str]]:
+def _faults(mesh: trimesh.Trimesh) -> Generator[tuple[bool | np.bool_, str, str]]:
     """Each fault's presence, name and hint; what follows supposes that the mesh has none of those before."""
     yield not np.isfinite(mesh.vertices).all(), "has vertices that are not finite", "export it again"
     mesh.merge_vertices()  # an STL names a corner anew in every face

@@ -208,7 +208,7 @@ class Plant:
         names = [arm.joint_names[j - 1] for j in self.joints]
         motors, actuators = np.array([self._gain, self._balance]), None
         if candidate.actuators is not None:
-            motors, actuators = None, drawing_values(candidate.actuators[0, self._active], names)
+            motors, actuators = None, drawing_values(candidate.actuators[0, self._active], names)  # pyright: ignore[reportArgumentType]
         text = arm_mjcf(spec, self._locked, model, motors)
         write_fitted(folder, text, self.timestep, ", ".join(names), actuators)
 

@@ -1,6 +1,6 @@
 """The kinds of files that hydroid reads, and the command that reads each.
 
-A damaged file is accepted, or refused with one printable line; anything else is a defect of hydroid. An accepted
+A damaged file is accepted, or refused with one printable line; anything else is a defect. An accepted
 log is also read by an independent reader, and must hold the same numbers.
 """
 
@@ -34,8 +34,8 @@ TINY = ("--algorithm=ga", "--set=search.ga={population: 4, generations: 1}", "--
 class Kind:
     """One kind of file.
 
-    seeds: intact files. place: the path of a file below a room's folder. command: what reads it. tree: whether it
-    is YAML or JSON, whose values are damaged too. check: looks at an accepted one.
+    seeds: intact files. place: the path of a file below a room's folder. command: what reads it. tree: whether
+    it is YAML or JSON, whose values are damaged too. check: looks at an accepted one.
     """
 
     name: str

@@ -71,7 +71,7 @@ def _no_report(monkeypatch):
 @pytest.fixture
 def folder(made, tmp_path) -> RunFolder:
     """A run that has begun, with two checkpoints of one and of two generations."""
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     folder = RunFolder(tmp_path / "run")
     folder.begin(settings, read_logs([path], settings))
     for generations in (1, 2):
@@ -163,7 +163,7 @@ def test_where_none_is_whole_the_run_says_so(folder):
 
 
 def test_the_checkpoint_of_another_run_is_refused(folder, made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     other = RunFolder(tmp_path / "other")
     search = settings.search.model_copy(update={"seed": 2})
     other.begin(settings.model_copy(update={"search": search}), read_logs([path], settings))
@@ -197,7 +197,7 @@ def test_a_full_disk_leaves_both_checkpoints(folder, made, fault, monkeypatch):
 
 
 def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     fit(settings, read_logs([path], settings), tmp_path / "whole", progress=Watcher())
     with pytest.raises(KeyboardInterrupt):
         fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
@@ -210,7 +210,7 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_
 
 
 def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match=r"file/run: cannot be written \(Not a directory\)"):
         fit(settings, read_logs([path], settings), tmp_path / "file" / "run", progress=Watcher())
@@ -218,7 +218,7 @@ def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_read_only_folder_is_refused_before_anything_is_simulated(folder, made):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     folder.path.chmod(0o555)
     with pytest.raises(RunError, match=r"cannot be written \(Permission denied\)"):
         fit(settings, read_logs([path], settings), folder.path, resume=True, progress=Watcher(1))
@@ -227,7 +227,7 @@ def test_a_read_only_folder_is_refused_before_anything_is_simulated(folder, made
 
 
 def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     (tmp_path / "thesis.tex").write_text("mine")
     for resume in (False, True):
         with pytest.raises(RunError, match="holds no run"):
@@ -249,7 +249,7 @@ def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
 
 @pytest.mark.parametrize("name", ["config.yaml", "arm.yaml", "model/arm.xml"])
 def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, made, name):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     folder.check(settings, read_logs([path], settings))
     file = folder.path / name
     file.write_text(file.read_text() + "\n")
@@ -288,7 +288,7 @@ def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, made,
 
 
 def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
         fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
     fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
@@ -324,7 +324,7 @@ def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):
 
 
 def test_a_run_tells_its_course_in_its_log(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     with pytest.raises(KeyboardInterrupt):
         fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
     fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())

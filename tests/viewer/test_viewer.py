@@ -151,7 +151,8 @@ def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, arm: Arm):
     try:
         picture = animation(make_playback(nominal, log))
     except RunError as error:
-        assert "no picture can be rendered" in str(error)
+        if "no picture can be rendered" not in str(error):
+            raise
         pytest.skip(str(error))
     with Image.open(io.BytesIO(picture)) as gif:
         assert gif.n_frames == 7

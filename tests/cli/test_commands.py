@@ -93,6 +93,7 @@ def test_runs_repeat_over_seeds(short: Path, tmp_path: Path):
     assert {"seed-5", "seed-6", "tables", "figures"} <= {p.name for p in (tmp_path / "many").iterdir()}
 
 
+@pytest.mark.slow
 def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, tmp_path: Path):
     arguments = [
         "fit-mech",

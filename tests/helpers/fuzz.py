@@ -34,7 +34,7 @@ TINY = ("--algorithm=ga", "--set=search.ga={population: 4, generations: 1}", "--
 class Kind:
     """One kind of file.
 
-    seeds: intact files. place: the path of a file below a room's folder. command: what reads it. tree: whether
+    seeds: intact files. place: path of the file below a room's folder. command: what reads it. tree: whether
     it is YAML or JSON, whose values are damaged too. check: looks at an accepted one.
     """
 

@@ -236,7 +236,7 @@ def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
 
 
 def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
-    settings, arm, path, _ = made
+    settings, _arm, path, _ = made
     folder = RunFolder(tmp_path)
     with locked(tmp_path):
         folder.begin(settings, read_logs([path], settings))

@@ -47,11 +47,15 @@ def wait_for(process: "subprocess.Popen[str]", file: Path) -> None:
         time.sleep(1e-3)
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    found = (p for p in folder.rglob("*") if p.is_file() and p.name not in OWN)
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in found}
+def content(folder: Path) -> dict[str, object]:
+    """Files by name, and what run.json says besides how long the run took."""
+    found = (p for p in folder.rglob("*") if p.is_file() and p.name not in (*OWN, "run.json"))
+    described = json.loads((folder / "run.json").read_text())
+    del described["seconds"]
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in found} | {"run.json": described}
 
 
+@pytest.mark.slow
 def test_killed_runs_end_the_same(tmp_path: Path):
     options = [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"]
     finish(start(tmp_path, *options, out="whole"))
@@ -67,6 +71,7 @@ def test_killed_runs_end_the_same(tmp_path: Path):
     assert content(tmp_path / "killed") == content(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_a_clusters_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path):
     options = [*SHORT, "--set", "search.ga.generations=4000"]
     process = start(tmp_path, *options, out="run")

@@ -240,6 +240,7 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     assert weighted.level == pytest.approx(2.1 * DEG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phi", [0.0, AR1])
 def test_intervals_cover_the_truth_as_often_as_they_say(phi):
     """400 linear fits, noise estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""

@@ -1,11 +1,14 @@
 """The folder of the shipped models, meshes and configs: in the wheel, or at the top of a checkout."""
 
 from pathlib import Path
+from typing import Literal
 
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
 
 _PACKAGE = Path(__file__).parent
+_ARMS = ("hydrolek",)
+"""shipped configs that describe an arm; the others are those of fits"""
 
 
 def assets() -> Path:
@@ -14,12 +17,15 @@ def assets() -> Path:
     return inside if inside.is_dir() else _PACKAGE.parent
 
 
-def find_config(name: str | Path, beside: Path | None = None) -> Path:
+def find_config(
+    name: str | Path, beside: Path | None = None, *, kind: Literal["config", "arm"] = "config"
+) -> Path:
     """Find a config file.
 
     Args:
         name: a path, or the name of a shipped config with or without `.yaml`.
         beside: folder in which a relative path is looked up first.
+        kind: config of a fit, or file of an arm; decides which names the error lists.
 
     Raises:
         SettingsError: no such file, with the names of the shipped configs.
@@ -30,5 +36,7 @@ def find_config(name: str | Path, beside: Path | None = None) -> Path:
         for candidate in (folder / name, folder / f"{name}.yaml"):
             if is_file(candidate):
                 return candidate
-    known = ", ".join(sorted(p.stem for p in shipped.glob("*.yaml")))
-    raise SettingsError("no such config", where=str(name), hint=f"give a YAML file or one of: {known}")
+    known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem in _ARMS) == (kind == "arm"))
+    raise SettingsError(
+        f"no such {kind}", where=str(name), hint=f"give a YAML file or one of: {', '.join(known)}"
+    )

@@ -110,7 +110,9 @@ def estimate_file(source: Path) -> Path:
     if is_file(source / "run.json"):
         raise RunError("has no estimate yet", where=str(source), hint="resume the fit")
     raise RunError(
-        "holds no estimate", where=str(source), hint="name a run folder, a saved plant or a YAML file"
+        "holds no estimate",
+        where=str(source),
+        hint="name a run folder, a folder of Plant.save or a YAML file",
     )
 
 

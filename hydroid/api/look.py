@@ -205,8 +205,8 @@ def view(
 
 def _require_hydraulics(model: IdentifiedModel) -> None:
     if model.settings.stage != "hyd":
-        hint = "name a fit of stage 2, or use the config fit-hyd"
-        raise SettingsError("stage mech has no actuators", where=model.source, hint=hint)
+        hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
+        raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
 
 
 def _ranges(settings: FitSettings) -> np.ndarray:

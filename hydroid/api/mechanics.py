@@ -36,8 +36,8 @@ def with_mechanics(
         settings = load(find_config(config), FitSettings, changes)
         free = [name for name in _mechanical(settings) if settings.parameters[name].fixed is None]
         if free:
-            hint = "give --mech RUN of stage 1, or set their `fixed` values in the config"
-            raise SettingsError(f"stage 2 needs stage 1's {', '.join(free)}", hint=hint)
+            hint = "give the run of stage 1 with --mech RUN, or set `fixed: VALUE` for each in the config"
+            raise SettingsError(f"stage 2 needs the values of {', '.join(free)} from stage 1", hint=hint)
         return changes
     values, summary = read_values(Path(mech))
     folder = estimate_file(Path(mech)).parent

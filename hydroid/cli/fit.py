@@ -61,7 +61,9 @@ class FitFlags:
     threads: Annotated[
         int | None,
         typer.Option(
-            min=0, max=1024, help="Number of threads; 0: one per core, or with --dask one per worker."
+            min=0,
+            max=1024,
+            help="Number of threads. 0 means one per core; with --dask it means one per worker.",
         ),
     ] = None
     dask: Annotated[
@@ -131,17 +133,21 @@ def fit_hyd(
         Path | None,
         typer.Option(
             metavar="RUN|YAML",
-            help="Stage 1: its run folder, or a YAML file of its values. The folder also gives the arm and "
-            "the log layout if --config has none.",
+            help="Stage 1: its run folder, or a YAML file of its values. The run folder also gives the arm and "
+            "the log layout, unless --config sets them.",
         ),
     ] = None,
     config: Config = "fit-hyd",
     joint: Annotated[
         bool | None,
-        typer.Option("--joint/--no-joint", help="At the end, refine the parameters of both stages together."),
+        typer.Option(
+            "--joint/--no-joint",
+            help="At the end, refine the parameters of both stages together. ('Joint' means 'together' here, "
+            "not a joint of the robot.)",
+        ),
     ] = None,
 ) -> None:
-    """Estimate the hydraulic actuators, with the arm as estimated in stage 1 (stage 2).
+    """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
 
     The parameters are the piston areas, currents, calibration and solenoid: all that is between command and
     torque. Writes a run folder as fit-mech does.

@@ -33,7 +33,8 @@ def validate(
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a saved plant or a YAML file; repeat for several.",
+            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file; repeat the "
+            "option for several.",
         ),
     ],
     out: Folder = Path("runs/validation"),
@@ -58,13 +59,17 @@ def identifiability(
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a saved plant or a YAML file "
+            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file "
             "[default: the middle of the bounds].",
         ),
     ] = None,
     config: OwnConfig = None,
     stage: Annotated[
-        Stage, typer.Option(help="Without other settings, use those of this stage (fit-mech or fit-hyd).")
+        Stage,
+        typer.Option(
+            help="Settings to use if neither --config nor a run folder gives any: those of fit-mech (mech) or "
+            "of fit-hyd (hyd)."
+        ),
     ] = Stage.MECH,
     profile: Annotated[
         str,
@@ -152,7 +157,8 @@ def surface(
 ) -> None:
     """Draw the error as a function of two parameters, with the others at the estimate (article, figure 11).
 
-    The error is the norm objective.norm of the whole record. Use --set objective.norm=2 for the rms error.
+    The error is that of the whole log. The setting objective.norm says which one: inf is the largest error,
+    2 the rms error, 1 the mean absolute error. Change it with --set objective.norm=2.
     """
     from hydroid.api.judge import surface
     from hydroid.api.look import read_logs

@@ -11,7 +11,11 @@ from hydroid.cli.output import show
 
 def simulate(
     commands: Annotated[
-        Path, typer.Argument(metavar="COMMANDS.csv", help="Commands. Its first angles are the start pose.")
+        Path,
+        typer.Argument(
+            metavar="COMMANDS.csv",
+            help="CSV file of commands. Its angles before the first command give the start pose.",
+        ),
     ],
     estimate: Estimate,
     output: Output,

@@ -32,7 +32,8 @@ Fit = Annotated[
         "--fit",
         "--params",
         metavar="RUN|YAML",
-        help="An estimate: a run folder, a saved plant, an estimate.yaml, or a YAML file of values by name.",
+        help="An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a YAML "
+        "file of values by name.",
     ),
 ]
 Set = Annotated[
@@ -40,7 +41,12 @@ Set = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Replace a setting, such as search.ga.generations=80."),
 ]
 Repair = Annotated[
-    bool, typer.Option("--repair", help="Fill short gaps (up to log.repair_s) in the logs, and report them.")
+    bool,
+    typer.Option(
+        "--repair",
+        help="Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves "
+        "stay as they are.",
+    ),
 ]
 
 
@@ -79,8 +85,8 @@ class NominalEstimate:
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a saved plant, or a YAML file of values [default: the nominal "
-            "values of the arm and the settings].",
+            help="An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file of values "
+            "[default: no estimate, but the values in the arm's file and under `hydraulics` in the settings].",
         ),
     ] = None
     config: Annotated[

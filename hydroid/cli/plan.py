@@ -18,7 +18,9 @@ def design(
     output: Output,
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="LOG.csv...", help="Existing logs, whose information is counted in."),
+        typer.Argument(
+            metavar="LOG.csv...", help="Logs that exist already. The design adds to what they determine."
+        ),
     ] = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the experiment [s].")] = None,
     joints: Annotated[
@@ -34,8 +36,8 @@ def design(
     """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
     SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
-    design.margin_deg, design.command_pct) are checked in simulation only, and the real arm may move
-    further or faster. Collisions are not checked.
+    design.margin_deg, design.command_pct) are checked only in simulation with the present estimate; the
+    real arm may exceed them. Collisions are not checked.
 
     Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
     settings define the compared joints, the free parameters and the limits.

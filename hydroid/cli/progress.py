@@ -68,7 +68,7 @@ class FitProgress(Progress):
     def __init__(self, settings: "FitSettings", label: str, *, quiet: bool) -> None:
         search = settings.search
         super().__init__(quiet=quiet, label=f"{label} {NAMES.get(search.name, search.name)}".strip())
-        self._step = "start" if search.algorithm == "multistart" else "generation"
+        self._step = "start" if search.algorithm == "multistart" else "population"
         self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (DEGREES, " deg")
         self._began, self._before = time.monotonic(), -1.0

@@ -150,7 +150,11 @@ def fit(
         assert settings.refinement is not None
         result = refine(last, start.theta, settings.refinement, watch.refining, refinements, name)
         if not result.ending.converged:
-            _log.warning("the refinement of the estimate %s did not converge: %s", name, result.ending.value)
+            _log.warning(
+                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an optimum.",
+                result.ending.value,
+                name,
+            )
         estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
         results[name], start, final = result, estimates[name], name
     refined = time.perf_counter()

@@ -37,7 +37,7 @@ def check_recording(
     """Return every fault of the recording, in the order in which a user should mend them."""
     return [
         *_ragged(recording),
-        *_holes(recording, repaired),
+        *_holes(recording, settings.repair_s, repaired),
         *_time(recording, settings),
         *_outside(recording),
         *_jumps(recording),
@@ -59,16 +59,18 @@ def _ragged(recording: Recording) -> Iterator[Finding]:
         yield recording.finding("error", what, "correct or delete the line, or use --repair", rows)
 
 
-def _holes(recording: Recording, repaired: bool) -> Iterator[Finding]:
+def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Finding]:
     for column, signal in enumerate(recording.signals):
         rows = np.flatnonzero(np.isnan(recording.values[:, column]) & ~recording.ragged)
         if not len(rows):
             continue
         text = recording.text(rows[0], column)
         what = f"{text[:30]!r} is not a number" if text else "the cell is empty"
-        hint = "correct the cell, or use --repair, which fills gaps up to log.repair_s [s]"
+        hint = (
+            f"correct the cell, or use --repair, which fills bad cells of up to {longest:g} s (log.repair_s)"
+        )
         if repaired:
-            hint = "correct the cell: --repair fills only gaps between samples, up to log.repair_s [s]"
+            hint = f"correct the cell; --repair fills only between good cells, up to {longest:g} s (log.repair_s)"
         if signal.kind == "time":
             hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
         yield recording.finding("error", what, hint, rows, signal)

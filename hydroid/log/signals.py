@@ -142,13 +142,14 @@ def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
         names += f" and {len(lacking) - _MAX_MISSING} more" if len(lacking) > _MAX_MISSING else ""
         have = [name for name in file.names if name]
         more = f" and {len(have) - _MAX_LISTED} more" if len(have) > _MAX_LISTED else ""
-        hint = (
-            f"it has: {', '.join(have[:_MAX_LISTED])}{more}; set log.time, log.command, log.angle or "
-            "log.joints, where null says that a joint is not in the log"
-        )
-        findings.append(
-            Finding("error", f"has no column {names}", file.source, hint, file.header, lacking[0].name)
-        )
+        keys = ", ".join(dict.fromkeys(f"log.{signal.kind}" for signal in lacking))
+        hint = f"the columns are: {', '.join(have[:_MAX_LISTED])}{more}; set the right names in {keys}"
+        if joints := [signal.joint for signal in lacking if signal.kind != "time"]:
+            hint += (
+                f"; for a joint that is not in the log set it to null, such as log.joints.{joints[-1]}=null"
+            )
+        what = f"is not in the header: {names}"
+        findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
     for name, count in Counter(file.names).items():
         if count > 1 and any(signal.name == name for signal in wanted):
             what = f"has {count} columns of this name"

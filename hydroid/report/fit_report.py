@@ -35,7 +35,8 @@ from hydroid.report.uncertainty_report import determined_section
 
 INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
 INDICES_NOTE = (
-    "fit: 100 % for a perfect response, 0 % for the mean of the measured angle, – for a joint at rest."
+    "fit: 100 % for a perfect response, 0 % for a response that is always the mean of the measured angle. A "
+    "dash (–): the joint does not move."
 )
 _ESTIMATES = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
 _LEARNING = "Best candidate so far, and the median of each population."
@@ -110,9 +111,10 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     others = [label for label in labels[1:] if label != final]
     optional = (*others, "effect [deg]", *(labels[:1] if labels[0] != final else ()), "lower", "upper")
     note = (
-        f"{estimate_meanings(fit)} ±: half of the 95 % interval of {final}, from the noise that the "
-        "logs show and for a model that is right; – if the parameter is not identifiable. effect: rms change "
-        "of the output when the parameter changes by 1 %."
+        f"{estimate_meanings(fit)} ±: half the 95 % confidence interval of {final}. The noise is taken from "
+        "the residuals. The interval is only right if the model is right. A dash (–): the interval has no limit, "
+        "or the parameter is at a bound or fixed. effect: rms change of the output when the parameter changes "
+        "by 1 %."
     )
     return Table("Parameters", header, tuple(rows), note, optional)
 
@@ -154,13 +156,13 @@ def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, st
         label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
         logs.append((label, f"{name}, {number(seconds)} s, {samples} samples{digest}"))
     return (
-        ("arm", f"{settings.arm.name}; its geometry is taken as configured in arm.yaml"),
+        ("arm", f"{settings.arm.name}; its geometry is not estimated but read from arm.yaml"),
         ("stage", STAGES[settings.stage]),
         *logs,
         *((f"payload in {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
         *((f"prior {name}", prior_phrase(prior)) for name, prior in settings.priors.items()),
         ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
-        ("joints not compared or driven", settings.simulation.other_joints),
+        ("joints without command and comparison", settings.simulation.other_joints),
         ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
         ("search", ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
         ("seed", str(settings.search.seed)),
@@ -178,14 +180,16 @@ def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
     if len(fit.history):
         multistart = problem.settings.search.algorithm == "multistart"
         rounds, evaluations, simulated, diverged = (int(v) for v in fit.history[-1, :4])
+        repeated = "; the others repeat earlier ones" if evaluations > simulated else ""
+        ranked = "; they rank behind all others" if diverged else ""
         facts += [
-            ("starts" if multistart else "populations", str(rounds)),
-            ("candidates", f"{evaluations:,} evaluated, {simulated:,} of them simulated"),
-            ("diverged", f"{diverged:,} of {simulated:,} simulated candidates; ranked behind all others"),
+            ("starts", str(rounds)) if multistart else ("populations", f"{rounds}, the first one included"),
+            ("candidates", f"{evaluations:,}, of which {simulated:,} were simulated{repeated}"),
+            ("diverged", f"{diverged:,} of {simulated:,} simulated candidates{ranked}"),
         ]
     for name, one in fit.refinements.items():
         effort = f"{one.iterations} iterations, {one.evaluations:,} simulations"
-        facts.append((f"refinement to {name}", f"{effort}; {one.ending.value}"))
+        facts.append((f"least squares: {name}", f"{effort}; {one.ending.value}"))
     return tuple(facts)
 
 

@@ -28,12 +28,20 @@ STAGES = {
 }
 _NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _ESTIMATES = {
-    "average": "mean of the best candidate of each segment, as in the article",
-    "utopia": "candidate whose errors come closest to the lowest error of every segment",
+    "average": "mean of the best candidates of all segments, as in the article",
+    "utopia": "candidate whose errors are nearest to the lowest error of every segment",
     "best": "candidate with the lowest error over the whole record",
-    "refined": "least squares, started from the search's estimate with the lowest rms error",
-    "joint": "least squares over the parameters of both stages, started from refined",
+    "refined": "least squares, started from the best (lowest rms error) of the estimates named before it",
+    "joint": "both stages refined together by least squares, started from 'refined'",
 }
+_UNKNOWN = {
+    DirectionKind.NO_EFFECT: "its value",
+    DirectionKind.SINGLE: "its value",
+    DirectionKind.COMMON_SCALE: "the factor",
+    DirectionKind.CURRENT_SCALE: "the factor",
+    DirectionKind.SOLENOID: "any other combination",
+}
+"""what the logs do not determine, by the kind of direction"""
 _UNEQUAL = 0.1
 """relative changes that differ by more than this do not scale by one factor"""
 
@@ -91,12 +99,13 @@ def direction_phrases(problem: Problem, result: Identifiability) -> tuple[str, .
 
 def _direction_phrase(problem: Problem, direction: Direction) -> str:
     name = _direction_name(problem, direction)
-    count = f", {len(direction.changes)} directions" if len(direction.changes) > 1 else ""
+    count = f" ({len(direction.changes)} directions)" if len(direction.changes) > 1 else ""
+    what = _UNKNOWN.get(direction.kind, "the size of this change")
     if direction.flag is Flag.UNIDENTIFIABLE:
-        return f"{name}: {Flag.UNIDENTIFIABLE.value} (±∞{count})"
+        return f"{name}: {what} cannot be determined{count}"
     percent = 100 * direction.relative_sd
     digits = f"{percent:.2g}" if percent < 10 else f"{percent:.0f}"
-    return f"{name}: known only to ±{digits} %{count}"
+    return f"{name}: {what} is known only to ±{digits} %{count}"
 
 
 def _direction_name(problem: Problem, direction: Direction) -> str:
@@ -106,25 +115,28 @@ def _direction_name(problem: Problem, direction: Direction) -> str:
         case DirectionKind.NO_EFFECT:
             return f"{names[0]} has no effect on {outputs_phrase(problem)}"
         case DirectionKind.SINGLE:
-            return f"{names[0]} alone"
+            return names[0]
         case DirectionKind.COMMON_SCALE:
             unequal = np.ptp(changes) > _UNEQUAL
-            note = " (the masses unequally, to make up for what is fixed)" if unequal else ""
-            return f"a common factor of {listed(names)}{note}"
+            note = " (the masses by unequal factors, to make up for what is fixed)" if unequal else ""
+            return f"{listed(names)} can be multiplied by a common factor{note} with almost the same response"
         case DirectionKind.SOLENOID:
             values = f"δ = {numbers['delta']:.3g} mm and k·i0² = {numbers['k_i0']:.3g} N·mm²"
-            return f"{listed(names)} act through two combinations only, {values}"
+            return f"only two combinations of {listed(names)} matter, {values}"
         case DirectionKind.CURRENT_SCALE:
             settings = problem.settings.parameters
             currents = [n for n in names if settings[n].quantity in CURRENTS]
             coil = [n for n in names if n not in currents]
             held = ("δ", "delta", "mm"), ("k·I_max²", "k_imax", "N·mm²"), ("k·I_min²", "k_imin", "N·mm²")
             values = listed([f"{symbol} = {numbers[key]:.3g} {unit}" for symbol, key, unit in held])
-            return f"a common scale of {listed(currents)} trades with {listed(coil)}, at the same {values}"
+            return (
+                f"{listed(currents)} can be multiplied by a common factor if {listed(coil)} change so that {values} "
+                "stay the same"
+            )
         case DirectionKind.COMBINATION:
             pairs = zip(names, changes, strict=True)
-            first, *others = (f"{change:+.2g} % {name}".replace("-", "−") for name, change in pairs)
-            return f"{first} with {', '.join(others)}"
+            parts = [f"{name} by " + f"{change:+.2g} %".replace("-", "−") for name, change in pairs]
+            return f"changing {listed(parts)} together has almost no effect"
 
 
 def outputs_phrase(problem: Problem) -> str:
@@ -160,7 +172,7 @@ def fit_summary(fit: Fit) -> str:
     if fit.refinement is None:
         return f"The search's estimate {error}; it was not refined."
     ending = "converged" if fit.refinement.ending.converged else "did not converge"
-    return f"The {fit.final} estimate {error}; its refinement {ending}."
+    return f"The estimate '{fit.final}' {error}; its refinement {ending}."
 
 
 def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
@@ -169,7 +181,7 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
     if fit.refinement is None:
         said.append("The estimate is the search's own, without a refinement: it need not be an optimum.")
     said += [
-        f"The refinement to the {name} estimate did not converge: {refinement.ending.value}. The estimate "
+        f"The least-squares refinement did not converge: {refinement.ending.value}. The estimate '{name}' "
         "need not be an optimum. Allow more iterations (refinement.iterations)."
         for name, refinement in fit.refinements.items()
         if not refinement.ending.converged
@@ -187,7 +199,7 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
                 "has no interval."
             )
     said += [
-        f"The estimate {name} diverged when it was simulated and was not used."
+        f"The estimate '{name}' diverged when it was simulated and was not used."
         for name, estimate in fit.estimates.items()
         if not math.isfinite(estimate.rms)
     ]

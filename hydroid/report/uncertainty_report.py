@@ -32,9 +32,10 @@ _LEAST_DRAWN = 1e-6
 _PROFILE_MARGIN = 0.3
 """part of a profile's interval that is drawn beyond each end"""
 _CAPTIONS = {
-    "singular_values": "The inverse of the relative standard deviation of each combination, from the noise "
-    f"that the logs show. Below the dashed line the standard deviation is above {100 * WEAK_ABOVE:.0f} %. A "
-    "hollow mark at the foot: the combination has no effect on the logs.",
+    "singular_values": "The inverse of the relative standard deviation of each direction, with the noise "
+    f"taken from the residuals. Below the dashed line the standard deviation is above {100 * WEAK_ABOVE:.0f} %. "
+    "A hollow mark at the bottom of the figure: a change along this direction does not change the simulated "
+    "response.",
     "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
     "identifiable are left out.",
     "profiles": "The error, in units of the noise, with one parameter held and the others fitted again. "
@@ -78,10 +79,12 @@ def determined_section(problem: Problem, uncertainty: Uncertainty, result: Ident
     """Return the section about directions and noise."""
     values = Plot("singular_values", _CAPTIONS["singular_values"], partial(singular_values, result))
     drawn = partial(correlation, uncertainty, result.names)
+    points = direction_phrases(problem, result)
     correlations = Plot("correlation", _CAPTIONS["correlation"], drawn)
     return Section(
-        "Which combinations the logs determine",
-        points=direction_phrases(problem, result),
+        "What the logs do not determine",
+        "" if points else "Nothing: every direction in the table is determined.",
+        points=points,
         tables={"directions": direction_table(result), "noise": noise_table(problem, uncertainty)},
         plots=(values, correlations) if np.sum(_correlated(uncertainty)) > 1 else (values,),
     )
@@ -106,9 +109,10 @@ def interval_table(study: UncertaintyStudy) -> Table:
             row += [unless_nan(v) for v in ends] if found.free[i] else [None, None]
         rows.append((*row, status_phrase(found.status[i])))
     note = (
-        f"At {study.source}. 95 % intervals, from the noise that the logs show there and for a model that is "
-        "right. –: no limit. A parameter at a bound has none. Away from a fit the residual does not measure "
-        "the noise: set objective.noise_deg."
+        f"At {study.source}. 95 % intervals. The noise is taken from the residuals, and the intervals are only "
+        "right if the model is right. A dash (–): no limit. A parameter at a bound has no interval. If these "
+        "parameters are not a fit to these logs, the residuals are no measure of the noise: set "
+        "objective.noise_deg."
     )
     if refits is not None:
         few = ", too few for 95 %: about their lowest and highest" if len(refits) < _FEW_REFITS else ""
@@ -124,8 +128,10 @@ def direction_table(result: Identifiability) -> Table:
         parts = ", ".join(f"{result.names[i]} {axis[i]:+.2f}".replace("-", "−") for i in order)
         rows.append((float(value), 100 / value if value > 0 else np.inf, parts))
     note = (
-        f"A direction is a set of relative changes made together. {result.rank} of {len(result.names)} "
-        f"directions have a relative standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
+        "A direction changes several parameters together. The relative changes give the proportions: "
+        "A +0.8, B −0.4 means that B falls by 1 % when A grows by 2 %. A large standard deviation means that the "
+        f"logs hardly show such a change. {result.rank} of {len(result.names)} directions have a relative "
+        f"standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )
     header = ("singular value", "standard deviation [%]", "relative changes")
     return Table("Directions", header, tuple(rows), note, header[:1])
@@ -145,8 +151,11 @@ def noise_table(problem: Problem, uncertainty: Uncertainty) -> Table:
         rows.append((names[channel.log], channel.joint, signal, *found))
     found = "rms residual", "noise", "correlation time [s]", "effective sample size", "source"
     note = (
-        "correlation time: after it the noise's autocorrelation is below 1/e. effective sample size: so "
-        "many independent samples would determine the noise's level equally well."
+        "rms residual: of the measured minus the simulated signal. noise: standard deviation of the noise "
+        "that the intervals use, and where it comes from (source): the residual, corrected for what the fit "
+        "absorbed; the settings; or the smallest value allowed. correlation time: after it the noise's "
+        "autocorrelation is below 1/e. effective sample size: the number of independent samples that would "
+        "determine the noise level equally well."
     )
     return Table("Noise", ("log", "joint", "signal", *found), tuple(rows), note, ("rms residual", "source"))
 

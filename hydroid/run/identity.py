@@ -81,8 +81,11 @@ def refuse_other_run(
             hint = f"put it back as it was, or {other}"
             raise RunError("has changed since the run began", where=str(folder / name), hint=hint)
     for key, old, new in other_settings(before, settings):
-        hint = f"continue it with its own settings, or {other}"
-        raise RunError(f"holds a run with {key} = {old}, now {new}", where=str(folder), hint=hint)
+        hint = (
+            f"to continue it with the settings it was started with, give only --resume and --out; or {other}"
+        )
+        what = f"this run was started with {key} = {old}, but your command gives {new}"
+        raise RunError(what, where=str(folder), hint=hint)
     if settings.arm.model.resolve() == (folder / MODEL).resolve():
         return
     arms = (arm.model_dump(mode="json", exclude={"model", "meshes"}) for arm in (before.arm, settings.arm))

@@ -17,7 +17,7 @@ class Ending(Enum):
     SLOW = "the last steps gained less than the tolerance"
     EXACT = "the residual is zero up to rounding"
     NO_IMPROVEMENT = "no step improves the fit any further"
-    ITERATIONS = "the iteration limit was reached before convergence"
+    ITERATIONS = "it reached the iteration limit"
     START_FAILED = "the start could not be simulated"
     JACOBIAN_FAILED = "simulations failed on both sides of the best point"
 

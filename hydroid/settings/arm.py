@@ -174,7 +174,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     Raises:
         SettingsError: no such file, or a setting that is not allowed.
     """
-    path = find_config(name, beside)
+    path = find_config(name, beside, kind="arm")
     arm = load(path, Arm)
     folder = path.resolve().parent
     places = {"model": (folder / arm.model).resolve(), "meshes": (folder / arm.meshes).resolve()}

@@ -45,7 +45,7 @@ class FitSettings(Settings):
     refinement: RefinementSettings | None = RefinementSettings()
     """the refinement's settings; null: no refinement, as in the article"""
     joint_refinement: bool = False
-    """refine all parameters that have bounds together at the end, including the fixed ones"""
+    """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
     design: DesignSettings = DesignSettings()
     cluster: ClusterSettings = ClusterSettings()
 

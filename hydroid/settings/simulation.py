@@ -11,13 +11,13 @@ class SimulationSettings(Settings):
     """How logs are simulated."""
 
     other_joints: Literal["locked", "passive", "measured"] = "locked"
-    """what joints do that the log does not drive and the fit does not compare. locked: they stand still
-    and are left out of the stepped model, which is exact; passive: they move on their own spring and
-    damper, as in the article; measured: they follow their logged motion"""
+    """how to treat joints that have no command in the log and are not compared. locked: they stand still,
+    which is the fastest; passive: they move on their own spring and damper, as in the article; measured:
+    they follow their logged motion"""
     steps_per_sample: Annotated[int, Field(ge=1, le=100)] = 1
     """MuJoCo steps per sample of the log"""
     threads: Annotated[int, Field(ge=0, le=1024)] = 0
-    """number of threads; 0: one per core, or one per worker with --dask"""
+    """number of threads. 0 means one per core; with --dask it means one per worker"""
     chunk_mib: Annotated[int, Field(ge=1, le=512)] = 128
     """memory for the part of a population that is simulated at a time [MiB]"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0

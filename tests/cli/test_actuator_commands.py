@@ -36,7 +36,10 @@ def test_an_estimate_is_drawn_with_the_settings_beside_it(tmp_path: Path):
     [
         (["plot-actuator", "--out", "o", "--params", "bad.yaml"], "no force-stroke curve"),
         (["plot-actuator", "--out", "o", "--joint", "9"], "joints 1 to 7"),
-        (["plot-actuator", "--out", "o", "--config", "fit-mech"], "stage mech has no actuators"),
+        (
+            ["plot-actuator", "--out", "o", "--config", "fit-mech"],
+            "stage 1 (mech) does not model the actuators",
+        ),
         (["view", "--params", "bad.yaml"], "no force-stroke curve"),
         (["view", "--pose", "asleep"], "no pose 'asleep'"),
         (["view", "--gif", "a.gif"], "a file has no sliders"),

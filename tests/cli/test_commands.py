@@ -54,7 +54,7 @@ def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     assert set(described["seconds"]) == {"search", "refinement", "uncertainty", "report"}
     # a refinement that ends at its limit of one step says so
     assert found["converged"] is False
-    assert "refinement of the estimate refined did not converge: the iteration limit" in done.stderr
+    assert "least-squares refinement did not converge: it reached the iteration limit" in done.stderr
 
     done = hydroid("validate", short, "--fit", "run", "--json", "--out", "val", cwd=tmp_path)
     (row,) = json.loads(done.stdout)["results"]
@@ -229,7 +229,7 @@ def test_the_second_stage_walks_through(short: Path, tmp_path: Path):
 
 def test_the_second_stage_needs_the_first(short: Path, tmp_path: Path):
     done = hydroid("fit-hyd", short, cwd=tmp_path, code=2)
-    assert "give --mech RUN of stage 1" in done.stderr
+    assert "give the run of stage 1 with --mech RUN" in done.stderr
     (tmp_path / "mech.yaml").write_text("D: 80.0\n")
     done = hydroid("fit-hyd", short, "--mech", "mech.yaml", cwd=tmp_path, code=2)
     assert "M6" in done.stderr

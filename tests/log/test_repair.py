@@ -64,7 +64,7 @@ def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", table)
     found = faults(path, repair=True)
     assert {(fault.line, fault.column) for fault in found} == {(2, "u1_pct"), (81, "q1_deg")}
-    assert all("fills only gaps between samples" in fault.hint for fault in found)
+    assert all("fills only between good cells" in fault.hint for fault in found)
     assert all("or use --repair" in fault.hint for fault in faults(path))
 
 

@@ -33,7 +33,8 @@ def validate(
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file; repeat the "
+            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file; "
+            "repeat the "
             "option for several.",
         ),
     ],
@@ -67,7 +68,8 @@ def identifiability(
     stage: Annotated[
         Stage,
         typer.Option(
-            help="Settings to use if neither --config nor a run folder gives any: those of fit-mech (mech) or "
+            help="Settings to use if neither --config nor a run folder gives any: those of fit-mech "
+            "(mech) or "
             "of fit-hyd (hyd)."
         ),
     ] = Stage.MECH,

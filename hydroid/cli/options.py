@@ -32,7 +32,8 @@ Fit = Annotated[
         "--fit",
         "--params",
         metavar="RUN|YAML",
-        help="An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a YAML "
+        help="An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a "
+        "YAML "
         "file of values by name.",
     ),
 ]
@@ -44,7 +45,8 @@ Repair = Annotated[
     bool,
     typer.Option(
         "--repair",
-        help="Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves "
+        help="Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files "
+        "themselves "
         "stay as they are.",
     ),
 ]
@@ -85,8 +87,10 @@ class NominalEstimate:
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file of values "
-            "[default: no estimate, but the values in the arm's file and under `hydraulics` in the settings].",
+            help="An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file of "
+            "values "
+            "[default: no estimate, but the values in the arm's file and under `hydraulics` in the "
+            "settings].",
         ),
     ] = None
     config: Annotated[

@@ -151,7 +151,8 @@ def fit(
         result = refine(last, start.theta, settings.refinement, watch.refining, refinements, name)
         if not result.ending.converged:
             _log.warning(
-                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an optimum.",
+                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
+                "optimum.",
                 result.ending.value,
                 name,
             )

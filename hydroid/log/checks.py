@@ -70,7 +70,10 @@ def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Fin
             f"correct the cell, or use --repair, which fills bad cells of up to {longest:g} s (log.repair_s)"
         )
         if repaired:
-            hint = f"correct the cell; --repair fills only between good cells, up to {longest:g} s (log.repair_s)"
+            hint = (
+                f"correct the cell; --repair fills only between good cells, up to {longest:g} s "
+                "(log.repair_s)"
+            )
         if signal.kind == "time":
             hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
         yield recording.finding("error", what, hint, rows, signal)

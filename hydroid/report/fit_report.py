@@ -112,8 +112,10 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     optional = (*others, "effect [deg]", *(labels[:1] if labels[0] != final else ()), "lower", "upper")
     note = (
         f"{estimate_meanings(fit)} ±: half the 95 % confidence interval of {final}. The noise is taken from "
-        "the residuals. The interval is only right if the model is right. A dash (–): the interval has no limit, "
-        "or the parameter is at a bound or fixed. effect: rms change of the output when the parameter changes "
+        "the residuals. The interval is only right if the model is right. A dash (–): the interval has "
+        "no limit, "
+        "or the parameter is at a bound or fixed. effect: rms change of the output when the parameter "
+        "changes "
         "by 1 %."
     )
     return Table("Parameters", header, tuple(rows), note, optional)

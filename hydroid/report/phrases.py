@@ -130,7 +130,8 @@ def _direction_name(problem: Problem, direction: Direction) -> str:
             held = ("δ", "delta", "mm"), ("k·I_max²", "k_imax", "N·mm²"), ("k·I_min²", "k_imin", "N·mm²")
             values = listed([f"{symbol} = {numbers[key]:.3g} {unit}" for symbol, key, unit in held])
             return (
-                f"{listed(currents)} can be multiplied by a common factor if {listed(coil)} change so that {values} "
+                f"{listed(currents)} can be multiplied by a common factor if {listed(coil)} change so "
+                f"that {values} "
                 "stay the same"
             )
         case DirectionKind.COMBINATION:

@@ -33,7 +33,8 @@ _PROFILE_MARGIN = 0.3
 """part of a profile's interval that is drawn beyond each end"""
 _CAPTIONS = {
     "singular_values": "The inverse of the relative standard deviation of each direction, with the noise "
-    f"taken from the residuals. Below the dashed line the standard deviation is above {100 * WEAK_ABOVE:.0f} %. "
+    "taken from the residuals. Below the dashed line the standard deviation is above "
+    f"{100 * WEAK_ABOVE:.0f} %. "
     "A hollow mark at the bottom of the figure: a change along this direction does not change the simulated "
     "response.",
     "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
@@ -109,7 +110,8 @@ def interval_table(study: UncertaintyStudy) -> Table:
             row += [unless_nan(v) for v in ends] if found.free[i] else [None, None]
         rows.append((*row, status_phrase(found.status[i])))
     note = (
-        f"At {study.source}. 95 % intervals. The noise is taken from the residuals, and the intervals are only "
+        f"At {study.source}. 95 % intervals. The noise is taken from the residuals, and the intervals "
+        "are only "
         "right if the model is right. A dash (–): no limit. A parameter at a bound has no interval. If these "
         "parameters are not a fit to these logs, the residuals are no measure of the noise: set "
         "objective.noise_deg."
@@ -129,7 +131,8 @@ def direction_table(result: Identifiability) -> Table:
         rows.append((float(value), 100 / value if value > 0 else np.inf, parts))
     note = (
         "A direction changes several parameters together. The relative changes give the proportions: "
-        "A +0.8, B −0.4 means that B falls by 1 % when A grows by 2 %. A large standard deviation means that the "
+        "A +0.8, B −0.4 means that B falls by 1 % when A grows by 2 %. A large standard deviation means "
+        "that the "
         f"logs hardly show such a change. {result.rank} of {len(result.names)} directions have a relative "
         f"standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )

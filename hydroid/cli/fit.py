@@ -133,9 +133,8 @@ def fit_hyd(
         Path | None,
         typer.Option(
             metavar="RUN|YAML",
-            help="Stage 1: its run folder, or a YAML file of its values. The run folder also gives the "
-            "arm and "
-            "the log layout, unless --config sets them.",
+            help="Stage 1: its run folder, or a YAML file of its values. The run folder also gives the arm "
+            "and the log layout, unless --config sets them.",
         ),
     ] = None,
     config: Config = "fit-hyd",

@@ -34,8 +34,7 @@ def validate(
             "--params",
             metavar="RUN|YAML",
             help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file; "
-            "repeat the "
-            "option for several.",
+            "repeat the option for several.",
         ),
     ],
     out: Folder = Path("runs/validation"),
@@ -68,9 +67,8 @@ def identifiability(
     stage: Annotated[
         Stage,
         typer.Option(
-            help="Settings to use if neither --config nor a run folder gives any: those of fit-mech "
-            "(mech) or "
-            "of fit-hyd (hyd)."
+            help="Settings to use if neither --config nor a run folder gives any: those of fit-mech (mech) "
+            "or of fit-hyd (hyd)."
         ),
     ] = Stage.MECH,
     profile: Annotated[

@@ -33,8 +33,7 @@ Fit = Annotated[
         "--params",
         metavar="RUN|YAML",
         help="An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a "
-        "YAML "
-        "file of values by name.",
+        "YAML file of values by name.",
     ),
 ]
 Set = Annotated[
@@ -46,8 +45,7 @@ Repair = Annotated[
     typer.Option(
         "--repair",
         help="Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files "
-        "themselves "
-        "stay as they are.",
+        "themselves stay as they are.",
     ),
 ]
 
@@ -88,8 +86,7 @@ class NominalEstimate:
             "--params",
             metavar="RUN|YAML",
             help="An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file of "
-            "values "
-            "[default: no estimate, but the values in the arm's file and under `hydraulics` in the "
+            "values [default: no estimate, but the values in the arm's file and under `hydraulics` in the "
             "settings].",
         ),
     ] = None

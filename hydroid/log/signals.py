@@ -148,7 +148,7 @@ def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
             hint += (
                 f"; for a joint that is not in the log set it to null, such as log.joints.{joints[-1]}=null"
             )
-        what = f"is not in the header: {names}"
+        what = f"the header lacks {names}"
         findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
     for name, count in Counter(file.names).items():
         if count > 1 and any(signal.name == name for signal in wanted):

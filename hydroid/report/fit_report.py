@@ -112,11 +112,9 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     optional = (*others, "effect [deg]", *(labels[:1] if labels[0] != final else ()), "lower", "upper")
     note = (
         f"{estimate_meanings(fit)} ±: half the 95 % confidence interval of {final}. The noise is taken from "
-        "the residuals. The interval is only right if the model is right. A dash (–): the interval has "
-        "no limit, "
-        "or the parameter is at a bound or fixed. effect: rms change of the output when the parameter "
-        "changes "
-        "by 1 %."
+        "the residuals. The interval is only right if the model is right. A dash (–): the interval has no "
+        "limit, or the parameter is at a bound or fixed. effect: rms change of the output when the "
+        "parameter changes by 1 %."
     )
     return Table("Parameters", header, tuple(rows), note, optional)
 
@@ -185,7 +183,9 @@ def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
         repeated = "; the others repeat earlier ones" if evaluations > simulated else ""
         ranked = "; they rank behind all others" if diverged else ""
         facts += [
-            ("starts", str(rounds)) if multistart else ("populations", f"{rounds}, the first one included"),
+            ("starts", str(rounds))
+            if multistart
+            else ("populations", f"{rounds}: the first one and {rounds - 1} generations"),
             ("candidates", f"{evaluations:,}, of which {simulated:,} were simulated{repeated}"),
             ("diverged", f"{diverged:,} of {simulated:,} simulated candidates{ranked}"),
         ]

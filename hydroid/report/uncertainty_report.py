@@ -34,9 +34,8 @@ _PROFILE_MARGIN = 0.3
 _CAPTIONS = {
     "singular_values": "The inverse of the relative standard deviation of each direction, with the noise "
     "taken from the residuals. Below the dashed line the standard deviation is above "
-    f"{100 * WEAK_ABOVE:.0f} %. "
-    "A hollow mark at the bottom of the figure: a change along this direction does not change the simulated "
-    "response.",
+    f"{100 * WEAK_ABOVE:.0f} %. A hollow mark at the bottom of the figure: a change along this direction "
+    "does not change the simulated response.",
     "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
     "identifiable are left out.",
     "profiles": "The error, in units of the noise, with one parameter held and the others fitted again. "
@@ -110,10 +109,9 @@ def interval_table(study: UncertaintyStudy) -> Table:
             row += [unless_nan(v) for v in ends] if found.free[i] else [None, None]
         rows.append((*row, status_phrase(found.status[i])))
     note = (
-        f"At {study.source}. 95 % intervals. The noise is taken from the residuals, and the intervals "
-        "are only "
-        "right if the model is right. A dash (–): no limit. A parameter at a bound has no interval. If these "
-        "parameters are not a fit to these logs, the residuals are no measure of the noise: set "
+        f"At {study.source}. 95 % intervals. The noise is taken from the residuals, and the intervals are "
+        "only right if the model is right. A dash (–): no limit. A parameter at a bound has no interval. "
+        "If these parameters are not a fit to these logs, the residuals are no measure of the noise: set "
         "objective.noise_deg."
     )
     if refits is not None:
@@ -130,11 +128,10 @@ def direction_table(result: Identifiability) -> Table:
         parts = ", ".join(f"{result.names[i]} {axis[i]:+.2f}".replace("-", "−") for i in order)
         rows.append((float(value), 100 / value if value > 0 else np.inf, parts))
     note = (
-        "A direction changes several parameters together. The relative changes give the proportions: "
-        "A +0.8, B −0.4 means that B falls by 1 % when A grows by 2 %. A large standard deviation means "
-        "that the "
-        f"logs hardly show such a change. {result.rank} of {len(result.names)} directions have a relative "
-        f"standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
+        "A direction changes several parameters together. The relative changes give the proportions: A "
+        "+0.8, B −0.4 means that B falls by 1 % when A grows by 2 %. A large standard deviation means that "
+        f"the logs hardly show such a change. {result.rank} of {len(result.names)} directions have a "
+        f"relative standard deviation of {100 * WEAK_ABOVE:.0f} % or less."
     )
     header = ("singular value", "standard deviation [%]", "relative changes")
     return Table("Directions", header, tuple(rows), note, header[:1])

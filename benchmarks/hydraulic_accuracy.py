@@ -30,7 +30,7 @@ def accuracy(sets: int) -> None:
     command = pulses(rng, 3000)
     candidates = parameters(HydraulicSettings(), **draw(rng, sets))
     began = time.perf_counter()
-    exact, pressure = zip(*(reference(candidates[i : i + 1], command) for i in range(sets)), strict=True)
+    exact, pressure = zip(*(reference(candidates[i : i + 1], command) for i in range(sets)), strict=True)  # pyright: ignore[reportArgumentType]
     took = time.perf_counter() - began
     angle, bar = np.degrees(exact), 1e-5 * np.array(pressure)
     print(

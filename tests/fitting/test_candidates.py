@@ -78,7 +78,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
     assert "estimate average diverged" in caplog.text
-    assert "The estimate average diverged" in " ".join(fit_warnings(problem, result))
+    assert "The estimate 'average' diverged" in " ".join(fit_warnings(problem, result))
     assert "search (utopia)" in parameter_table(problem, result).markdown()
     assert "average" in objective_table(problem, result).markdown()
 

@@ -19,7 +19,7 @@ test: setup  ## the fast tests: four minutes on two cores
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: setup  ## killed processes, clusters, thousands of files
-	$(BIN)/pytest -m slow
+	$(BIN)/pytest -n 2 --dist loadfile -m slow
 
 demo: setup  ## both stages on one log of the virtual rig, and the other log to judge them by
 	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."

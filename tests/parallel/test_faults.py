@@ -103,6 +103,22 @@ def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path:
     assert len((tmp_path / "deaths").read_text()) == 4  # two tries in its chunk, two alone
 
 
+@pytest.mark.xfail(run=False, reason="waits without workers: they do not come back after repeated deaths")
+def test_residuals_leave_out_the_candidate_that_kills_after_an_evaluation(two: DaskWorkers, tmp_path: Path):
+    problem = Problem(*arguments())
+    theta = random_candidates(problem, 7)[:6]
+    theta[3, 0] = DEADLY
+
+    def spread(target: object, method: str, theta: np.ndarray, columns: int) -> np.ndarray:
+        return two(Deadly(target, tmp_path / "deaths"), method, theta, columns)
+
+    spread_problem = Problem(*arguments(), spread)
+    spread_problem.evaluate(theta)
+    residuals = spread_problem.residuals(theta[2:5])
+    assert np.isnan(residuals[1]).all()
+    np.testing.assert_array_equal(residuals[::2], problem.residuals(theta[2:5:2]))
+
+
 class Site:
     """A scheduler and workers started from the command line, with credentials made for the run."""
 

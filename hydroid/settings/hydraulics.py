@@ -15,6 +15,21 @@ from hydroid.settings.load import NotNegative, Positive, Settings
 SI_FACTORS = {"mm": 1e-3, "mm²": 1e-6, "cm³": 1e-6, "N/mm": 1e3, "bar": 1e5, "L/min": 1e-3 / 60.0}
 """what one of a unit is in SI; units that are SI already are not listed"""
 
+SPANS = {
+    "opening_a": (0.01, 1000.0),
+    "opening_b": (0.01, 1000.0),
+    "plunger_damping": (1.0, 5000.0),
+    "overlap_a": (0.0, 2.0),
+    "overlap_b": (0.0, 2.0),
+    "opening_exponent": (0.3, 4.0),
+    "leakage": (0.0, 10.0),
+    "flow_limit": (0.1, 1000.0),
+    "bulk_modulus": (500.0, 20000.0),
+    "dry_friction": (0.0, 1e5),
+    "delay": (0.0, 2.0),
+}
+"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where they are not free."""
+
 
 @dataclass(frozen=True)
 class Quantity:

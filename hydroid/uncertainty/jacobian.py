@@ -1,5 +1,6 @@
 """Derivatives of the residuals at one parameter vector, by finite differences whose step is checked."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +68,10 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     """
     scale, free = relative_scale(problem.parameters, theta), problem.parameters.free
     residual = problem.residuals(theta[None])[0]
-    fine, wide = (_slopes(problem, theta, residual, step * scale) for step in (STEP, CHECK_FACTOR * STEP))
+    fine, wide = (
+        slopes_of(problem.residuals, problem.parameters, theta, residual, step * scale)
+        for step in (STEP, CHECK_FACTOR * STEP)
+    )
     error = fine - wide
     length = np.linalg.norm(wide, axis=1)
     agree = np.linalg.norm(error, axis=1) <= STEPS_DISAGREE_ABOVE * length
@@ -86,19 +90,22 @@ def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
     return np.maximum(np.abs(theta), MIN_SCALE * (parameters.upper - parameters.lower))
 
 
-def _slopes(problem: Problem, theta: Array, residual: Array, step: Array) -> Array:
-    """Derivatives from the parabola through each free parameter's value and two others, shape (p, R).
+def slopes_of(
+    function: Callable[[Array], Array], parameters: ParameterSet, theta: Array, value: Array, step: Array
+) -> Array:
+    """Derivatives of a function, (n, P) -> (n, R), by each free parameter at theta, (P,), shape (p, R).
 
-    The two lie on both sides, a step (P,) away, or both on one side where a bound is near.
+    They are those of the parabola through `value`, the function there, and two other points. The two lie on
+    both sides, a step (P,) away, or both on one side where a bound is near.
     """
-    free, parameters = problem.parameters.free, problem.parameters
+    free = parameters.free
     above = theta + step > np.maximum(parameters.upper, theta)
     below = theta - step < np.minimum(parameters.lower, theta)
     first = np.where(above, -step, step)
     second = np.where(above, -2 * step, np.where(below, 2 * step, -step))
-    rows = problem.residuals(theta + np.vstack([np.diag(first)[free], np.diag(second)[free]]))
+    rows = function(theta + np.vstack([np.diag(first)[free], np.diag(second)[free]]))
     first, second = first[free, None], second[free, None]
-    near, far = (rows[: len(first)] - residual) / first, (rows[len(first) :] - residual) / second
+    near, far = (rows[: len(first)] - value) / first, (rows[len(first) :] - value) / second
     both = (near * second - far * first) / (second - first)
     one_side = np.where(np.isfinite(near), near, far)  # where the other one diverges
     return np.where(np.isfinite(both), both, one_side)

@@ -33,13 +33,11 @@ CONNECT = 20.0
 """seconds in which a scheduler must answer"""
 PEM = ["tls_ca_file", *(f"tls_{r}_{k}" for r in ("scheduler", "worker", "client") for k in ("cert", "key"))]
 """attributes of Dask's credentials"""
-CONFIG: dict[str, Any] = {
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-    "distributed.deploy.lost-worker-timeout": "1 hour",
-}
-"""Dask's configuration for what is started here. Its HTTP servers have no TLS, and serve nothing. A worker
-that dies is started again; Dask would give up one that takes longer than 15 s, as on a busy machine"""
+CLOSED: dict[str, list[str]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+"""Dask's configuration for what is started here: its HTTP servers have no TLS, and serve nothing"""
+PATIENT = {"distributed.deploy.lost-worker-timeout": "1 hour"}
+"""Dask's configuration for local workers: one that dies is started again, and Dask would give it up for good
+if that takes longer than 15 s, as on a busy machine"""
 
 
 @contextmanager
@@ -68,8 +66,9 @@ def open_workers(
         hint = "install it: pip install 'hydroid[cluster]'"
         raise SettingsError(f"Dask cannot be imported ({error})", where="--dask", hint=hint) from None
     with ExitStack() as stack:
-        stack.enter_context(config.set(CONFIG))
+        stack.enter_context(config.set(CLOSED))
         if local := re.fullmatch(r"local(?::([1-9][0-9]{0,3}))?", dask):
+            stack.enter_context(config.set(PATIENT))
             target = _start_local(stack, int(local[1] or os.cpu_count() or 1))
         else:
             target = _start_slurm(stack, settings) if dask == "slurm" else _address(dask, insecure)

@@ -28,7 +28,7 @@ SPANS = {
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),
 }
-"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where they are not free."""
+"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where not free."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class Actuator:
             substeps=settings.substeps,
         )
         self._level = 1e5 * settings.start_pressure
-        self._history = 2 + int(np.ceil(parameters.delay.max() / period))
+        self._history = 2 + int(np.ceil(max(parameters.delay_a.max(), parameters.delay_b.max()) / period))
 
     def start(self, angle: Array, torque: Array) -> ActuatorState:
         """Return the state at rest at `angle` [rad], with the plungers' coils at I_min.

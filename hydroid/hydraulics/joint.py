@@ -16,11 +16,17 @@ from hydroid.hydraulics.valve import opening, port_flow, spool
 
 
 @compilable
-def drives(c: Any, command: float) -> Any:
-    """Drives k i² [N·m²] of coils A and B at a command [%]: equations (2) to (5)."""
-    current_a = coil_current(side_voltage(command, c.onset_a, c.full_a), c.current_max, c.current_min)
-    current_b = coil_current(side_voltage(-command, c.onset_b, c.full_b), c.current_max, c.current_min)
-    return c.coil * current_a * current_a, c.coil * current_b * current_b
+def drive_a(c: Any, command: float) -> float:
+    """Drive k i² [N·m²] of coil A at a command [%]: equations (2) to (5)."""
+    current = coil_current(side_voltage(command, c.onset_a, c.full_a), c.current_max, c.current_min)
+    return c.coil * current * current
+
+
+@compilable
+def drive_b(c: Any, command: float) -> float:
+    """Drive k i² [N·m²] of coil B at a command [%]."""
+    current = coil_current(side_voltage(-command, c.onset_b, c.full_b), c.current_max, c.current_min)
+    return c.coil * current * current
 
 
 @compilable
@@ -43,27 +49,33 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
 
 @compilable
 def command(c: Any, w: Any, recent: Any, period: float, substeps: int) -> None:
-    """Drives before and after the delayed command changes, `fresh` sub-steps into this step.
+    """Each coil's drive before and after its delayed command changes, `fresh` sub-steps into this step.
 
     `recent` holds the joint's commands up to now, newest last [%].
     """
-    late = np.floor(c.delay / period)
-    w.fresh = (c.delay / period - late) * substeps
+    step = period / substeps
+    late = np.floor(c.delay_a / period)
+    w.fresh_a = (c.delay_a / period - late) * substeps
     place = recent.size - 1 - int(late)
-    w.new_a, w.new_b = drives(c, recent[place])
-    w.old_a, w.old_b = drives(c, recent[place - 1])
-    w.plunger_weight = plunger_weight(c, period / substeps)
+    w.new_a, w.old_a = drive_a(c, recent[place]), drive_a(c, recent[place - 1])
+    w.plunger_weight_a = plunger_weight(c.plunger_damping_a, step, c)
+    late = np.floor(c.delay_b / period)
+    w.fresh_b = (c.delay_b / period - late) * substeps
+    place = recent.size - 1 - int(late)
+    w.new_b, w.old_b = drive_b(c, recent[place]), drive_b(c, recent[place - 1])
+    w.plunger_weight_b = plunger_weight(c.plunger_damping_b, step, c)
 
 
 @compilable
 def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
     """Advance both plungers; the mean spool displacement of the sub-step [m]."""
-    part = min(max(substep + 1.0 - w.fresh, 0.0), 1.0)
-    drive_a = w.old_a + part * (w.new_a - w.old_a)
-    drive_b = w.old_b + part * (w.new_b - w.old_b)
+    part_a = min(max(substep + 1.0 - w.fresh_a, 0.0), 1.0)
+    part_b = min(max(substep + 1.0 - w.fresh_b, 0.0), 1.0)
+    pull_a, pull_b = w.old_a + part_a * (w.new_a - w.old_a), w.old_b + part_b * (w.new_b - w.old_b)
     before = spool(z.stroke_a, z.stroke_b)
-    z.stroke_a, z.speed_a = plunger_step(z.stroke_a, z.speed_a, drive_a, step, w.plunger_weight, c)
-    z.stroke_b, z.speed_b = plunger_step(z.stroke_b, z.speed_b, drive_b, step, w.plunger_weight, c)
+    a, b = (z.stroke_a, z.speed_a), (z.stroke_b, z.speed_b)
+    z.stroke_a, z.speed_a = plunger_step(a, pull_a, c.plunger_damping_a, step, w.plunger_weight_a, c)
+    z.stroke_b, z.speed_b = plunger_step(b, pull_b, c.plunger_damping_b, step, w.plunger_weight_b, c)
     return 0.5 * (before + spool(z.stroke_a, z.stroke_b))
 
 

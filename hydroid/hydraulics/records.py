@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
 from hydroid.settings.arm import Arm, Joint
-from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings
 from hydroid.settings.linkage import LinearActuator
 
 Array = NDArray[np.float64]
@@ -56,8 +56,9 @@ SCRATCH = np.dtype(
         # of the whole step: running sums over its sub-steps, and where the joint is
         "inertia way speed torque resistance oil_stiffness flow_a flow_b "
         "travel arm slope pressure_a pressure_b "
-        # commands of the step: sub-steps until the newer one acts, and the coils' drives before and after
-        "fresh new_a new_b old_a old_b plunger_weight "
+        # coils A and B in the step: sub-steps until the newer command acts, drives before and after, weight of
+        # the new state
+        "fresh_a fresh_b new_a new_b old_a old_b plunger_weight_a plunger_weight_b "
         # of a sub-step, chambers A and B: whether oil fills them, pressure, inflow, its fall with pressure
         "filled_a filled_b pushing_a pushing_b inflow_a inflow_b relief_a relief_b "
         # torque per pressure, pressure per volume, weight of the new state, pressure rise per flow
@@ -96,12 +97,13 @@ def _nominal(joint: Joint, settings: HydraulicSettings) -> tuple[float, ...]:
 def with_values(parameters: Records, values: Mapping[str, Any]) -> Records:
     """Return the parameters, shape (n, J), with some quantities replaced; n may grow from 1.
 
-    The values, by name in the units of QUANTITIES, have shapes that broadcast to (n, J).
+    The values, by a name of TARGETS in the units of QUANTITIES, have shapes that broadcast to (n, J).
     """
     shape = np.broadcast_shapes(parameters.shape, *(np.shape(v) for v in values.values()))
     replaced = np.broadcast_to(parameters, shape).copy().view(np.recarray)
     for name, value in values.items():
-        replaced[name] = np.asarray(value) * QUANTITIES[name].factor
+        for target in TARGETS[name]:
+            replaced[target] = np.asarray(value) * QUANTITIES[target].factor
     return replaced
 
 

@@ -83,21 +83,26 @@ def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
 
 
 @compilable
-def plunger_weight(c: Any, step: Any) -> Any:
-    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff."""
+def plunger_weight(damping: Any, step: Any, c: Any) -> Any:
+    """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff.
+
+    The damping is λ of this side [N·s/m].
+    """
     natural = np.sqrt(3.0 * c.plunger_stiffness / c.plunger_mass)
-    return implicit_weight(step * np.maximum(c.plunger_damping / c.plunger_mass, natural))
+    return implicit_weight(step * np.maximum(damping / c.plunger_mass, natural))
 
 
 @compilable
-def plunger_step(stroke: Any, speed: Any, drive: Any, step: Any, weight: Any, c: Any) -> Any:
-    """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step [s]; stroke [m] and speed [m/s] after it.
+def plunger_step(motion: Any, drive: Any, damping: Any, step: Any, weight: Any, c: Any) -> Any:
+    """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step [s].
 
-    The drive k i² [N·m²] holds during the step. A plunger that reaches its seat at x = 0 stops there.
+    `motion` is stroke [m] and speed [m/s]; returned are those after the step. The drive k i² [N·m²] holds
+    during the step. λ is the `damping` [N·s/m]. A plunger that reaches its seat at x = 0 stops there.
     """
+    stroke, speed = motion
     force = coil_force(drive, stroke, c.gap)
     slope = c.plunger_stiffness + 2.0 * force / (stroke + c.gap)
-    drag = c.plunger_damping + weight * step * slope
+    drag = damping + weight * step * slope
     net = force - c.plunger_stiffness * stroke - drag * speed
     gain = step * net / (c.plunger_mass + weight * step * drag)
     after = stroke + step * (speed + weight * gain)

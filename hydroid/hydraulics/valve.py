@@ -6,8 +6,8 @@ to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp
 
     Q = C_q A √(2/ρ) Δp / (Δp² + p_cr²)^(1/4).
 
-The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own
-A_max and overlap, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
+The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own A_max,
+overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
 to this actuator.
 """
 
@@ -29,8 +29,10 @@ def opening(spool: Any, c: Any) -> Any:
     """Opening A(x) of both metering edges [m²], without leakage, at x [m]; x > 0 opens towards A."""
     towards_a = spool > 0.0
     beyond = np.abs(spool) - select(towards_a, c.overlap_a, c.overlap_b)
-    fraction = np.minimum(np.maximum(beyond, 0.0) / c.slot_width, 1.0)
-    return select(towards_a, c.opening_a, c.opening_b) * power(fraction, c.opening_exponent)
+    slot = select(towards_a, c.slot_width_a, c.slot_width_b)
+    fraction = np.minimum(np.maximum(beyond, 0.0) / slot, 1.0)
+    exponent = select(towards_a, c.opening_exponent_a, c.opening_exponent_b)
+    return select(towards_a, c.opening_a, c.opening_b) * power(fraction, exponent)
 
 
 def conductance(flow_coefficient: Any, density: Any) -> Any:

@@ -1,6 +1,7 @@
 """The two stages of the article: which parameters are free, and where each enters (section 3, (15), (16))."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from hydroid.hydraulics.records import nominal_parameters
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.hydraulics import QUANTITIES
+from hydroid.settings.hydraulics import QUANTITIES, TARGETS
 from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
 from hydroid.simulation import Candidates
 
@@ -47,7 +48,8 @@ class Stage:
             if quantity in arm:
                 arm[quantity][:, slots] = theta[:, column, None]
             elif actuators is not None:
-                actuators[quantity][:, slots] = theta[:, column, None] * QUANTITIES[quantity].factor
+                for target in TARGETS[quantity]:
+                    actuators[target][:, slots] = theta[:, column, None] * QUANTITIES[target].factor
         return Candidates(**arm, actuators=actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
@@ -67,11 +69,12 @@ class Stage:
     def _refuse_overlap(self) -> None:
         taken: dict[tuple[str, int], str] = {}
         for name, slots in self._slots.items():
-            for slot in slots:
-                other = taken.setdefault((self._quantities[name], slot), name)
+            quantity = self._quantities[name]
+            for target, slot in product(TARGETS.get(quantity, (quantity,)), slots):
+                other = taken.setdefault((target, slot), name)
                 if other != name:
                     raise SettingsError(
-                        f"{other} and {name} both set the {self._quantities[name]} of the same joint or link",
+                        f"{other} and {name} both set the {target} of the same joint or link",
                         where=f"parameters.{name}",
                         hint="give each its own joints, or remove one",
                     )

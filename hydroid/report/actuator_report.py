@@ -119,8 +119,8 @@ def _force(axes: Axes, actuator: JointActuator) -> None:
 def _spool(axes: Axes, actuator: JointActuator) -> None:
     p = actuator.parameters
     axes.plot(_COMMAND, 1e3 * _displacement(p, _COMMAND), **SIDE_A)
-    for edge, label in ((0.0, "opens"), (p.slot_width, "fully open")):
-        for sign, overlap in ((1.0, p.overlap_a), (-1.0, p.overlap_b)):
+    for sign, overlap, slot in ((1.0, p.overlap_a, p.slot_width_a), (-1.0, p.overlap_b, p.slot_width_b)):
+        for edge, label in ((0.0, "opens"), (slot, "fully open")):
             at = 1e3 * sign * (overlap + edge)
             dashes, once = ":" if edge else "--", label if sign > 0 else None
             axes.axhline(float(at), color=style.GREY, linestyle=dashes, linewidth=1.0, label=once)
@@ -186,7 +186,7 @@ def _displacement(p: Any, command: Array) -> Array:
 
 def _spool_range(p: Any) -> Array:
     """A little more than from full opening to full opening [m]."""
-    return np.linspace(-1.15 * (p.overlap_b + p.slot_width), 1.15 * (p.overlap_a + p.slot_width), 2001)
+    return np.linspace(-1.15 * (p.overlap_b + p.slot_width_b), 1.15 * (p.overlap_a + p.slot_width_a), 2001)
 
 
 def _pump_flow(p: Any, drop: Array | float, area: Array | float) -> Array:

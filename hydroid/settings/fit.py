@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.experiment import DesignSettings
-from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
@@ -62,7 +62,7 @@ class FitSettings(Settings):
         if len(set(self.outputs)) < len(self.outputs):
             raise ValueError("outputs: a joint is listed twice")
         for name, parameter in self.parameters.items():
-            hydraulic = parameter.quantity in QUANTITIES
+            hydraulic = parameter.quantity in TARGETS
             if self.stage == "mech" and hydraulic:
                 raise ValueError(f"{name}: stage mech has no {parameter.quantity}; set stage: hyd")
             if self.stage == "hyd" and parameter.quantity == "gain":

@@ -1,6 +1,8 @@
-"""The hydraulics of an arm, from command to chamber pressure, and the one table of their 35 quantities.
+"""The hydraulics of an arm, from command to chamber pressure, and the one table of their quantities.
 
 Each quantity holds for every actuator of the arm; a parameter of a fit sets or frees it joint by joint.
+Names that end in _a and _b belong to one side, or one direction, of an actuator. Without that ending, as in
+`delay` for delay_a and delay_b, a name sets both.
 Units are those of a drawing or data sheet. Values marked as the article's are the ones it calls true. All
 others are ours: plausible sizes, not measurements of a HydroLek.
 """
@@ -8,7 +10,7 @@ others are ours: plausible sizes, not measurements of a HydroLek.
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hydroid.settings.load import NotNegative, Positive, Settings
 
@@ -51,6 +53,9 @@ def _quantity(default: float | None, unit: str, meaning: str, source: str = "our
     return Field(default, description=meaning, json_schema_extra={"unit": unit, "source": source})
 
 
+Delay = Annotated[float, Field(ge=0, le=5)]
+
+
 class HydraulicSettings(Settings):
     """All numbers of the actuator chain except areas and openings, which the arm's file gives by joint."""
 
@@ -66,14 +71,23 @@ class HydraulicSettings(Settings):
     stroke_2: Positive = _quantity(12.0, "mm", "x2: plunger stroke at F2", "article")
     rated_current: Positive = _quantity(0.9, "A", "current at which F1 and F2 act")
     plunger_mass: Positive = _quantity(0.05, "kg", "m of equation (5)")
-    plunger_damping: NotNegative = _quantity(20.0, "N·s/m", "λ of equation (5)")
+    plunger_damping_a: NotNegative = _quantity(
+        20.0, "N·s/m", "λ of equation (5), coil A; the spool lags behind its coil by at most λ/K, here 10 ms"
+    )
+    plunger_damping_b: NotNegative = _quantity(20.0, "N·s/m", "the same of coil B")
     plunger_stiffness: Positive = _quantity(2.0, "N/mm", "K of equation (5)")
-    slot_width: Positive = _quantity(2.0, "mm", "w of equation (7): spool travel from first to full opening")
+    slot_width_a: Positive = _quantity(
+        2.0, "mm", "w of equation (7): spool travel from first to full opening, towards A"
+    )
+    slot_width_b: Positive = _quantity(2.0, "mm", "the same towards B")
     overlap_a: NotNegative = _quantity(0.0, "mm", "spool travel before the valve opens, towards A")
     overlap_b: NotNegative = _quantity(0.0, "mm", "spool travel before the valve opens, towards B")
-    opening_exponent: Positive = _quantity(
-        1.0, "", "1: opening proportional to spool travel; above 1: it grows faster towards the end"
+    opening_exponent_a: Positive = _quantity(
+        1.0,
+        "",
+        "1: opening proportional to spool travel; above 1: it grows faster towards the end; towards A",
     )
+    opening_exponent_b: Positive = _quantity(1.0, "", "the same towards B")
     leakage: NotNegative = _quantity(1e-4, "mm²", "leakage area of every metering edge, open or shut")
     flow_coefficient: Positive = _quantity(0.7, "", "C_q of equation (7)")
     transition_pressure: Positive = _quantity(0.2, "bar", "pressure drop below which flow is laminar")
@@ -96,7 +110,8 @@ class HydraulicSettings(Settings):
     stop_penetration: NotNegative = _quantity(
         1e10, "N·s/m²", "K_p of equation (9): force of the end stops per penetration and speed"
     )
-    delay: Annotated[float, Field(ge=0, le=5)] = _quantity(0.0, "s", "transport delay of the command")
+    delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
+    delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
@@ -104,6 +119,21 @@ class HydraulicSettings(Settings):
     """pressure on the rod side at the start, where static balance leaves it open [bar]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3
     """sub-steps of valves and oil in one MuJoCo step"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _both_sides(cls, values: Any) -> Any:
+        """Let a name without _a or _b set both sides."""
+        if not isinstance(values, dict):
+            return values
+        spread: dict[Any, Any] = {}
+        for key, value in values.items():
+            sides = (f"{key}_a", f"{key}_b")
+            for name in sides if sides[0] in cls.model_fields else (key,):
+                if name in spread:
+                    raise ValueError(f"{name} is given twice")
+                spread[name] = value
+        return spread
 
 
 def _quantities() -> dict[str, Quantity]:
@@ -122,4 +152,9 @@ def _quantities() -> dict[str, Quantity]:
 
 
 QUANTITIES = _quantities()
-"""the 35 quantities by name; parameters of a fit and the kernel's arrays use these names"""
+"""the quantities by name; the kernel's arrays use these names"""
+
+TARGETS = {name: (name,) for name in QUANTITIES} | {
+    name[:-2]: (name, f"{name[:-2]}_b") for name in QUANTITIES if name.endswith("_a")
+}
+"""the quantities that a name sets: itself, or both sides; parameters of a fit use these names"""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from hydroid.settings.hydraulics import QUANTITIES
+from hydroid.settings.hydraulics import QUANTITIES, TARGETS
 from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
 
 MECHANICAL_UNITS = {
@@ -20,7 +20,7 @@ MECHANICAL_UNITS = {
 MECHANICAL_SPANS = {"damping": (0.0, 1e5), "stiffness": (0.0, 1e4), "friction": (0.0, 1e4)}
 """Values that real joints have, of the quantities that `hydroid suggest` asks about where not free."""
 
-UNITS = MECHANICAL_UNITS | {q.name: q.unit for q in QUANTITIES.values()}
+UNITS = MECHANICAL_UNITS | {name: QUANTITIES[sets[0]].unit for name, sets in TARGETS.items()}
 """Quantities that a parameter can be, with their units."""
 
 

@@ -147,9 +147,14 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
             pa, pb = pressures(z, x)
             spool = xa - xb
             share = min(
-                max(abs(spool) - v["overlap_a" if spool > 0 else "overlap_b"], 0) / v["slot_width"], 1
+                max(abs(spool) - v["overlap_a" if spool > 0 else "overlap_b"], 0)
+                / v["slot_width_a" if spool > 0 else "slot_width_b"],
+                1,
             )
-            area = v["opening_a" if spool > 0 else "opening_b"] * share ** v["opening_exponent"]
+            area = (
+                v["opening_a" if spool > 0 else "opening_b"]
+                * share ** v["opening_exponent_a" if spool > 0 else "opening_exponent_b"]
+            )
             ahead, back = (
                 v["leakage"] + (area if spool > 0 else 0),
                 v["leakage"] + (area if spool <= 0 else 0),
@@ -165,8 +170,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
             force -= v["dry_friction"] * speed / sqrt(speed**2 + 1e-6)
             weight = MASS * GRAVITY * CENTRE * cos(q + TILT)
             turn = (r * force - weight - DAMPING * w - STIFFNESS * (q - START)) / INERTIA
-            push_a = drive_a / (xa + gap) ** 2 - v["plunger_damping"] * ua - v["plunger_stiffness"] * xa
-            push_b = drive_b / (xb + gap) ** 2 - v["plunger_damping"] * ub - v["plunger_stiffness"] * xb
+            push_a = drive_a / (xa + gap) ** 2 - v["plunger_damping_a"] * ua - v["plunger_stiffness"] * xa
+            push_b = drive_b / (xb + gap) ** 2 - v["plunger_damping_b"] * ub - v["plunger_stiffness"] * xb
             return [ua, push_a / m, ub, push_b / m, qa / va, qb / vb, w, turn]
 
         return f

@@ -1,0 +1,91 @@
+"""What a valve has for each side: symmetry under swapping them, one name for both, recovery from a log."""
+
+import numpy as np
+import pytest
+from recovery import assert_recovered, duties, recover, settings_of
+
+from hydroid.errors import SettingsError
+from hydroid.hydraulics.actuator import Actuator
+from hydroid.hydraulics.records import LINKAGE, ROTARY, nominal_parameters, with_values
+from hydroid.settings.arm import Arm
+from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings
+from hydroid.settings.load import validate
+
+SIDED = [name for name, sets in TARGETS.items() if len(sets) == 2]
+SETTINGS = HydraulicSettings()
+UNLIKE = {
+    "delay_a": 0.05, "delay_b": 0.12, "plunger_damping_a": 60.0, "plunger_damping_b": 20.0,
+    "opening_exponent_a": 2.0, "opening_exponent_b": 1.3, "slot_width_a": 2.5, "slot_width_b": 1.5,
+    "overlap_a": 0.2, "overlap_b": 0.1, "opening_a": 0.4, "opening_b": 0.3, "onset_a": 1.0, "onset_b": 2.0,
+}  # fmt: skip
+
+
+def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
+    """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
+    linkage = np.array([(ROTARY, 0, 0, 0, 0, 0)], LINKAGE).view(np.recarray)
+    nominal = nominal_parameters(arm, SETTINGS, [3])
+    actuator = Actuator(with_values(nominal, values), linkage, 5.0, 0.01, SETTINGS)
+    angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05
+    state, mass = actuator.start(angle, np.zeros((1, 1))), np.full((1, 1), inertia)
+    out = []
+    for u in command:
+        torque, armature = actuator.advance(state, [u], angle, velocity, mass)
+        mass = inertia + armature
+        velocity = velocity + 0.01 * torque / mass
+        angle = actuator.close(state, velocity, mass)
+        out.append(angle[0, 0])
+    return np.array(out)
+
+
+def test_swapped_sides_mirror_the_motion(arm: Arm):
+    command = np.repeat([60.0, -80.0, 40.0, 0.0, -50.0, 90.0], 80)
+    other = {"a": "b", "b": "a"}
+    swapped = {f"{name[:-1]}{other[name[-1]]}": value for name, value in UNLIKE.items()}
+    here, there = wheel(arm, UNLIKE, command), wheel(arm, swapped, -command)
+    assert np.ptp(here) > 0.5
+    np.testing.assert_allclose(there, -here, atol=1e-9)
+    assert abs(wheel(arm, UNLIKE, -command) + here).max() > 0.05
+
+
+@pytest.mark.parametrize("name", ["delay", "plunger_damping", "opening_exponent", "slot_width", "overlap"])
+def test_a_name_without_side_sets_both(name: str):
+    one, both = (
+        validate(values, HydraulicSettings, "here")
+        for values in ({name: 0.7}, dict.fromkeys(TARGETS[name], 0.7))
+    )
+    assert one == both
+    with pytest.raises(SettingsError, match=f"{name}_b is given twice"):
+        validate({name: 0.7, f"{name}_b": 0.7}, HydraulicSettings, "here")
+
+
+def test_every_side_has_its_other():
+    for name in SIDED:
+        a, b = (QUANTITIES[side] for side in TARGETS[name])
+        assert a.unit == b.unit
+    assert {q.rstrip("ab").rstrip("_") for q in QUANTITIES if q.endswith(("_a", "_b"))} == set(SIDED)
+
+
+def test_two_parameters_for_one_side_are_refused():
+    bounds = {"bounds": [0.0, 1.0], "joints": [2]}
+    settings = settings_of({"d": {"quantity": "delay", **bounds}, "d_B": {"quantity": "delay_b", **bounds}})
+    with pytest.raises(SettingsError, match="d and d_B both set the delay_b"):
+        recover(settings, [], {}, {})
+
+
+def test_a_valve_that_differs_by_side_is_recovered():
+    """Delay, lag and exponent of each direction, from one log of duties."""
+    truth = {"t_A": 0.15, "t_B": 0.06, "lag_A": 160.0, "lag_B": 60.0, "n_A": 1.8, "n_B": 1.2}
+    rows = {
+        "t_A": ("delay_a", 0.0, 0.5), "t_B": ("delay_b", 0.0, 0.5), "n_A": ("opening_exponent_a", 0.7, 3.0),
+        "lag_A": ("plunger_damping_a", 5.0, 500.0), "lag_B": ("plunger_damping_b", 5.0, 500.0),
+        "n_B": ("opening_exponent_b", 0.7, 3.0),
+    }  # fmt: skip
+    parameters = {
+        name: {"quantity": quantity, "joints": [2], "bounds": [low, high]}
+        for name, (quantity, low, high) in rows.items()
+    }
+    settings = settings_of(parameters)
+    pose = settings.arm.pose("study")
+    log = duties(pose, {2: [50, -40, 80, -90, 60, 0, -60, 40, -30, 90, -70, 30]}, dwell=0.8)
+    start = {"t_A": 0.1, "t_B": 0.1, "lag_A": 100.0, "lag_B": 100.0, "n_A": 1.5, "n_B": 1.5}
+    assert_recovered(recover(settings, [log], truth, start), settings, truth)

@@ -56,7 +56,7 @@ SCRATCH = np.dtype(
         # of the whole step: running sums over its sub-steps, and where the joint is
         "inertia way speed torque resistance oil_stiffness flow_a flow_b "
         "travel arm slope pressure_a pressure_b "
-        # coils A and B in the step: sub-steps until the newer command acts, drives before and after, weight of
+        # coils A and B: sub-steps until the newer command acts, drives before and after, weight of
         # the new state
         "fresh_a fresh_b new_a new_b old_a old_b plunger_weight_a plunger_weight_b "
         # of a sub-step, chambers A and B: whether oil fills them, pressure, inflow, its fall with pressure

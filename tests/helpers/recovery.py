@@ -18,7 +18,7 @@ NOISE_DEG = 0.02
 
 
 def duties(pose: np.ndarray, levels: Mapping[int, Sequence[float]], dwell: float = 1.0) -> Log:
-    """A log without motion: commands [%] from its first sample on, each held `dwell` [s], by joint (from 1)."""
+    """A log without motion: commands [%] from its first sample, each held `dwell` [s], by joint (from 1)."""
     period = 0.01
     length = round(dwell * max(map(len, levels.values())) / period) + 1
     command = np.zeros((length, len(pose)))

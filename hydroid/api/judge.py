@@ -23,6 +23,8 @@ def validate(
     models: ModelSource | Sequence[ModelSource],
     logs: "LogSources",
     out: str | Path | None = "runs/validation",
+    *,
+    repair: bool = False,
 ) -> "Study[list[Validation]]":
     """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots.
 
@@ -34,6 +36,7 @@ def validate(
             logs with its own settings.
         logs: CSV files or logs, one or several.
         out: folder for the page, the table and the figures; None: nothing is written.
+        repair: fill holes of the logs up to `log.repair_s`.
 
     Returns:
         The study, with one result for each fit and log.
@@ -44,7 +47,7 @@ def validate(
     """
     several = [models] if isinstance(models, str | Path | IdentifiedModel) else models
     opened = [open_model(model) for model in several]
-    read = [read_logs(logs, model.settings) for model in opened]
+    read = [read_logs(logs, model.settings, repair=repair) for model in opened]
     from hydroid.fitting.validation import error_indices
     from hydroid.prediction import predict
     from hydroid.report.validation_report import Validation, validation_page

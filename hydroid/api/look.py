@@ -88,13 +88,16 @@ def read_with_findings(
     return read, found
 
 
-def read_commands(path: str | Path, settings: FitSettings, pose: str | None = None) -> "Log":
+def read_commands(
+    path: str | Path, settings: FitSettings, pose: str | None = None, *, repair: bool = False
+) -> "Log":
     """Read a CSV of commands, whose angles may be missing.
 
     Args:
         path: the file.
         settings: which map its columns.
         pose: pose of the arm's file to start from; None: as logged, or the settings' pose where unmeasured.
+        repair: fill holes up to `log.repair_s`.
 
     Raises:
         LogError: a fault that keeps the commands from being used.
@@ -103,7 +106,9 @@ def read_commands(path: str | Path, settings: FitSettings, pose: str | None = No
     from hydroid.log import read_log
 
     start = settings.arm.pose(pose or settings.start_pose)
-    log, findings = read_log(Path(path), settings.log, _ranges(settings), angles_required=False)
+    log, findings = read_log(
+        Path(path), settings.log, _ranges(settings), angles_required=False, repair=repair
+    )
     _report(findings)
     return replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
 
@@ -169,6 +174,7 @@ def view(
     *,
     pose: str | None = None,
     gif: str | Path | None = None,
+    repair: bool = False,
 ) -> None:
     """Show the arm in MuJoCo's viewer in real time until its window is closed, or write its motion to a GIF.
 
@@ -180,6 +186,7 @@ def view(
         pose: name of the start pose in the arm's file; by default the log's first angles, or the settings'
             start pose.
         gif: a file to write; needs a log and no display.
+        repair: fill holes of the log up to `log.repair_s`.
 
     Raises:
         RunError: no window can be opened, or the simulation diverged.
@@ -192,7 +199,11 @@ def view(
         _require_hydraulics(model)
     from hydroid.log import Log
 
-    commands = log if log is None or isinstance(log, Log) else read_commands(log, model.settings, pose)
+    commands = (
+        log
+        if log is None or isinstance(log, Log)
+        else read_commands(log, model.settings, pose, repair=repair)
+    )
     from hydroid.viewer.playback import make_playback
     from hydroid.viewer.window import animation, show
 

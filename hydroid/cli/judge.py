@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Estimate, Folder, Logs, Output, OwnConfig, Set, names, overrides
+from hydroid.cli.options import Estimate, Folder, Logs, Output, OwnConfig, Repair, Set, names, overrides
 from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
@@ -39,13 +39,14 @@ def validate(
     ],
     out: Folder = Path("runs/validation"),
     setting: Set = None,
+    repair: Repair = False,
 ) -> None:
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots."""
     from hydroid.api.judge import validate
     from hydroid.identified import load_identified
 
     models = [load_identified(path, overrides=overrides(setting)) for path in fit]
-    study = validate(models, logs, out)
+    study = validate(models, logs, out, repair=repair)
     found = [row for result in study.result for row in _indices(result)]
     show(output, lambda: {"results": found}, [study.table, str(out / "validation.html")])
 
@@ -81,6 +82,7 @@ def identifiability(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     out: Folder = Path("runs/identifiability"),
     setting: Set = None,
+    repair: Repair = False,
 ) -> None:
     """Find which parameters, and which combinations of them, the logs determine.
 
@@ -100,7 +102,7 @@ def identifiability(
     with Progress(quiet=output.silent) as progress:
         study = identifiability(
             model,
-            read_logs(logs, model.settings),
+            read_logs(logs, model.settings, repair=repair),
             out,
             profile=names(profile),
             bootstrap=(bootstrap, seed),
@@ -122,6 +124,7 @@ def sensitivity(
     estimate: Estimate,
     output: Output,
     out: Folder = Path("runs/sensitivity"),
+    repair: Repair = False,
 ) -> None:
     """Draw the effect of each free parameter on each output over time (article, figure 10).
 
@@ -133,7 +136,7 @@ def sensitivity(
 
     model = _model(estimate)
     with Progress(quiet=output.silent) as progress:
-        study = sensitivity(model, read_logs(logs, model.settings), out, progress=progress)
+        study = sensitivity(model, read_logs(logs, model.settings, repair=repair), out, progress=progress)
     found = rows(study.table, "log", "output", "parameter", "rms_per_percent")
     show(output, lambda: {"results": found}, [study.table, str(out / f"{study.page.name}.html")])
 
@@ -154,6 +157,7 @@ def surface(
         ),
     ] = None,
     out: Folder = Path("runs/surface"),
+    repair: Repair = False,
 ) -> None:
     """Draw the error as a function of two parameters, with the others at the estimate (article, figure 11).
 
@@ -167,7 +171,9 @@ def surface(
     model = _model(estimate)
     grid = points, None if around is None else around / 100
     with Progress(quiet=output.silent) as progress:
-        study = surface(model, read_logs(logs, model.settings), pairs, out, grid=grid, progress=progress)
+        study = surface(
+            model, read_logs(logs, model.settings, repair=repair), pairs, out, grid=grid, progress=progress
+        )
     error = "error" if model.settings.objective.relative else "error_deg"
     keys = ("parameters", "first_lowest", "second_lowest", f"lowest_{error}")
     found = rows(study.table, *keys, "first_estimate", "second_estimate", f"estimate_{error}")

@@ -42,6 +42,7 @@ def view(
     gif: Annotated[
         Path | None, typer.Option(metavar="OUT.gif", help="Write the motion to a GIF instead of a window.")
     ] = None,
+    repair: Repair = False,
 ) -> None:
     """Show the moving arm in MuJoCo's viewer, in real time.
 
@@ -52,7 +53,7 @@ def view(
     from hydroid.api.look import view
 
     try:
-        view(_model(estimate, output), log, pose=pose, gif=gif)
+        view(_model(estimate, output), log, pose=pose, gif=gif, repair=repair)
     except KeyboardInterrupt:
         if gif is not None:
             raise

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from hydroid.cli.options import Estimate, Output, overrides
+from hydroid.cli.options import Estimate, Output, Repair, overrides
 from hydroid.cli.output import show
 
 
@@ -34,6 +34,7 @@ def simulate(
         Path | None,
         typer.Option(metavar="CSV", help="Also write pressures, flows, spool position and force (stage 2)."),
     ] = None,
+    repair: Repair = False,
 ) -> None:
     """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit."""
     from hydroid.api.look import read_commands
@@ -45,7 +46,7 @@ def simulate(
     if target.resolve() == commands.resolve():
         raise SettingsError("would overwrite the commands", where=f"--out {target}", hint="name another file")
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
-    start = read_commands(commands, model.settings, pose)
+    start = read_commands(commands, model.settings, pose, repair=repair)
     log = simulate(model, start, target, noise_deg=noise_deg, seed=seed, trace=trace)
     content = {"out": str(target), "samples": len(log.time), "duration_s": float(log.duration)}
     show(output, lambda: content | {"trace": trace and str(trace)}, [str(target)])

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from hydroid.cli.options import Estimate, Folder, Output, names, overrides
+from hydroid.cli.options import Estimate, Folder, Output, Repair, names, overrides
 from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
@@ -32,6 +32,7 @@ def design(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search for commands.")] = 1,
     out: Folder = Path("runs/design"),
+    repair: Repair = False,
 ) -> None:
     """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
@@ -50,7 +51,8 @@ def design(
     flags = {"design.duration_s": duration, "design.criterion": criterion, "design.joints": driven}
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting, **flags))
     with Progress(quiet=output.silent) as progress:
-        study = design(model, read_logs(logs or [], model.settings), out, seed=seed, progress=progress)
+        existing = read_logs(logs or [], model.settings, repair=repair)
+        study = design(model, existing, out, seed=seed, progress=progress)
     found = rows(study.table, *PRECISION)
     commands = str(out / "commands.csv")
     show(output, lambda: {"commands": commands, "precision": found}, [study.table, commands])

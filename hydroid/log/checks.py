@@ -8,7 +8,7 @@ from hydroid.log.log import Finding, Floats, numbered
 from hydroid.log.signals import Recording
 from hydroid.settings.log import LogSettings
 
-GAP = 1.5  # in sample periods: a longer step is a gap
+GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
 JITTER = 0.25  # in sample periods: a larger variation of the steps is a warning
 SLOWEST = 10  # largest ratio of the file's period to log.period_s: held commands would not explain the motion
 ROUNDING = 1e-6  # [%], of a scaled command

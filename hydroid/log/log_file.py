@@ -12,9 +12,16 @@ from hydroid.files import write_atomic
 from hydroid.log.checks import check_recording, sample_period
 from hydroid.log.csv_file import open_csv
 from hydroid.log.delay import delay_findings
-from hydroid.log.log import Finding, Floats, Log
+from hydroid.log.log import Finding, Floats, Log, numbered
 from hydroid.log.resample import fill, hold, is_on_grid, resample, unwrap
-from hydroid.log.signals import Recording, Signal, map_signals, missing_columns, read_recording
+from hydroid.log.signals import (
+    Recording,
+    Signal,
+    absent_joints,
+    map_signals,
+    missing_columns,
+    read_recording,
+)
 from hydroid.settings.log import LogSettings
 
 DIGITS = "%.10g"
@@ -75,6 +82,9 @@ def check_log(
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:
         wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in file.names]
+    if absent := absent_joints(file, wanted, {*outputs, *settings.joints}):
+        findings.append(Finding("note", f"holds nothing of {numbered(absent)}", str(path)))
+        wanted = [signal for signal in wanted if signal.joint not in absent]
     findings += missing_columns(file, wanted)
     signals = [signal for signal in wanted if signal.name in file.names]
     log = None

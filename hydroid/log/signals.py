@@ -1,7 +1,7 @@
 """The signals that a file's columns hold, and their values in SI units at the file's own rate."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Literal
@@ -129,6 +129,16 @@ def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
             one = Signal("", "pressure", joint, pressure.scale * unit, pressure.offset * unit, *_PRESSURES)
             signals += [replace(one, name=name, chamber=k) for k, name in enumerate(pressure.column)]
     return signals
+
+
+def absent_joints(file: CsvFile, wanted: Sequence[Signal], needed: Collection[int]) -> list[int]:
+    """Return the joints, other than those `needed`, of which the file has no column though it has others'.
+
+    A column of a similar name speaks against it: it is rather misspelt.
+    """
+    free = sorted(set(file.names).difference(signal.name for signal in wanted))
+    known = {s.joint for s in wanted if s.name in file.names or _hint(s.name, free)} - {0}
+    return sorted({s.joint for s in wanted} - known - {0, *needed}) if known else []
 
 
 def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:

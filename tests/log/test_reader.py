@@ -222,3 +222,30 @@ def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
     settings = LogSettings.model_validate({"joints": {5: None}})
     with pytest.raises(LogError, match=r"log\.joints\.5: the arm has joints 1 to 2"):
         read(edited(tmp_path, lambda rows: None), settings)
+
+
+def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
+    path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 5, 2)) for row in rows])
+    log, (note,) = read(path, outputs=[1])
+    assert (note.level, note.what) == ("note", "holds nothing of joint 2")
+    assert log.driven.tolist() == log.measured.tolist() == [True, False]
+    (fault,) = faults(path, outputs=[2])
+    assert "'u2_pct' (command of joint 2)" in fault.what
+    named = LogSettings.model_validate({"joints": {2: {"angle": {"unit": "rad"}}}})
+    assert len(faults(path, named, outputs=[1])) == 1
+
+
+def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) -> None:
+    """A log of 20 Hz with steps of 0.02 to 0.08 s: angles are interpolated, commands held."""
+    rng = np.random.default_rng(0)
+    time = 0.05 * np.arange(200) + rng.uniform(-0.016, 0.016, 200) - 0.0001
+    command, angle = 60 * np.sign(np.sin(time)), 10 + 9 * np.sin(time)
+    values = np.round(np.stack([time - time[0], command, command, angle, angle], axis=1), 4)
+    path = save(tmp_path / "log.csv", lines(values))
+    assert np.diff(values[:, 0]).max() > 1.5 * 0.05
+    log, findings = read(path, LogSettings(period_s=0.05))
+    assert [finding.level for finding in findings if "sample period varies" in finding.what] == ["warning"]
+    np.testing.assert_allclose(np.rad2deg(log.angle[:, 0]), 10 + 9 * np.sin(log.time + time[0]), atol=0.01)
+    gap = save(tmp_path / "gap.csv", lines(np.delete(values, np.s_[50:52], axis=0)))
+    assert "--repair" in str(faults(gap, LogSettings(period_s=0.05))[0])
+    assert len(read(gap, LogSettings(period_s=0.05, repair_s=0.2), repair=True)[0].time) == len(log.time)

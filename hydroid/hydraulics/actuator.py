@@ -40,12 +40,14 @@ class Observation:
 
     pressure [Pa], shape (n, J, 2): chambers A and B. flow [m³/s], shape (n, J, 2): into A and out of B.
     spool [m], shape (n, J). force [N], shape (n, J): A_A p_A − A_B p_B; of a rotary actuator a torque [N·m].
+    line [Pa], shape (n, J): pressure of the pump's line, the same at all joints.
     """
 
     pressure: Array
     flow: Array
     spool: Array
     force: Array
+    line: Array
 
 
 class Actuator:
@@ -103,6 +105,7 @@ class Actuator:
         rest = resting_stroke(c["coil"] * c["current_min"] ** 2, c["gap"], c["plunger_stiffness"])
         z["stroke_a"] = z["stroke_b"] = rest
         z["hold"], z["external"] = torque, -torque
+        z["line"], z["share"] = c["relief"], c["pump_idle"]
         return ActuatorState(z, np.zeros((self._history, self.shape[1])))
 
     def advance(
@@ -144,7 +147,8 @@ class Actuator:
         ]
         force = c["area_a"] * pressure[0] - c["area_b"] * pressure[1]
         flow = np.stack([z["flow_a"], -z["flow_b"]], axis=-1)
-        return Observation(np.stack(pressure, axis=-1), flow, z["stroke_a"] - z["stroke_b"], force)
+        spool = z["stroke_a"] - z["stroke_b"]
+        return Observation(np.stack(pressure, axis=-1), flow, spool, force, z["line"].copy())
 
 
 def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:

@@ -80,8 +80,8 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
 
 
 @compilable
-def meter(c: Any, w: Any, displacement: float) -> None:
-    """Flows into both chambers and how they fall with pressure."""
+def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
+    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' pressures."""
     area = opening(displacement, c)
     ahead, back = c.leakage, c.leakage  # pump to A and B to tank, pump to B and A to tank
     if displacement > 0.0:
@@ -92,8 +92,8 @@ def meter(c: Any, w: Any, displacement: float) -> None:
     w.filled_a = 1.0 if w.pressure_a > c.vapour_pressure else 0.0
     w.filled_b = 1.0 if w.pressure_b > c.vapour_pressure else 0.0
     w.pushing_a, w.pushing_b = max(w.pressure_a, c.vapour_pressure), max(w.pressure_b, c.vapour_pressure)
-    w.inflow_a, w.relief_a = port_flow(w.pushing_a, ahead, back, c)
-    w.inflow_b, w.relief_b = port_flow(w.pushing_b, back, ahead, c)
+    w.inflow_a, w.relief_a, w.pumped_a, w.give_a = port_flow(w.pushing_a, supply, ahead, back, c)
+    w.inflow_b, w.relief_b, w.pumped_b, w.give_b = port_flow(w.pushing_b, supply, back, ahead, c)
 
 
 @compilable

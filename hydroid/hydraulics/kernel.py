@@ -33,7 +33,8 @@ from numba import njit
 
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
-from hydroid.hydraulics.records import SCRATCH
+from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
+from hydroid.hydraulics.records import LINE, SCRATCH
 from hydroid.settings import linkage
 
 RAMP_TORQUE, RAMP_WAY = 1.0 / 6.0, 1.0 / 2.0
@@ -94,9 +95,11 @@ class Plugin(NamedTuple):
 
 
 class Pad(NamedTuple):
-    """Scratch space of one look-ahead: (J,) of SCRATCH; what the matrices of all sub-steps share, (J, J)."""
+    """Scratch space of one look-ahead: (J,) of SCRATCH, (1,) of LINE; what the matrices of all sub-steps
+    share, (J, J)."""
 
     joints: Any
+    line: Any
     common: Any
     matrix: Any
     gain: Any
@@ -106,7 +109,8 @@ class Pad(NamedTuple):
 def make_pad(joints: int) -> Pad:
     """Return scratch space for so many joints."""
     square = (joints, joints)
-    return Pad(np.zeros(joints, SCRATCH), np.empty(square), np.empty(square), np.empty(joints))
+    work, line = np.zeros(joints, SCRATCH), np.zeros(1, LINE)
+    return Pad(work, line, np.empty(square), np.empty(square), np.empty(joints))
 
 
 class Exchange(NamedTuple):
@@ -133,8 +137,12 @@ def look_ahead(
     """
     coefficients, damping, order, entries, idle, period, substeps = plugin
     angle, velocity, mass, torque, armature = exchange
-    work, common, matrix, gain = pad
+    work, lines, common, matrix, gain = pad
+    line = lines[0]
     joints = state.shape[0]
+    # all joints with an actuator have the same pump: read it at one of them
+    some, last = coefficients[candidate, order[joints - 1]], state[order[joints - 1]]
+    shared = idle < joints and some.pump_flow < np.inf
     part = 1.0 / substeps
     step = part * period
     for a in range(joints):
@@ -150,6 +158,11 @@ def look_ahead(
             command(c, w, commands[:, j], period, substeps)
         for b in range(a + 1, joints):
             matrix[a, b] = mass[entries[a, b]]
+    if shared:
+        demanded = False
+        for a in range(idle, joints):
+            demanded |= commands[-1, order[a]] != 0.0
+        begin_line(line, some, last, demanded, step)
     # joints without actuator bring the same to all sub-steps: they are eliminated once
     eliminate(matrix, 0, idle)
     for a in range(idle, joints):
@@ -160,16 +173,34 @@ def look_ahead(
             j = order[a]
             c, z, w = coefficients[candidate, j], state[j], work[j]
             if a >= idle:
-                meter(c, w, move_spool(c, z, w, i, step))
+                supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
+                meter(c, w, move_spool(c, z, w, i, step), supply)
                 load(c, w, damping[candidate, j], step)
+                if shared:
+                    draw(line, c, w)
             resistance = w.weight * w.stiffness + w.drag
             gain[a] = step * (w.push + z.external - resistance * w.speed)
             if a >= idle:
                 matrix[a, a] = common[a, a] + w.weight * step * resistance
                 for b in range(a + 1, joints):
                     matrix[a, b] = common[a, b]
+        if shared:
+            open_line(line, some, step)
+            for a in range(idle, joints):
+                u = work[order[a]]
+                gain[a] += step * u.weight * u.thrust * line.change
+                for b in range(a, joints):
+                    w = work[order[b]]
+                    matrix[a, b] += step * line.softness * u.weight * u.thrust * w.weight * w.thrust
         eliminate(matrix, idle, joints)
         substitute(matrix, gain)
+        if shared:
+            for a in range(idle, joints):
+                w = work[order[a]]
+                line.change -= line.softness * w.thrust * w.weight * gain[a]
+            for a in range(idle, joints):
+                fill(line, work[order[a]], step)
+            close_line(line, some)
         for a in range(joints):
             j = order[a]
             settle(coefficients[candidate, j], state[j], work[j], gain[a], step)
@@ -181,6 +212,8 @@ def look_ahead(
         z.armature = period * kappa
         z.torque = part * w.torque + kappa * (w.speed - velocity[j])
         torque[j], armature[j] = z.torque, z.armature
+        if shared:
+            z.line, z.share, z.demand = line.pressure, line.share, line.demand
 
 
 @compilable

@@ -3,7 +3,7 @@
 A population's parameters are a record array, shape (n, J), with one field per quantity of
 `hydroid.settings.hydraulics` in SI: `parameters.area_a` is an array, shape (n, J), and `parameters[i, j]`
 one actuator. Of a rotary actuator area_a and area_b are displacements [m³/rad], dead_volume is the constant
-volume of a chamber, and dry_friction a torque [N·m]. flow_limit is inf where there is none.
+volume of a chamber, and dry_friction a torque [N·m]. flow_limit and pump_flow are inf where there is none.
 """
 
 import math
@@ -37,8 +37,9 @@ LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
 """how a joint is moved: kind (NONE, LINEAR or ROTARY); pivots' distances a, b [m]; their angle theta0 at
 joint angle 0 [rad]; cylinder length with the rod fully in [m], as at the joint's lower limit; stroke [m]"""
 
-COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance")])
-"""what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them"""
+COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance backflow relief")])
+"""what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them:
+backflow is the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
 
 JOINT_STATE = np.dtype(
     _fields(
@@ -46,7 +47,9 @@ JOINT_STATE = np.dtype(
         "oil_a oil_b flow_a flow_b "  # oil [Pa] as `cylinder` defines it; mean flows of the last step [m³/s]
         "external hold "  # torque e that is neither oil nor damping; torque that held the start pose [N·m]
         "angle velocity "  # at the start of the step [rad, rad/s]
-        "way predicted torque armature"  # of the look-ahead: turn [rad], velocity v*, torque, h κ
+        "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
+        # of the one pump, the same at all joints: pressure of its line [Pa], φ of `pump`, time of the demand [s]
+        "line share demand"
     )
 )
 """what a joint carries from step to step"""
@@ -64,10 +67,20 @@ SCRATCH = np.dtype(
         # torque per pressure, pressure per volume, weight of the new state, pressure rise per flow
         "lever_a lever_b rate_a rate_b weight_a weight_b rise_a rise_b "
         # of a sub-step, the joint: damping, oil stiffness times step, weight of the new state, torque at rest
-        "drag stiffness weight push"
+        "drag stiffness weight push "
+        # of a sub-step, the pump: flows into A and B from it, their rise with its pressure, f of `pump`
+        "pumped_a pumped_b give_a give_b thrust"
     )
 )
 """a joint's scratch space during a look-ahead"""
+
+LINE = np.dtype(
+    _fields(
+        "pressure share demand demanded decay "  # of the step: state, whether there is a command, decay of φ
+        "drawn softness swept change"  # of a sub-step: as `pump` sums them; change of pressure
+    )
+)
+"""scratch space of the pump's line during a look-ahead"""
 
 
 def nominal_parameters(
@@ -83,8 +96,7 @@ def nominal_parameters(
 
 def _nominal(joint: Joint, settings: HydraulicSettings) -> tuple[float, ...]:
     actuator = joint.actuator
-    values = settings.model_dump()
-    values["flow_limit"] = settings.flow_limit or math.inf
+    values = {name: math.inf if value is None else value for name, value in settings.model_dump().items()}
     values["opening_a"] = values["opening_b"] = actuator.max_opening
     if isinstance(actuator, LinearActuator):
         values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
@@ -149,4 +161,7 @@ def coefficients(parameters: Records, linkages: Records) -> NDArray[np.void]:
     p = parameters
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient, p.density)
+    table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
+    driven = linkages.kind != NONE
+    table["relief"] = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)[:, None]
     return table

@@ -8,7 +8,7 @@ to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp
 
 The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own A_max,
 overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
-to this actuator.
+to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
 """
 
 from typing import Any
@@ -50,17 +50,18 @@ def root(drop: Any, transition: Any) -> Any:
 
 
 @compilable
-def port_flow(pressure: Any, pump_area: Any, tank_area: Any, c: Any) -> Any:
+def port_flow(pressure: Any, supply: Any, pump_area: Any, tank_area: Any, c: Any) -> Any:
     """Flow Q [m³/s] into a chamber at a pressure [Pa] through its two edges, openings [m²], (7) and (8).
 
-    Also returns -dQ/dp [m³/(s Pa)], which is never negative.
+    Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes from the pump, at
+    `supply` pressure [Pa], and its rise with that pressure.
     """
-    into, into_slope = root(c.supply_pressure - pressure, c.transition_pressure)
+    into, into_slope = root(supply - pressure, c.transition_pressure)
     out, out_slope = root(pressure - c.tank_pressure, c.transition_pressure)
     pumped = c.conductance * pump_area * into
     pumped_slope = c.conductance * pump_area * into_slope
-    limited = pumped >= c.flow_limit
-    pumped = select(limited, c.flow_limit, pumped)
+    limited = (pumped >= c.flow_limit) | (pumped < c.backflow)
+    pumped = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow)
     pumped_slope = select(limited, 0.0, pumped_slope)
     drained = c.conductance * tank_area
-    return pumped - drained * out, pumped_slope + drained * out_slope
+    return pumped - drained * out, pumped_slope + drained * out_slope, pumped, pumped_slope

@@ -191,7 +191,7 @@ def _spool_range(p: Any) -> Array:
 
 def _pump_flow(p: Any, drop: Array | float, area: Array | float) -> Array:
     """Flow [L/min] from the pump over a pressure drop [Pa] through an edge of area [m²] and its leakage."""
-    flow, _ = port_flow(p.supply_pressure - drop, area + p.leakage, 0.0, p)
+    flow = port_flow(p.supply_pressure - drop, p.supply_pressure, area + p.leakage, 0.0, p)[0]
     return _LITRES * flow
 
 

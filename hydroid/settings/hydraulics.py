@@ -94,6 +94,20 @@ class HydraulicSettings(Settings):
     flow_limit: Positive | None = _quantity(
         None, "L/min", "largest flow that the pump gives to one actuator; null: no limit"
     )
+    pump_flow: Positive | None = _quantity(
+        None, "L/min", "largest flow that the pump gives to all actuators together; null: no limit"
+    )
+    pump_droop: NotNegative = _quantity(
+        0.0, "bar", "fall of the supply pressure from no flow to the pump's full flow"
+    )
+    pump_idle: Annotated[float, Field(ge=0, le=1)] = _quantity(
+        1.0, "", "part of its flow that the pump gives before it comes up"
+    )
+    pump_delay: NotNegative = _quantity(0.0, "s", "time from the first command until the pump comes up")
+    pump_rise: NotNegative = _quantity(
+        0.0, "s", "time constant with which the pump comes up, and goes down after the last command"
+    )
+    line_volume: Positive = _quantity(100.0, "cm³", "oil between pump and valves; it acts with a pump_flow")
     supply_pressure: Positive = _quantity(150.0, "bar", "p_S: pressure of the pump")
     tank_pressure: NotNegative = _quantity(5.0, "bar", "p_T: pressure of the return line")
     vapour_pressure: NotNegative = _quantity(0.0, "bar", "lowest pressure in a chamber")
@@ -153,6 +167,9 @@ def _quantities() -> dict[str, Quantity]:
 
 QUANTITIES = _quantities()
 """the quantities by name; the kernel's arrays use these names"""
+
+OF_THE_PUMP = tuple(name for name in QUANTITIES if name.startswith("pump_") or name == "line_volume")
+"""quantities that all actuators share, since they have one pump"""
 
 TARGETS = {name: (name,) for name in QUANTITIES} | {
     name[:-2]: (name, f"{name[:-2]}_b") for name in QUANTITIES if name.endswith("_a")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from hydroid.settings.hydraulics import QUANTITIES, TARGETS
+from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, TARGETS
 from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
 
 MECHANICAL_UNITS = {
@@ -46,6 +46,8 @@ class ParameterSettings(Settings):
             raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
         if (self.quantity == "mass") != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
+        if self.quantity in OF_THE_PUMP and self.joints is not None:
+            raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
         if self.link is not None and self.joints is not None:
             raise ValueError("a mass belongs to a link, not to joints")
         if self.bounds is None and self.fixed is None:

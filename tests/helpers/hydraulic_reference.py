@@ -31,7 +31,7 @@ TEN = {
 
 def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
     """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
-    base = settings.model_dump() | {"flow_limit": settings.flow_limit or inf} | TRUTH
+    base = {k: inf if v is None else v for k, v in settings.model_dump().items()} | TRUTH
     one = np.zeros((1, 1), PARAMETERS).view(np.recarray)
     return with_values(
         one,
@@ -115,7 +115,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
     gap = (v["stroke_2"] - ratio * v["stroke_1"]) / (ratio - 1)
     coil = v["force_1"] * (v["stroke_1"] + gap) ** 2 / v["rated_current"] ** 2
     beta, gain = v["bulk_modulus"], v["flow_coefficient"] * sqrt(2 / v["density"])
-    shortest = SHORTEST
+    shortest, pump = SHORTEST, v["pump_flow"]
+    backflow = -inf if pump == inf else 0.0
 
     def geometry(q: float) -> tuple[float, float]:
         length = sqrt(A * A + B * B - 2 * A * B * cos(q + THETA0))
@@ -138,10 +139,11 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
         )
 
     def slope(drive_a: float, drive_b: float):
-        ps, pt, m = v["supply_pressure"], v["tank_pressure"], v["plunger_mass"]
+        pt, m = v["tank_pressure"], v["plunger_mass"]
 
         def f(_: float, z: np.ndarray) -> list[float]:
-            xa, ua, xb, ub, _, _, q, w = z
+            xa, ua, xb, ub, _, _, q, w, line = z
+            ps = beta * line if pump < inf else v["supply_pressure"]
             x, r = geometry(q)
             va, vb = volumes(x)
             pa, pb = pressures(z, x)
@@ -159,8 +161,15 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
                 v["leakage"] + (area if spool > 0 else 0),
                 v["leakage"] + (area if spool <= 0 else 0),
             )
-            qa = flow(ahead, ps - pa) - flow(back, pa - pt)
-            qb = flow(back, ps - pb) - flow(ahead, pb - pt)
+            in_a, in_b = (max(flow(a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
+            qa = in_a - flow(back, pa - pt)
+            qb = in_b - flow(ahead, pb - pt)
+            rise = 0.0
+            if pump < inf:
+                left = v["supply_pressure"] - ps
+                given = pump * min(1.0, max(left, 0.0) / v["pump_droop"]) if v["pump_droop"] > 0 else pump
+                relieved = pump * max(-left, 0.0) / 1e3  # all of it at 0.01 bar above
+                rise = (given - relieved - in_a - in_b) / v["line_volume"]
             speed = r * w
             force = v["area_a"] * pa - v["area_b"] * pb
             if x > STROKE and speed > 0:
@@ -172,7 +181,7 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
             turn = (r * force - weight - DAMPING * w - STIFFNESS * (q - START)) / INERTIA
             push_a = drive_a / (xa + gap) ** 2 - v["plunger_damping_a"] * ua - v["plunger_stiffness"] * xa
             push_b = drive_b / (xb + gap) ** 2 - v["plunger_damping_b"] * ub - v["plunger_stiffness"] * xb
-            return [ua, push_a / m, ub, push_b / m, qa / va, qb / vb, w, turn]
+            return [ua, push_a / m, ub, push_b / m, qa / va, qb / vb, w, turn, rise]
 
         return f
 
@@ -185,9 +194,11 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
     at_rest = np.roots([1, 2 * gap, gap**2, -coil * v["current_min"] ** 2 / v["plunger_stiffness"]])
     rest = float(max(at_rest[abs(at_rest.imag) < 1e-9].real))
     va, vb = volumes(x0)
-    z = np.array([rest, 0, rest, 0, pa / beta + log(va), pb / beta + log(vb), START, 0.0])
-    atol = np.array([1e-11, 1e-9, 1e-11, 1e-9, 1e-11, 1e-11, 1e-10, 1e-9])
-    states = np.empty((len(command) + 1, 8))
+    z = np.array(
+        [rest, 0, rest, 0, pa / beta + log(va), pb / beta + log(vb), START, 0.0, v["supply_pressure"] / beta]
+    )
+    atol = np.array([1e-11, 1e-9, 1e-11, 1e-9, 1e-11, 1e-11, 1e-10, 1e-9, 1e-11])
+    states = np.empty((len(command) + 1, 9))
     states[0] = z
     edges = [0, *(np.flatnonzero(np.diff(command)) + 1), len(command)]
     for first, last in pairwise(edges):

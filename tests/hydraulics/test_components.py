@@ -138,14 +138,19 @@ def test_port_flow_against_equation_7_and_its_limit():
         conductance=conductance(0.7, 860.0),
         transition_pressure=0.2e5,
         flow_limit=np.inf,
+        backflow=-np.inf,
     )
-    flow, slope = port_flow(50e5, 0.4e-6, 0.0, c)
+    flow, slope, pumped, _ = port_flow(50e5, 150e5, 0.4e-6, 0.0, c)
+    assert pumped == flow
     assert flow == pytest.approx(0.7 * 0.4e-6 * np.sqrt(2 * 100e5 / 860), rel=1e-5)
     assert slope > 0
     c.flow_limit = 1e-5
-    limited, slope = port_flow(50e5, 0.4e-6, 0.0, c)
+    limited, slope, *_ = port_flow(50e5, 150e5, 0.4e-6, 0.0, c)
     assert limited == 1e-5
     assert slope == 0.0
+    assert port_flow(60e5, 50e5, 0.4e-6, 0.0, c)[0] < 0
+    c.backflow = 0.0  # with a check valve
+    assert port_flow(60e5, 50e5, 0.4e-6, 0.0, c) == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_triangle_is_a_derivative_chain():

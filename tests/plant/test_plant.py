@@ -60,6 +60,7 @@ def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray
         ("mech", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 3}),
         ("hyd", {"hydraulics.delay": 0.033}),
         ("hyd", {"simulation.other_joints": "passive", "simulation.steps_per_sample": 2}),
+        ("hyd", {"hydraulics.pump_flow": 2.0, "hydraulics.pump_idle": 0.5, "hydraulics.pump_rise": 0.2}),
     ],
 )
 def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints):

@@ -1,0 +1,103 @@
+"""One pump for all actuators: the pressure of the line between pump and valves.
+
+Without a `pump_flow` every valve has supply pressure at its port, whatever flows. With one, the line has a pressure P
+of its own. Its oil is compressible, as in the chambers:
+
+    Ṗ = β/V_line (Q_P(P) − Σ Q_i),   P ≤ supply pressure, where the relief valve opens,
+
+with Q_i the flow that actuator i takes from it. So P falls until the flows, opening times root of what the load leaves of
+P, add up to what the pump gives, and no equation has to be solved for it. The pump gives
+
+    Q_P = φ Q_max min(1, (p_S − P)/droop),
+
+and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it rises to 1
+with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never runs back to the pump.
+A joint whose own supply pressure is lower than the line's has a reducing valve.
+
+A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
+P changes by
+
+    δ = (R − Σ f_i v̄_i) / D,   D = V_line/(β h) − dQ_P/dP + Σ k (1 − k r) > 0,
+
+v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's rise of pressure per flow. It
+pushes joint i with the torque f_i δ. To the symmetric system of the velocities that adds the matrix f fᵀ h / D, which is
+positive: the sub-step stays as stable as it is without a pump. Where P would pass the relief pressure, δ is what is missing
+to it.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from hydroid.hydraulics.elementwise import compilable
+
+
+@compilable
+def delivery(pressure: float, share: float, relief: float, c: Any) -> Any:
+    """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is φ."""
+    full = share * c.pump_flow
+    left = relief - pressure
+    if left < c.pump_droop:
+        return full * max(left, 0.0) / c.pump_droop, full / c.pump_droop
+    return full, 0.0
+
+
+@compilable
+def come_up(line: Any, c: Any, step: float) -> float:
+    """Advance φ and the time of the demand by a sub-step [s]; the mean of φ."""
+    before, target = line.share, c.pump_idle
+    if line.demanded > 0.0:
+        line.demand += step
+        late = (line.demand - c.pump_delay) / step  # part of this sub-step
+        target += (1.0 - c.pump_idle) * min(max(late, 0.0), 1.0)
+    else:
+        line.demand = 0.0
+    line.share = target + (before - target) * line.decay
+    return 0.5 * (before + line.share)
+
+
+@compilable
+def begin_line(line: Any, c: Any, z: Any, demanded: bool, step: float) -> None:
+    """The line at the start of a step, from the state of a joint; `demanded`: whether a command is not 0."""
+    line.pressure, line.share, line.demand = z.line, z.share, z.demand
+    line.demanded = 1.0 if demanded else 0.0
+    line.decay = np.exp(-step / c.pump_rise) if c.pump_rise > 0.0 else 0.0
+
+
+@compilable
+def draw(line: Any, c: Any, w: Any) -> None:
+    """Add what one actuator takes from the line in a sub-step, and how that answers to pressure and speed."""
+    if line.pressure > c.supply_pressure:
+        w.give_a, w.give_b = 0.0, 0.0
+    back_a, back_b = w.filled_a * w.give_a * w.rise_a, w.filled_b * w.give_b * w.rise_b
+    line.drawn += w.pumped_a - back_a * w.inflow_a + w.pumped_b - back_b * w.inflow_b
+    line.softness += w.give_a * (1.0 - back_a) + w.give_b * (1.0 - back_b)
+    w.thrust = back_a * w.lever_a - back_b * w.lever_b
+    line.swept += w.thrust * w.speed
+
+
+@compilable
+def open_line(line: Any, c: Any, step: float) -> None:
+    """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and 1/D."""
+    flow, fall = delivery(line.pressure, come_up(line, c, step), c.relief, c)
+    line.softness = 1.0 / (c.line_volume / (c.bulk_modulus * step) + fall + line.softness)
+    line.change = line.softness * (flow - line.drawn - line.swept)
+    missing = c.relief - line.pressure
+    if line.change >= missing:
+        line.change, line.softness = missing, 0.0
+
+
+@compilable
+def fill(line: Any, w: Any, step: float) -> None:
+    """Give one actuator the flow and the torque of the line's change."""
+    w.inflow_a += w.give_a * line.change
+    w.inflow_b += w.give_b * line.change
+    w.push += w.weight * w.thrust * line.change
+    w.oil_stiffness += line.softness * w.thrust * w.thrust / step
+
+
+@compilable
+def close_line(line: Any, c: Any) -> None:
+    """Take over the line's change, and be ready for the next sub-step."""
+    line.pressure = min(max(line.pressure + line.change, 0.0), c.relief)
+    line.drawn, line.softness, line.swept = 0.0, 0.0, 0.0

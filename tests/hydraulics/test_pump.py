@@ -1,0 +1,164 @@
+"""One pump for all actuators: its limits, the power it gives, how it comes up, a stiff reference, recovery."""
+
+import numpy as np
+import pytest
+from hydraulic_arm import DrivenArm
+from hydraulic_reference import parameters, pulses, reference, simulate
+from recovery import assert_recovered, duties, recover, settings_of
+
+from hydroid.hydraulics.records import nominal_parameters, with_values
+from hydroid.settings.arm import Arm
+from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.problem import ParameterSettings
+
+SETTINGS = HydraulicSettings(substeps=10)
+LITRES = 6e4
+JOINTS = list(range(7))
+
+
+def observe(arm: Arm, command: list[float], samples: int, **pump: float) -> tuple[np.ndarray, ...]:
+    """The whole arm under constant commands: line [bar], (T,), flow from the pump [L/min], (T, J), pressures."""
+    driven = [j for j in JOINTS if command[j]]
+    nominal = nominal_parameters(arm, SETTINGS, JOINTS)
+    one = DrivenArm(arm, with_values(nominal, {"leakage": 0.0, **pump}), driven, SETTINGS)
+    line, flow, pressure = [], [], []
+    one.run(np.zeros((1, 7)))
+    state = one.state
+    for _ in range(samples):
+        one.applied[:], one.armature[:] = one.actuator.advance(
+            state, command, one.angle, one.velocity, one.mass
+        )
+        one.batch.step()
+        one.angle[:] = one.actuator.close(state, one.velocity, one.mass)
+        seen = one.actuator.observe(state, one.angle)
+        line.append(1e-5 * seen.line[0, driven[0]])
+        into = np.where(np.array(command) > 0, seen.flow[0, :, 0], -seen.flow[0, :, 1])
+        flow.append(LITRES * into)
+        pressure.append(1e-5 * seen.pressure[0])
+    return np.array(line), np.array(flow), np.array(pressure)
+
+
+def test_a_pump_that_suffices_changes_nothing():
+    command = 0.4 * pulses(np.random.default_rng(3), 300)
+    both, seen = parameters(SETTINGS, pump_flow=np.array([np.inf, 500.0])), []
+    angle = simulate(both, command, SETTINGS, observe=seen)
+    assert np.ptp(angle[0]) > 0.1
+    assert max(o.pressure.max() for o, _ in seen) < 150e5  # above it, the check valve changes something
+    np.testing.assert_allclose(angle[1], angle[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("droop", [0.0, 60.0])
+def test_joints_that_move_together_share_the_flow(arm: Arm, droop: float):
+    command = [0.0, 70.0, 0.0, -90.0, 0.0, 60.0, 0.0]
+    alone = [observe(arm, [u if j == k else 0.0 for k, u in enumerate(command)], 60)[1] for j in (1, 3, 5)]
+    wanted = sum(flow[-1].sum() for flow in alone)
+    most = 0.6 * wanted
+    line, flow, pressure = observe(arm, command, 60, pump_flow=most, pump_droop=droop, line_volume=5.0)
+    given = most * min(1.0, (150.0 - line[-1]) / droop) if droop else most
+    assert flow[-5:].sum(axis=1).mean() == pytest.approx(given, rel=0.02)
+    stored = 5e-3 * (150.0 - line[-1]) / 8000.0  # oil that the line gave [L]
+    assert flow.sum(axis=1).mean() * 0.01 <= most / 60 * 0.6 + stored
+    assert (flow[-1, [1, 3, 5]] > 0).all()
+    assert line[-1] < 140
+    # no oil runs back: each feeding chamber is below the line where oil flows
+    feeding = np.array([pressure[-1, 1, 0], pressure[-1, 3, 1], pressure[-1, 5, 0]])
+    assert (feeding < line[-1]).all()
+
+
+def test_the_valves_lose_power_and_never_make_any(arm: Arm):
+    """Pump and tank give at least what the chambers get, at every step once the start has passed."""
+    command = [0.0, 70.0, 50.0, -90.0, 0.0, 60.0, 0.0]
+    line, flow, pressure = observe(arm, command, 100, pump_flow=4.0)
+    driven = [1, 2, 3, 5]
+    feeding = np.where(np.array(command) > 0, pressure[:, :, 0], pressure[:, :, 1])[:, driven]
+    lost = flow[:, driven] * (line[:, None] - feeding)
+    assert lost.sum(axis=1)[5:].min() >= 0
+    assert lost.min() > -1.0  # L/min bar: 1.7 mW
+    assert line.max() <= 150.0
+
+
+def test_no_load_sinks_while_another_joint_takes_the_pressure(arm: Arm):
+    """Load check valves: an open valve below its load's pressure passes nothing."""
+    heavy, light = [0.0, 15.0, 0, 0, 0, 0, 0], [0.0, 15.0, 0, 0, 0, 0, -100.0]
+    line, flow, pressure = observe(arm, light, 40, pump_flow=0.05, line_volume=5.0)
+    assert (line[20:] < pressure[20:, 1, 0]).all()
+    assert flow[:, 1].min() >= -1e-6
+    assert observe(arm, heavy, 40, pump_flow=0.05, line_volume=5.0)[1][-1, 1] > 0
+
+
+@pytest.mark.parametrize(("delay", "rise"), [(0.5, 0.0), (0.0, 0.3), (0.4, 0.2)])
+def test_a_pump_comes_up_after_the_demand(arm: Arm, delay: float, rise: float):
+    command = [0.0, -60.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    pump = {"pump_flow": 0.5, "pump_idle": 0.4, "pump_delay": delay, "pump_rise": rise, "line_volume": 5.0}
+    flow = observe(arm, command, 150, **pump)[1][:, 1]
+    time = 0.01 * np.arange(150) + 0.005
+    since = np.maximum(time - delay, 0.0)
+    share = 0.4 + 0.6 * ((since > 0) if rise == 0 else 1 - np.exp(-since / rise))
+    later = (time > 0.15) & (abs(time - delay) > 0.1)
+    np.testing.assert_allclose(flow[later], 0.5 * share[later], rtol=0.03)
+
+
+def test_at_rest_the_pump_stands_by_again():
+    """After the last command φ falls with the same time constant, and the delay counts from the next one."""
+    command = np.repeat([100.0, 0.0, 100.0], 100)
+    values = {"pump_flow": 0.5, "pump_idle": 0.3, "pump_delay": 0.5, "pump_rise": 0.01, "line_volume": 5.0}
+    angle = simulate(parameters(SETTINGS, **values), command, SETTINGS)[0]
+    speed = np.diff(angle) / 0.01
+    slow, fast, again = speed[20:45].mean(), speed[70:95].mean(), speed[225:245].mean()
+    assert fast / slow == pytest.approx(1 / 0.3, rel=0.15)
+    assert again / slow == pytest.approx(1.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "pump",
+    [{"pump_flow": 1.0}, {"pump_flow": 1.0, "line_volume": 50.0}, {"pump_flow": 2.0, "pump_droop": 60.0}],
+)
+def test_the_line_follows_a_stiff_reference(pump: dict[str, float]):
+    command, p = pulses(np.random.default_rng(24), 200), parameters(SETTINGS, **pump)
+    exact, _ = reference(p, command)
+    sizes = []
+    for substeps in (3, 12):
+        error = np.degrees(simulate(p, command, HydraulicSettings(substeps=substeps))[0] - exact)
+        sizes.append(np.sqrt((error**2).mean()))
+    assert np.ptp(exact) > np.radians(3)
+    assert sizes[0] < 0.02
+    assert sizes[1] < 0.5 * sizes[0]
+
+
+def test_random_pumps_and_valves_stay_stable(arm: Arm):
+    rng = np.random.default_rng(5)
+    n, command = 20, np.stack([pulses(rng, 300) for _ in JOINTS], axis=1)
+    pump = {
+        "pump_flow": 10 ** rng.uniform(-1, 1.3, (n, 1)), "pump_droop": rng.choice([0, 20, 100], (n, 1)),
+        "pump_idle": rng.uniform(0, 1, (n, 1)), "pump_rise": rng.choice([0, 0.3], (n, 1)),
+        "line_volume": 10 ** rng.uniform(0.7, 3.3, (n, 1)),
+    }  # fmt: skip
+    p = with_values(nominal_parameters(arm, SETTINGS, JOINTS), pump)
+    coarse, fine = HydraulicSettings(substeps=3), HydraulicSettings(substeps=20)
+    runs = []
+    for settings in (coarse, fine):
+        one = DrivenArm(arm, p, JOINTS, settings, threads=1)
+        runs.append(one.run(command))
+        assert not one.failed.any()
+    assert np.median(np.degrees(abs(runs[0] - runs[1])).max(axis=(1, 2))) < 0.5
+
+
+def test_a_pump_belongs_to_all_joints():
+    with pytest.raises(ValueError, match="all joints share the pump"):
+        ParameterSettings(quantity="pump_flow", joints=(2,), bounds=(1.0, 2.0))
+
+
+def test_a_shared_pump_that_comes_up_is_recovered():
+    """Two joints and one log of duties: flow, standby part, delay and rise of the pump."""
+    truth = {"flow": 1.6, "idle": 0.5, "after": 0.4, "rise": 0.2}
+    rows = {
+        "flow": ("pump_flow", 0.2, 10.0), "idle": ("pump_idle", 0.05, 1.0),
+        "after": ("pump_delay", 0.0, 2.0), "rise": ("pump_rise", 0.01, 2.0),
+    }  # fmt: skip
+    settings = settings_of({name: {"quantity": q, "bounds": [a, b]} for name, (q, a, b) in rows.items()})
+    settings = settings.model_copy(update={"outputs": (2, 3)})
+    log = duties(
+        settings.arm.pose("study"), {2: [80, -60, 0, 50, -90, 0, 70], 3: [-70, 90, 0, 0, -80, 0, 60]}
+    )
+    start = {"flow": 2.5, "idle": 0.8, "after": 0.3, "rise": 0.1}
+    assert_recovered(recover(settings, [log], truth, start), settings, truth)

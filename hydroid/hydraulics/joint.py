@@ -81,7 +81,7 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
 
 @compilable
 def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
-    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' pressures."""
+    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own."""
     area = opening(displacement, c)
     ahead, back = c.leakage, c.leakage  # pump to A and B to tank, pump to B and A to tank
     if displacement > 0.0:

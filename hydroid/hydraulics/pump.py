@@ -1,18 +1,18 @@
 """One pump for all actuators: the pressure of the line between pump and valves.
 
-Without a `pump_flow` every valve has supply pressure at its port, whatever flows. With one, the line has a pressure P
-of its own. Its oil is compressible, as in the chambers:
+Without a `pump_flow` every valve has supply pressure at its port, whatever flows. With one, the line has a
+pressure P of its own. Its oil is compressible, as in the chambers:
 
     Ṗ = β/V_line (Q_P(P) − Σ Q_i),   P ≤ supply pressure, where the relief valve opens,
 
-with Q_i the flow that actuator i takes from it. So P falls until the flows, opening times root of what the load leaves of
-P, add up to what the pump gives, and no equation has to be solved for it. The pump gives
+with Q_i the flow that actuator i takes from it. So P falls until the flows, opening times root of what the
+load leaves of P, add up to what the pump gives, and no equation has to be solved for it. The pump gives
 
     Q_P = φ Q_max min(1, (p_S − P)/droop),
 
-and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it rises to 1
-with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never runs back to the pump.
-A joint whose own supply pressure is lower than the line's has a reducing valve.
+and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
+rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
+runs back to the pump. A joint whose own supply pressure is lower than the line's has a reducing valve.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
 P changes by
@@ -20,9 +20,9 @@ P changes by
     δ = (R − Σ f_i v̄_i) / D,   D = V_line/(β h) − dQ_P/dP + Σ k (1 − k r) > 0,
 
 v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's rise of pressure per flow. It
-pushes joint i with the torque f_i δ. To the symmetric system of the velocities that adds the matrix f fᵀ h / D, which is
-positive: the sub-step stays as stable as it is without a pump. Where P would pass the relief pressure, δ is what is missing
-to it.
+pushes joint i with the torque f_i δ. To the symmetric system of the velocities that adds the matrix
+f fᵀ h / D, which is positive: the sub-step stays as stable as it is without a pump. Where P would pass the
+relief pressure, δ is what is missing to it.
 """
 
 from typing import Any

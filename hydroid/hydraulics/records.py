@@ -48,7 +48,7 @@ JOINT_STATE = np.dtype(
         "external hold "  # torque e that is neither oil nor damping; torque that held the start pose [N·m]
         "angle velocity "  # at the start of the step [rad, rad/s]
         "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
-        # of the one pump, the same at all joints: pressure of its line [Pa], φ of `pump`, time of the demand [s]
+        # of the pump, the same at all joints: pressure of its line [Pa], its φ, time of the demand [s]
         "line share demand"
     )
 )

@@ -1,4 +1,4 @@
-"""One pump for all actuators: its limits, the power it gives, how it comes up, a stiff reference, recovery."""
+"""One pump for all actuators: limits, power, how it comes up, a stiff reference, recovery."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ JOINTS = list(range(7))
 
 
 def observe(arm: Arm, command: list[float], samples: int, **pump: float) -> tuple[np.ndarray, ...]:
-    """The whole arm under constant commands: line [bar], (T,), flow from the pump [L/min], (T, J), pressures."""
+    """The arm, commands constant: line [bar], (T,), inflow [L/min], (T, J), chambers [bar], (T, J, 2)."""
     driven = [j for j in JOINTS if command[j]]
     nominal = nominal_parameters(arm, SETTINGS, JOINTS)
     one = DrivenArm(arm, with_values(nominal, {"leakage": 0.0, **pump}), driven, SETTINGS)

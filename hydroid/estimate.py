@@ -43,6 +43,48 @@ class NamedEstimate(Settings):
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
 
 
+class Covariance(Settings):
+    """What is known of the free parameters together: C^-1 = G' G per relative change (`Uncertainty.root`)."""
+
+    parameters: tuple[str, ...]
+    """the p free ones"""
+    scale: tuple[float, ...]
+    """what a relative change of 1 is, in the parameter's unit"""
+    root: tuple[tuple[float, ...], ...]
+    """G, (p, p): a relative change v is |G v| standard deviations long"""
+    quantile: float
+    """half a 95 % interval, in standard deviations"""
+
+
+class QuantityEstimate(Settings):
+    """One quantity that follows from the parameters, with what the fit knows of it."""
+
+    label: str
+    """in plain words"""
+    joint: int | None = None
+    """numbered from 1"""
+    value: float
+    unit: str
+    sd: float | None = None
+    """standard deviation, in the unit of the value; null: not determined"""
+    interval: tuple[float | None, float | None] = (None, None)
+    """95 % interval"""
+
+
+class CurveEstimate(Settings):
+    """A quantity against a command or an angle; `value` and `interval` are at the points of `at`."""
+
+    label: str
+    joint: int
+    unit: str
+    along: str
+    """what `at` is, with its unit"""
+    at: tuple[float, ...]
+    value: tuple[float, ...]
+    interval: tuple[tuple[float | None, float | None], ...]
+    """95 % interval at each point by itself"""
+
+
 class FitSummary(Settings):
     """The final estimate of a fit, and the estimates that it was chosen from."""
 
@@ -68,6 +110,12 @@ class FitSummary(Settings):
     """simulations of the search that diverged"""
     estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
     """by name; the first is the search's own"""
+    quantities: dict[str, QuantityEstimate] = Field(default_factory=dict[str, QuantityEstimate])
+    """what follows from the final estimate, by name"""
+    curves: dict[str, CurveEstimate] = Field(default_factory=dict[str, CurveEstimate])
+    """the same against a command or an angle"""
+    covariance: Covariance | None = None
+    """of the final estimate"""
 
     @property
     def values(self) -> dict[str, float]:
@@ -85,7 +133,12 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
     Raises:
         RunError: the folder cannot be written.
     """
-    write_atomic(folder / NAME, yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True))
+    write_atomic(folder / NAME, _yaml(summary.plain()))
+
+
+def _yaml(content: dict[str, Any]) -> str:
+    # lists of numbers on one line each
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
 
 
 def read_estimate(file: Path) -> FitSummary:

@@ -18,6 +18,7 @@ LAYERS = [
     {"problem"},
     {"plant", "prediction"},
     {"uncertainty"},
+    {"quantities"},
     {"fitting", "experiment"},
     {"run"},
     {"report"},

@@ -72,7 +72,8 @@ class SingleArm:
         Call it within `quiet_mujoco`.
 
         Returns:
-            What holds it there, tau0 = g(q0) of equation (1) [N·m], shape (V,).
+            What holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m],
+            shape (V,).
         """
         model, data = self.model, self.data
         for name, value in values.items():
@@ -84,7 +85,7 @@ class SingleArm:
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         data.warning.number[:] = 0
-        return data.qfrc_bias.copy()
+        return data.qfrc_bias - data.qfrc_passive
 
     @property
     def healthy(self) -> bool:

@@ -1,7 +1,8 @@
 """What is simulated: one log's joints, start and commands, for a population of candidates."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from copy import copy
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import mujoco
@@ -85,6 +86,17 @@ class Scenario:
             follows = np.flatnonzero(~self.active)
             columns = np.searchsorted(self.arm.columns, follows)
             self.prescribed = Prescribed(self.arm.model, log, follows, columns, settings)
+
+    def restarted(self, start: Array, command: Array) -> "Scenario":
+        """Return the same moving joints from another pose [rad], shape (V,), under other commands.
+
+        `command` is held during each step [%], shape (steps, V). No joint may follow the log. Springs are
+        slack where they were.
+        """
+        assert self.prescribed is None
+        other = copy(self)
+        other.arm, other.command = replace(self.arm, pose=start), command
+        return other
 
     def values(self, candidates: Candidates) -> dict[str, Array]:
         """Return what candidates change in the model, the prescribed joints' servo included."""

@@ -1,0 +1,87 @@
+"""One joint on the test bench: weighed and driven by itself, all other joints locked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hydroid.arm.model import load_model, quiet_mujoco
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.settings.fit import FitSettings
+from hydroid.simulation import Candidates, HydraulicSimulation
+from hydroid.simulation.rollout import SingleArm
+from hydroid.simulation.scenario import Scenario
+
+MARGIN = float(np.radians(1.0))
+"""distance that test movements keep from the joint's stops [rad]"""
+LEAST_TRAVEL = float(np.radians(5.0))
+"""of a joint that its logs hardly move [rad]"""
+
+
+@dataclass(frozen=True, eq=False)
+class TestedJoint:
+    """A joint whose quantities are wanted.
+
+    Attributes:
+        settings: of the fit.
+        joint: its number, from 1.
+        angle: at which it is tested [rad].
+        travel: smallest and largest angle of interest [rad].
+        period: between samples [s].
+        scenario: the joint alone.
+    """
+
+    settings: FitSettings
+    joint: int
+    angle: float
+    travel: tuple[float, float]
+    period: float
+    scenario: Scenario
+
+    @property
+    def name(self) -> str:
+        """Begins the names of its quantities."""
+        return f"joint{self.joint}"
+
+    def at(self, angle: float) -> "TestedJoint":
+        """Return the joint tested at another angle [rad]."""
+        return replace(self, angle=angle)
+
+    def weigh(self, candidates: Candidates, angles: Array) -> tuple[Array, Array]:
+        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at angles, shape (n, A) each."""
+        torque, inertia = np.empty((2, len(candidates), len(angles)))
+        arm, values = SingleArm(self.scenario.arm.model), self.scenario.values(candidates)
+        with quiet_mujoco():
+            for row, column in np.ndindex(torque.shape):
+                arm.start(values, row, angles[[column]])
+                torque[row, column] = arm.data.qfrc_bias[0]
+                inertia[row, column] = arm.data.M[0]
+        return torque, inertia
+
+    def drive(self, candidates: Candidates, command: float, start: float, samples: int) -> Array:
+        """Return the angles of n candidates from rest under a constant command [%], (n, samples + 1) [rad]."""
+        steps = samples * self.settings.simulation.steps_per_sample
+        scenario = self.scenario.restarted(np.array([start]), np.full((steps, 1), command))
+        simulation = HydraulicSimulation(scenario, self.settings.arm, self.settings.hydraulics)
+        return simulation.simulate(candidates).angle[:, :, 0]
+
+    def room(self, towards: float) -> float:
+        """Return how far the joint can turn from its angle before the stop on that side [rad]."""
+        arm, i = self.settings.arm, self.joint - 1
+        limit = arm.upper[i] if towards > 0 else arm.lower[i]
+        return max(abs(float(limit) - self.angle) - MARGIN, 0.0)
+
+
+def tested_joint(settings: FitSettings, logs: Sequence[Log], joint: int) -> TestedJoint:
+    """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
+    arm, pose, period = settings.arm, logs[0].start, logs[0].period
+    angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
+    middle = float(np.radians(round(np.degrees((angles.min() + angles.max()) / 2))))
+    half = max(float(np.ptp(angles)) / 2, LEAST_TRAVEL)
+    rest = Log(
+        "a test movement", np.arange(2) * period, np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
+    )
+    alone = settings.simulation.model_copy(update={"other_joints": "locked"})
+    scenario = Scenario(load_model(arm.model, arm), arm, rest, [joint - 1], alone)
+    return TestedJoint(settings, joint, middle, (middle - half, middle + half), period, scenario)

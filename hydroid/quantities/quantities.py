@@ -1,0 +1,114 @@
+"""All quantities of a fit: what its logs determine, in the words of an engineer."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
+from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
+from hydroid.quantities.column import SIGNS, Column, Measure, Measured
+from hydroid.quantities.delta import Known, Precision, precision
+from hydroid.quantities.joint import TestedJoint, tested_joint
+from hydroid.quantities.speeds import SpeedTests
+from hydroid.quantities.statics import gain_model, gravity, oil
+from hydroid.simulation import Candidates
+from hydroid.uncertainty.covariance import Uncertainty
+
+LEAST_GRAVITY = 1.0
+"""holding torque below which no direction is called raising [N·m]"""
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """What follows from an estimate: single quantities and curves by name, and what they were computed from.
+
+    Quantities that no free parameter changes are left out: the settings give them, not the logs.
+    """
+
+    scalars: dict[str, QuantityEstimate]
+    curves: dict[str, CurveEstimate]
+    precision: Precision
+
+
+def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
+    """Return the quantities of every joint that a log drives or that is compared, at a fit's estimate."""
+    known = precision(problem.parameters, uncertainty)
+    estimate = problem.stage.candidates(uncertainty.theta[None])
+    scalars: dict[str, QuantityEstimate] = {}
+    curves: dict[str, CurveEstimate] = {}
+    for joint in problem.active_joints:
+        tested = tested_joint(problem.settings, problem.logs, joint)
+        measure = joint_measure(tested, estimate)
+        columns = [column for column, _ in measure(estimate)]
+
+        def values(theta: Array, measure: Measure = measure) -> Array:
+            found = measure(problem.stage.candidates(theta))
+            return np.stack([value for _, value in found], axis=1)
+
+        concerned = np.array(
+            [p.joints is None or joint in p.joints for p in problem.settings.parameters.values()]
+        )
+        names = [c.name for c in columns]
+        positive = np.array([c.positive for c in columns])
+        result = known.propagate(values, positive, concerned)
+        single = [i for i, c in enumerate(columns) if not c.along]
+        scalars |= {names[i]: _scalar(joint, columns[i], result, i) for i in single if _told(result, i)}
+        for name in dict.fromkeys(c.name for c in columns if c.along):
+            points = [i for i, n in enumerate(names) if n == name and np.isfinite(result.value[i])]
+            if any(_told(result, i) for i in points):
+                curves[name] = _curve(joint, columns, result, sorted(points, key=lambda i: columns[i].at))
+    return Quantities(scalars, curves, known)
+
+
+def joint_measure(tested: TestedJoint, estimate: Candidates) -> Measure:
+    """Return what computes the quantities of one joint; test movements are planned at the estimate."""
+    if tested.settings.stage == "mech":
+        return lambda candidates: [*gain_model(tested, candidates), *gravity(tested, candidates)]
+    torque = float(tested.weigh(estimate, np.array([tested.angle]))[0][0, 0])
+    words = ("raising", "lowering") if torque > 0 else ("lowering", "raising")
+    words = words if abs(torque) >= LEAST_GRAVITY else SIGNS
+    tests = [
+        SpeedTests(tested, estimate, sign, named)
+        for sign, named in zip((1.0, -1.0), zip(SIGNS, words, strict=True), strict=True)
+    ]
+
+    def measure(candidates: Candidates) -> Measured:
+        moved = [pair for test in tests for pair in test.measure(candidates)]
+        return [*moved, *oil(tested, candidates), *gravity(tested, candidates)]
+
+    return measure
+
+
+def _told(result: Known, i: int) -> bool:
+    """Whether a quantity exists and depends on a free parameter."""
+    return bool(np.isfinite(result.value[i]) and not result.given[i])
+
+
+def _interval(result: Known, i: int) -> tuple[float | None, float | None]:
+    return finite(result.interval[i, 0]), finite(result.interval[i, 1])
+
+
+def _scalar(joint: int, column: Column, result: Known, i: int) -> QuantityEstimate:
+    return QuantityEstimate(
+        label=column.label,
+        joint=joint,
+        value=float(result.value[i]),
+        unit=column.unit,
+        sd=finite(result.sd[i]),
+        interval=_interval(result, i),
+    )
+
+
+def _curve(joint: int, columns: Sequence[Column], result: Known, points: Sequence[int]) -> CurveEstimate:
+    first = columns[points[0]]
+    return CurveEstimate(
+        label=first.label,
+        joint=joint,
+        unit=first.unit,
+        along=first.along,
+        at=tuple(columns[i].at for i in points),
+        value=tuple(float(result.value[i]) for i in points),
+        interval=tuple(_interval(result, i) for i in points),
+    )

@@ -187,6 +187,7 @@ def collect(
 def _show(runs: "FitRuns", output: Output) -> None:
     from hydroid.report.fit_report import objective_table, parameter_table
     from hydroid.report.phrases import fit_summary, fit_warnings
+    from hydroid.report.quantities_report import best_known
     from hydroid.report.spread import final_spread
 
     first = runs.results[0]
@@ -197,6 +198,6 @@ def _show(runs: "FitRuns", output: Output) -> None:
         return
     problem, fit = first.problem, first.fit
     tables = [objective_table(problem, fit), parameter_table(problem, fit)]
-    words = [fit_summary(fit), *fit_warnings(problem, fit)]
+    words = [fit_summary(fit), *best_known(fit.quantities), *fit_warnings(problem, fit)]
     content = partial(dict[str, Any], first.summary.plain(), out=str(runs.out))
     show(output, content, [*tables, *words, str(runs.out / "report.html")])

@@ -16,6 +16,7 @@ from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
+from hydroid.quantities.quantities import Quantities, quantities
 from hydroid.search import compromise
 from hydroid.search.pareto import non_dominated
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
@@ -51,8 +52,8 @@ class Fit:
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
     objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty,
-    identifiability: what the logs say about the final estimate. seconds: wall-clock time of "search",
-    "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
+    identifiability, quantities: what the logs say about the final estimate. seconds: wall-clock time of
+    "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
     estimates: dict[str, Estimate]
@@ -62,6 +63,7 @@ class Fit:
     refinements: dict[str, Refinement]
     uncertainty: Uncertainty
     identifiability: Identifiability
+    quantities: Quantities
     seconds: Mapping[str, float]
 
     @property
@@ -161,6 +163,7 @@ def fit(
     refined = time.perf_counter()
     told = uncertainty(last, estimates[final].theta)
     directions = identifiability(last, told)
+    determined = quantities(last, told)
     seconds = {
         "search": searched - began,
         "refinement": refined - searched,
@@ -174,6 +177,7 @@ def fit(
         results,
         told,
         directions,
+        determined,
         seconds,
     )
 

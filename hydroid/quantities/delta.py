@@ -113,8 +113,8 @@ class Precision:
     def known(self, value: Array, slopes: Array, positive: NDArray[np.bool_] | bool) -> Known:
         """Return quantities, (m,), with intervals from their derivatives, (p, m).
 
-        The interval of a `positive` quantity, (m,), is multiplicative. As of a parameter, it has no limits where
-        the standard deviation exceeds the value: a linear interval then means nothing.
+        The interval of a `positive` quantity, (m,), is multiplicative. It has no limits where the standard
+        deviation exceeds the value, as that of a parameter: a first-order interval then means nothing.
         """
         sd = self.deviation(slopes)
         half = self.quantile * sd
@@ -127,7 +127,7 @@ class Precision:
         sd[lost] = np.inf
         interval[np.isposinf(sd)] = -np.inf, np.inf
         interval[np.isposinf(sd) & positive] = 0.0, np.inf
-        return Known(value, sd, interval, ~slopes.any(axis=0))
+        return Known(value, sd, interval, np.all(slopes == 0, axis=0))
 
 
 def precision(parameters: ParameterSet, uncertainty: Uncertainty) -> Precision:

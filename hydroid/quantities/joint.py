@@ -60,7 +60,10 @@ class TestedJoint:
         return torque, inertia
 
     def drive(self, candidates: Candidates, command: float, start: float, samples: int) -> Array:
-        """Return the angles of n candidates from rest under a constant command [%], (n, samples + 1) [rad]."""
+        """Return the angles of n candidates from rest under a constant command [%], (n, 1 + samples) [rad].
+
+        Springs are slack where the first log starts.
+        """
         steps = samples * self.settings.simulation.steps_per_sample
         scenario = self.scenario.restarted(np.array([start]), np.full((steps, 1), command))
         simulation = HydraulicSimulation(scenario, self.settings.arm, self.settings.hydraulics)
@@ -80,7 +83,7 @@ def tested_joint(settings: FitSettings, logs: Sequence[Log], joint: int) -> Test
     middle = float(np.radians(round(np.degrees((angles.min() + angles.max()) / 2))))
     half = max(float(np.ptp(angles)) / 2, LEAST_TRAVEL)
     rest = Log(
-        "a test movement", np.arange(2) * period, np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
+        "a test movement", np.array([0.0, period]), np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
     )
     alone = settings.simulation.model_copy(update={"other_joints": "locked"})
     scenario = Scenario(load_model(arm.model, arm), arm, rest, [joint - 1], alone)

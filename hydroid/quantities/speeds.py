@@ -1,6 +1,4 @@
-"""Quantities of stage 2 that test movements in one direction show: speeds, dead band, dead time, time constant."""
-
-from dataclasses import replace
+"""Quantities of stage 2 that test movements in one direction show: speeds, dead band, dead time."""
 
 import numpy as np
 
@@ -54,10 +52,14 @@ class SpeedTests:
         """Return the quantities of n candidates."""
         runs = {u: step.speeds(candidates) for u, step in self._steps.items()}
         speed = {u: self._steps[u].final(run) for u, run in runs.items()}
+        name = self._tested.name
         curve = [
-            (Column(f"{self._tested.name}_speed", "speed", "deg/s", False, "command [%]", self._sign * u), self._sign * v)
-            for u, v in speed.items()
-        ]  # fmt: skip
+            (
+                Column(f"{name}_speed", "speed", "deg/s", False, "command [%]", self._sign * u),
+                self._sign * value,
+            )
+            for u, value in speed.items()
+        ]
         poses = [
             self._named("speed_50_over_poses", "speed at 50 % command", "deg/s", step.speed(candidates),
                         "angle [deg]", float(np.degrees(step.tested.angle)))

@@ -10,7 +10,7 @@ from hydroid.quantities.joint import TestedJoint
 from hydroid.simulation import Candidates
 
 GRAVITY_POINTS = 9
-COMMANDS = (10.0, 25.0, 50.0, 75.0, 100.0)
+COMMANDS = (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0)
 """at which stage 1's speeds are stated [%]"""
 
 
@@ -30,17 +30,20 @@ def gain_model(tested: TestedJoint, candidates: Candidates) -> Measured:
     gain, damping, friction = candidates.gain[:, j], candidates.damping[:, j], candidates.friction[:, j]
     inertia = tested.weigh(candidates, np.array([tested.angle]))[1][:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        speeds = [np.degrees(np.maximum(gain * u - friction, 0.0) / damping) for u in COMMANDS]
+        torques = [np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0) for u in COMMANDS]
         return [
             (
                 Column(f"{name}_gain", "gain between command and speed, K/D", "deg/s per %"),
-                speeds[-1] / 100.0,
+                np.degrees(gain / damping),
             ),
             (Column(f"{name}_time_constant", "time constant, inertia/D", "s"), inertia / damping),
             (Column(f"{name}_dead_band", "dead band, friction/K", "%"), friction / gain),
             *(
-                (Column(f"{name}_speed", "speed", "deg/s", True, "command [%]", u), speed)
-                for u, speed in zip(COMMANDS, speeds, strict=True)
+                (
+                    Column(f"{name}_speed", "speed", "deg/s", False, "command [%]", u),
+                    np.degrees(torque / damping),
+                )
+                for u, torque in zip(COMMANDS, torques, strict=True)
             ),
         ]
 

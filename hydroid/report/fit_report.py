@@ -29,6 +29,7 @@ from hydroid.report.phrases import (
     rank_phrase,
     status_phrase,
 )
+from hydroid.report.quantities_report import curves_csv, quantity_section
 from hydroid.report.responses import joint_responses, response_plots
 from hydroid.report.table import Cell, Given, Table, number, numbers_csv, unless_nan
 from hydroid.report.uncertainty_report import determined_section
@@ -67,6 +68,7 @@ def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
             tables={"errors": objective_table(problem, fit)},
             plots=drawn,
         ),
+        quantity_section(fit.quantities, problem.logs),
         Section(
             "Parameters",
             rank_phrase(fit.identifiability),
@@ -204,4 +206,9 @@ def _data(problem: Problem, fit: Fit) -> dict[str, str]:
     segments = (f"segment_{s}{unit}" for s in range(1, evaluation.segments.shape[1] + 1))
     header = (*problem.parameters.names, *segments, f"overall{unit}")
     front = np.column_stack([theta, evaluation.segments, evaluation.overall])
-    return {"history.csv": Table("", HISTORY, rows).csv(), "pareto.csv": numbers_csv(header, front)}
+    curves = curves_csv(fit.quantities.curves)
+    return {
+        "history.csv": Table("", HISTORY, rows).csv(),
+        "pareto.csv": numbers_csv(header, front),
+        "tables/curves.csv": curves,
+    }

@@ -31,6 +31,9 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             )
             for e in fit.estimates.values()
         },
+        quantities=fit.quantities.scalars,
+        curves=fit.quantities.curves,
+        covariance=fit.quantities.precision.covariance(),
     )
 
 

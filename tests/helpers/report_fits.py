@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.estimate import CurveEstimate, QuantityEstimate
 from hydroid.fitting.fit import Estimate, Fit
 from hydroid.fitting.refinement import Refinement
 from hydroid.log import Log
@@ -12,6 +13,8 @@ from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
+from hydroid.quantities.delta import precision
+from hydroid.quantities.quantities import Quantities
 from hydroid.search.least_squares_state import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -116,8 +119,29 @@ def make_fit(
         {"refined": refined} if "refined" in names else {},
         uncertain,
         identifiability(problem, uncertain),
+        make_quantities(problem, uncertain),
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
+
+
+def make_quantities(problem: Problem, uncertain: Uncertainty) -> Quantities:
+    """Of each joint a speed that is known, one that is not, and a curve of speed that ends without limits."""
+    scalars, curves = {}, {}
+    for joint in problem.settings.outputs:
+        name = f"joint{joint}_speed"
+        one = {"joint": joint, "unit": "deg/s"}
+        known = QuantityEstimate(label="speed at 50 %", value=12.0, sd=0.3, interval=(11.4, 12.6), **one)
+        lost = QuantityEstimate(label="dead band", value=3.0, interval=(0.0, None), joint=joint, unit="%")
+        scalars |= {f"{name}_50": known, f"joint{joint}_dead_band": lost}
+        curves[name] = CurveEstimate(
+            label="speed",
+            along="command [%]",
+            at=(-100.0, -50.0, 50.0, 100.0),
+            value=(-24.0, -12.0, 12.0, 24.0),
+            interval=((None, None), (-13.0, -11.0), (11.0, 13.0), (None, None)),
+            **one,
+        )
+    return Quantities(scalars, curves, precision(problem.parameters, uncertain))
 
 
 def make_uncertainty(

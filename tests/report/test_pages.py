@@ -64,12 +64,12 @@ def test_a_fits_report_has_all_its_files_and_no_others(written):
     path, _, _, paths = written
     tables = {
         f"tables/{t}.{e}"
-        for t in ("parameters", "errors", "directions", "noise")
+        for t in ("parameters", "errors", "quantities", "directions", "noise")
         for e in ("csv", "md", "tex")
     }
-    names = ("response", "learning", "pareto", "estimates", "singular_values", "correlation")
+    names = ("response", "learning", "pareto", "estimates", "singular_values", "correlation", "speed")
     figures = {f"figures/{f}.{e}" for f in names for e in ("png", "svg")}
-    rest = {"history.csv", "pareto.csv", "report.html"}
+    rest = {"history.csv", "pareto.csv", "tables/curves.csv", "report.html"}
     assert set(files(path)) == tables | figures | rest
     assert sorted(paths) == sorted(path / name for name in files(path))
 
@@ -99,7 +99,7 @@ def test_history_and_front_come_back_to_the_last_bit(written):
 def test_the_page_loads_nothing_from_elsewhere(written):
     source = (written[0] / "report.html").read_text(encoding="utf-8")
     page = Reader(source)
-    assert len(page.links) == 6
+    assert len(page.links) == 7
     assert all(link.startswith("data:image/svg+xml;base64,") for link in page.links)
     assert not re.search(r"https?:|//[a-z]|@import|url\(", re.sub(r"base64,[\w+/=]+", "", source))
     assert not {"script", "link", "iframe", "object"} & set(page.tags)
@@ -128,7 +128,7 @@ def test_the_page_begins_with_the_prediction_and_warnings_and_then_has_the_param
 
 def test_svg_figures_are_well_formed_and_undated(written):
     figures = {name: content for name, content in files(written[0]).items() if name.endswith(".svg")}
-    assert len(figures) == 6
+    assert len(figures) == 7
     for content in figures.values():
         ElementTree.fromstring(content)
         assert b"dc:date" not in content

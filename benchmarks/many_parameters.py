@@ -25,7 +25,6 @@ from sysid_peer import Peer
 
 from hydroid import load_settings
 from hydroid.fitting.fit import Fit, fit
-from hydroid.fitting.multistart import random_start
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -183,7 +182,8 @@ def main() -> None:
         fits.append(result)
     for seed in range(1, arguments.peer_starts + 1):
         peer = Peer(arm, problem, log, NOISE)
-        start = random_start(problem, np.random.default_rng([seed, 0]))
+        unit = np.random.default_rng([seed, 0]).random((1, len(problem.parameters.names)))
+        start = problem.theta(unit)[0]
         clock = Clock()
         try:
             found = peer.fit(start)

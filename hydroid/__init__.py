@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from hydroid.identified import IdentifiedModel as IdentifiedModel
     from hydroid.identified import identified as identified
     from hydroid.identified import load_identified as load_identified
-    from hydroid.identified import middle_of_bounds as middle_of_bounds
+    from hydroid.identified import start_values as start_values
     from hydroid.log import Log as Log
     from hydroid.log import write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
@@ -59,7 +59,7 @@ _NAMES = {
     "hydroid.api.plan": "design",
     "hydroid.api.study": "Study",
     "hydroid.errors": "HydroidError",
-    "hydroid.identified": "IdentifiedModel identified load_identified middle_of_bounds",
+    "hydroid.identified": "IdentifiedModel identified load_identified start_values",
     "hydroid.log": "Log write_log",
     "hydroid.parallel.cluster": "open_workers",
     "hydroid.plant": "Plant load_plant",

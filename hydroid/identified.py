@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from hydroid.assets import find_config
@@ -108,11 +107,10 @@ def load_identified(
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
 
 
-def middle_of_bounds(settings: FitSettings) -> IdentifiedModel:
-    """Return the model with every free parameter in the middle of its bounds."""
+def start_values(settings: FitSettings) -> IdentifiedModel:
+    """Return the model before any fit, where a search starts: nominal values, or the middle of the bounds."""
     parameters = settings.parameter_set()
-    theta = parameters.from_unit(np.full((1, int(parameters.free.sum())), 0.5))[0]
-    return IdentifiedModel(settings, theta, "the middle of the bounds")
+    return IdentifiedModel(settings, parameters.start, "the start values")
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:

@@ -1,4 +1,4 @@
-"""Parameters: names, units and bounds, and the way between a vector and its names.
+"""Parameters: names, units, bounds, scale and prior, and the way between a vector and its names.
 
 The search works in the unit box of the *free* parameters; everything else works with the full
 vector theta: one column per parameter, fixed ones included, in the units of the table.
@@ -19,14 +19,63 @@ LARGEST = 1e100
 
 
 @dataclass(frozen=True)
+class Prior:
+    """What is known of one parameter besides the logs: Gaussian, or log-normal where `log`.
+
+    Attributes:
+        nominal: most likely value; of a log-normal prior its median.
+        sd: standard deviation in the unit; of a log-normal prior that of the logarithm.
+        log: whether the logarithm is Gaussian.
+    """
+
+    nominal: float
+    sd: float
+    log: bool = False
+
+    def score(self, value: Array) -> Array:
+        """Return the distance of values from the nominal one, in standard deviations."""
+        distance = np.log(value / self.nominal) if self.log else value - self.nominal
+        return distance / self.sd
+
+    def value(self, score: float) -> float:
+        """Return the value at a score."""
+        change = score * self.sd
+        return float(self.nominal * np.exp(change)) if self.log else self.nominal + change
+
+
+@dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: its symbol, unit and bounds, and its value if it is fixed."""
+    """One physical parameter.
+
+    Attributes:
+        name, unit: its symbol, and the unit of its values.
+        lower, upper: its bounds.
+        fixed: its value if it is not estimated.
+        log: whether it is searched, refined and reported by its logarithm; the lower bound is then above 0.
+        start: where a search starts; None: no parameter of the set states a start.
+        prior: what is known besides the logs.
+    """
 
     name: str
     unit: str
     lower: float
     upper: float
     fixed: float | None = None
+    log: bool = False
+    start: float | None = None
+    prior: Prior | None = None
+
+    def position(self, value: Array | float) -> Array:
+        """Return where values lie on the parameter's scale: 0 at the lower bound, 1 at the upper one."""
+        if self.log:
+            return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
+        return (np.asarray(value) - self.lower) / (self.upper - self.lower)
+
+    def at(self, position: Array | float) -> Array:
+        """Return the values at positions; the ends are the bounds to the last digit. Equations (15), (16)."""
+        low, high = self.lower, self.upper
+        inner = low * (high / low) ** np.asarray(position) if self.log else low + position * (high - low)
+        return np.where(np.asarray(position) >= 1.0, high, inner)
 
 
 @dataclass(frozen=True)
@@ -46,6 +95,11 @@ class ParameterSet:
         return np.array([p.fixed is None for p in self.parameters], dtype=bool)
 
     @property
+    def log(self) -> NDArray[np.bool_]:
+        """Which parameters are on a log scale, shape (P,)."""
+        return np.array([p.log for p in self.parameters], dtype=bool)
+
+    @property
     def lower(self) -> Array:
         """Lower bounds, shape (P,)."""
         return np.array([p.lower for p in self.parameters])
@@ -55,18 +109,34 @@ class ParameterSet:
         """Upper bounds, shape (P,)."""
         return np.array([p.upper for p in self.parameters])
 
+    @property
+    def has_start(self) -> bool:
+        """Whether a free parameter states where a search starts."""
+        return any(p.start is not None for p in self._free)
+
+    @property
+    def start(self) -> Array:
+        """Where a search starts, shape (P,): as stated, or in the middle of the bounds on their scale."""
+        middle = self.from_unit(np.full((1, len(self._free)), 0.5))[0]
+        stated = [p.start if p.fixed is None else None for p in self.parameters]
+        return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
+
+    @property
+    def _free(self) -> list[Parameter]:
+        return [p for p in self.parameters if p.fixed is None]
+
     def from_unit(self, unit: Array) -> Array:
-        """Map points of the unit box, shape (n, free), to theta, shape (n, P), equations (15) and (16)."""
+        """Map points of the unit box, shape (n, free), to theta, shape (n, P)."""
         theta = np.tile([p.fixed if p.fixed is not None else 0.0 for p in self.parameters], (len(unit), 1))
-        low, high = self.lower[self.free], self.upper[self.free]
-        # low + (high - low) may differ from high in the last digit
-        theta[:, self.free] = np.where(unit >= 1.0, high, low + unit * (high - low))
+        for column, p, positions in zip(np.flatnonzero(self.free), self._free, unit.T, strict=True):
+            theta[:, column] = p.at(positions)
         return theta
 
     def to_unit(self, theta: Array) -> Array:
         """Map theta, shape (n, P), to the unit box, shape (n, free); values beyond a bound are clipped."""
-        low, high = self.lower[self.free], self.upper[self.free]
-        return np.clip((theta[:, self.free] - low) / (high - low), 0.0, 1.0)
+        free = theta[:, self.free].T
+        columns = [p.position(values) for p, values in zip(self._free, free, strict=True)]
+        return np.clip(np.stack(columns, axis=1), 0.0, 1.0)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.

@@ -7,7 +7,7 @@ import pytest
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, read_estimate, write_estimate
-from hydroid.identified import load_identified, middle_of_bounds, write_settings
+from hydroid.identified import load_identified, start_values, write_settings
 from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
 
@@ -22,7 +22,7 @@ def nominal(source: Path | None = None, **overrides: object):
 def run_folder(folder: Path, final: str) -> Path:
     """A folder as a fit of stage 2 leaves it."""
     fixed = {f"parameters.{name}.fixed": value for name, value in VALUES.items() if name != "K"}
-    model = middle_of_bounds(load_identified(None, "fit-hyd", fixed, nominal=True).settings)
+    model = start_values(load_identified(None, "fit-hyd", fixed, nominal=True).settings)
     settings = load_identified(None, "fit-hyd", fixed, nominal=True).settings
     write_settings(folder, settings)
     estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in VALUES.items() if n != "K"}

@@ -80,7 +80,7 @@ def identifiability(
         print(study.result.uncertainty.interval)
 
     Args:
-        model: as of `validate` (`middle_of_bounds` gives one before any fit).
+        model: as of `validate` (`start_values` gives one before any fit).
         logs: CSV files or logs, one or several.
         out: folder for the page, tables and figures; None: nothing is written.
         profile: names of parameters whose profile likelihood is wanted.

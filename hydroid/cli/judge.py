@@ -61,7 +61,7 @@ def identifiability(
             "--params",
             metavar="RUN|YAML",
             help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file "
-            "[default: the middle of the bounds].",
+            "[default: the start values of the parameters].",
         ),
     ] = None,
     config: OwnConfig = None,
@@ -91,12 +91,12 @@ def identifiability(
     """
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
-    from hydroid.identified import load_identified, middle_of_bounds
+    from hydroid.identified import load_identified, start_values
     from hydroid.report.phrases import direction_phrases, profile_warnings
 
     default, changes = f"fit-{stage.value}", overrides(setting)
     if fit is None:
-        model = middle_of_bounds(load_settings(config or default, changes))
+        model = start_values(load_settings(config or default, changes))
     else:
         model = load_identified(fit, config, changes, default=default)
     with Progress(quiet=output.silent) as progress:

@@ -1,4 +1,4 @@
-"""Multi-start least squares: from random starts, each over a growing part of the record.
+"""Multi-start least squares: from the stated start and random ones, each over a growing part of the record.
 
 From far off, the response over a whole record says nothing to a local method: it runs to the joints' stops,
 where no parameter has an effect. Over the first seconds it cannot get that far. A start is therefore fitted
@@ -20,8 +20,6 @@ from hydroid.problem.problem import Problem
 from hydroid.search.algorithm import Population
 from hydroid.settings.search import RefinementSettings, SearchSettings
 
-WIDE = 10.0
-"""bounds of a larger ratio than this are searched by the logarithm: a start is as likely in each decade"""
 DRAWS = 16
 """candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
 
@@ -79,9 +77,15 @@ class Multistart:
         return self._problem.parameters.from_unit(population.chromosomes)
 
     def start(self, number: int) -> Array:
-        """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all."""
+        """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all.
+
+        The first one is the start that the parameters state, if they do.
+        """
         rng = np.random.default_rng([self._seed, number])
-        drawn = np.array([random_start(self._problem, rng) for _ in range(DRAWS)])
+        unit = rng.random((DRAWS, int(self._problem.parameters.free.sum())))
+        if number == 0 and self._problem.start is not None:
+            unit[0] = self._problem.start
+        drawn = self._problem.theta(unit)
         shortest = self._parts[0] if self._parts else self._problem
         return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
 
@@ -117,17 +121,3 @@ class Multistart:
         median = np.median(finite) if finite.size else np.inf
         row = [done + 1, simulated, simulated, infeasible, overall.min(), median]
         return SearchState(population, {}, np.vstack([history, row]))
-
-
-def random_start(problem: Problem, rng: np.random.Generator) -> Array:
-    """Draw a parameter set within the bounds, shape (P,), where what is known holds.
-
-    Uniform, or uniform in the logarithm where the bounds are WIDE.
-    """
-    parameters = problem.parameters
-    unit = rng.random(int(parameters.free.sum()))
-    low, high = parameters.lower[parameters.free], parameters.upper[parameters.free]
-    wide = (low > 0) & (high > WIDE * low)
-    ratio = np.where(wide, high, 2.0) / np.where(wide, low, 1.0)
-    unit = np.where(wide, (ratio**unit - 1) / (ratio - 1), unit)
-    return problem.theta(unit[None])[0]

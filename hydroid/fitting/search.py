@@ -178,15 +178,15 @@ def make_algorithm(problem: Problem, settings: SearchSettings) -> Algorithm:
     Raises:
         SettingsError: a library is not installed, or has no such algorithm.
     """
-    free = int(problem.parameters.free.sum())
+    free, start = int(problem.parameters.free.sum()), problem.start
     match settings.algorithm:
         case "ga":
-            return SimpleGa(settings.ga, free)
+            return SimpleGa(settings.ga, free, start)
         case "nsga2":
-            return Nsga2(settings.nsga2, free)
+            return Nsga2(settings.nsga2, free, start)
         case "cmaes":
-            return cmaes(settings.cmaes, free)
+            return cmaes(settings.cmaes, free, start)
         case "pymoo":
-            return pymoo(settings.pymoo, free, len(problem.bounds))
+            return pymoo(settings.pymoo, free, len(problem.bounds), start)
         case other:
             raise SettingsError(f"{other} is no search by populations", where="search.algorithm")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
 from hydroid.settings.arm import Arm, Joint
-from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings
+from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings, actuator_values
 from hydroid.settings.linkage import LinearActuator
 
 Array = NDArray[np.float64]
@@ -95,15 +95,9 @@ def nominal_parameters(
 
 
 def _nominal(joint: Joint, settings: HydraulicSettings) -> tuple[float, ...]:
-    actuator = joint.actuator
-    values = {name: math.inf if value is None else value for name, value in settings.model_dump().items()}
-    values["opening_a"] = values["opening_b"] = actuator.max_opening
-    if isinstance(actuator, LinearActuator):
-        values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
-    else:
-        values["area_a"] = values["area_b"] = actuator.displacement
-        values["dead_volume"] = settings.rotary_volume
-    return tuple(values[q.name] * q.factor for q in QUANTITIES.values())
+    values = actuator_values(joint.actuator, settings)
+    factors = ((values[name], q.factor) for name, q in QUANTITIES.items())
+    return tuple(math.inf if value is None else value * factor for value, factor in factors)
 
 
 def with_values(parameters: Records, values: Mapping[str, Any]) -> Records:

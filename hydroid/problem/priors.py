@@ -1,10 +1,12 @@
-"""Priors: linear combinations or ratios of parameters that are known besides the logs.
+"""Priors: single parameters, and linear combinations or ratios of them, that are known besides the logs.
 
-Each has a value and a standard deviation; without one it is a constraint. A search stays where every prior
-holds within REACH standard deviations. The refinement and the uncertainty take it as one more measurement.
+Each has a value and a standard deviation; a combination without one is a constraint. A search stays where
+every prior holds within REACH standard deviations. The refinement and the uncertainty take each as one more
+measurement.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,85 +22,90 @@ MAX_SWEEPS = 200
 """projections on all priors in turn; two that are nearly parallel need the most"""
 
 
+@dataclass(frozen=True, eq=False)
+class _Combination:
+    """A prior on factors·theta, or on a ratio a / b.
+
+    A ratio has the factors of a - value b and the column of b as `divisor`.
+    step: the shortest change in the box of the free parameters that raises factors·theta by 1, shape (P,).
+    """
+
+    name: str
+    factors: Array
+    value: float
+    sd: float
+    divisor: int | None
+    step: Array
+
+    def excess(self, theta: Array) -> Array:
+        """Distance from the value, shape (n,), times the divisor if any."""
+        # the sum along the last axis is the same for any number of rows; a matrix product may not be
+        return (theta * self.factors).sum(axis=1) - self.value
+
+    def tolerance(self, theta: Array) -> Array:
+        """Excess of one standard deviation, shape (n,)."""
+        return self.sd * (np.ones(len(theta)) if self.divisor is None else theta[:, self.divisor])
+
+
 class Priors:
     """M priors about P parameters, named `names`; those about fixed parameters only are left out.
+
+    Those of single parameters come first. `searched` are the parameters with bounds within REACH of these.
 
     Raises:
         SettingsError: a parameter that does not exist, or priors that the bounds contradict.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
-        self._parameters = parameters
-        for name, prior in settings.items():
-            for parameter in prior.factors:
-                if parameter not in parameters.names:
-                    hint = f"parameters: {', '.join(parameters.names)}"
-                    raise SettingsError(f"no parameter {parameter!r}", where=f"priors.{name}", hint=hint)
-        free = {n for n, is_free in zip(parameters.names, parameters.free, strict=True) if is_free}
-        active = {name: s for name, s in settings.items() if free & set(s.factors)}
-        self.names = tuple(active)
-        self._factors = np.array(
-            [[s.factors.get(n, 0.0) for n in parameters.names] for s in active.values()]
-        ).reshape(len(active), len(parameters.names))
-        self._value = np.array([0.0 if s.ratio else s.value for s in active.values()])
-        # column of a ratio's denominator b, which turns a - value b into a / b - value
-        self._divisor = [parameters.names.index(s.ratio[1]) if s.ratio else None for s in active.values()]
-        width = np.where(parameters.free, parameters.upper - parameters.lower, 0.0)
-        open_ = np.abs(self._factors) @ width
-        self._sd = np.array([s.sd or CONSTRAINT_SD * o for s, o in zip(active.values(), open_, strict=True)])
-        self._steps = np.zeros_like(self._factors)
-        if len(active):
-            # the shortest step in the box of the free parameters that changes a prior's left side by 1
-            self._steps = self._factors * width**2 / np.sum((self._factors * width) ** 2, axis=1)[:, None]
+        self.searched = _within_reach(parameters)
+        free = zip(range(len(parameters.names)), parameters.parameters, parameters.free, strict=True)
+        self._own = [(column, p.prior) for column, p, is_free in free if is_free and p.prior is not None]
+        self._combinations = [
+            combination
+            for name, prior in settings.items()
+            if (combination := _combination(name, prior, self.searched)) is not None
+        ]
+        self.names = (
+            *(parameters.names[column] for column, _ in self._own),
+            *(combination.name for combination in self._combinations),
+        )
         self._refuse_contradictions()
 
     def __len__(self) -> int:
         return len(self.names)
 
     def scores(self, theta: Array) -> Array:
-        """Return (left side at theta - value) / sd of each prior; (n, P) -> (n, M)."""
-        scores = np.empty((len(theta), len(self)))
-        for m, divisor in enumerate(self._divisor):
-            scores[:, m] = self._excess(theta, m) / self._tolerance(theta, m, divisor)
-        return scores
+        """Return the distance from each prior's value in standard deviations; (n, P) -> (n, M)."""
+        own = [prior.score(theta[:, column]) for column, prior in self._own]
+        return np.array(
+            [*own, *(c.excess(theta) / c.tolerance(theta) for c in self._combinations)]
+        ).T.reshape(len(theta), len(self))
 
     def project(self, theta: Array) -> Array:
-        """Return theta, (n, P), moved by the shortest steps to within REACH sd of every prior.
+        """Return theta, (n, P), moved by the shortest steps to within REACH sd of every combination.
 
-        Projections on the priors in turn (S. Kaczmarz, 1937), within the bounds. Each row is moved by itself.
+        Projections on them in turn (S. Kaczmarz, 1937), within the bounds of `searched`. Each row is moved by
+        itself.
         """
-        if not len(self):
+        if not self._combinations:
             return theta
-        theta, free = theta.copy(), self._parameters.free
-        low, high = self._parameters.lower[free], self._parameters.upper[free]
+        theta, free = theta.copy(), self.searched.free
+        low, high = self.searched.lower[free], self.searched.upper[free]
         for _ in range(MAX_SWEEPS):
             before = theta.copy()
-            for m, divisor in enumerate(self._divisor):
-                excess, slack = self._excess(theta, m), REACH * self._tolerance(theta, m, divisor)
+            for combination in self._combinations:
+                excess, slack = combination.excess(theta), REACH * combination.tolerance(theta)
                 beyond = excess - np.clip(excess, -slack, slack)
-                theta -= beyond[:, None] * self._steps[m]
+                theta -= beyond[:, None] * combination.step
                 theta[:, free] = np.clip(theta[:, free], low, high)
             if np.array_equal(theta, before):
                 break
         return theta
 
-    def _excess(self, theta: Array, m: int) -> Array:
-        # the sum along the last axis is the same for any number of rows; a matrix product may not be
-        return (theta * self._factors[m]).sum(axis=1) - self._value[m]
-
-    def _tolerance(self, theta: Array, m: int, divisor: int | None) -> Array:
-        return self._sd[m] * (np.ones(len(theta)) if divisor is None else theta[:, divisor])
-
     def _refuse_contradictions(self) -> None:
-        divisors = {d for d in self._divisor if d is not None}
-        for column in divisors:
-            p = self._parameters.parameters[column]
-            if (p.lower if p.fixed is None else p.fixed) <= 0:
-                raise SettingsError(f"a ratio divides by {p.name}, which may be 0", where="priors")
-        if not len(self):
+        if not self._combinations:
             return
-        centre = self._parameters.from_unit(np.full((1, int(self._parameters.free.sum())), 0.5))
-        off = np.abs(self.scores(self.project(centre))[0])
+        off = np.abs(self.scores(self.project(self.searched.start[None]))[0])
         worst = int(np.argmax(off))
         if off[worst] > 1.5 * REACH:
             raise SettingsError(
@@ -106,3 +113,39 @@ class Priors:
                 where=f"priors.{self.names[worst]}",
                 hint="widen the bounds, correct the value, or give it a larger sd",
             )
+
+
+def _within_reach(parameters: ParameterSet) -> ParameterSet:
+    """Return the parameters with bounds no further than REACH standard deviations from their priors."""
+    narrowed = list(parameters.parameters)
+    for column, p in enumerate(narrowed):
+        if p.prior is not None and p.fixed is None:
+            low, high = max(p.lower, p.prior.value(-REACH)), min(p.upper, p.prior.value(REACH))
+            narrowed[column] = replace(p, lower=low, upper=high)
+    return ParameterSet(tuple(narrowed))
+
+
+def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
+    """Return a combination; None where all of its parameters are fixed.
+
+    Raises:
+        SettingsError: a parameter that does not exist, or a divisor that may be 0.
+    """
+    names, free = parameters.names, parameters.free
+    for parameter in prior.factors:
+        if parameter not in names:
+            hint = f"parameters: {', '.join(names)}"
+            raise SettingsError(f"no parameter {parameter!r}", where=f"priors.{name}", hint=hint)
+    factors = np.array([prior.factors.get(n, 0.0) for n in names])
+    if not factors[free].any():
+        return None
+    width = np.where(free, parameters.upper - parameters.lower, 0.0)
+    step = factors * width**2 / np.sum((factors * width) ** 2)
+    sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
+    if prior.ratio is None:
+        return _Combination(name, factors, prior.value, sd, None, step)
+    divisor = names.index(prior.ratio[1])
+    p = parameters.parameters[divisor]
+    if (p.lower if p.fixed is None else p.fixed) <= 0:
+        raise SettingsError(f"a ratio divides by {p.name}, which may be 0", where="priors")
+    return _Combination(name, factors, 0.0, sd, divisor, step)

@@ -92,7 +92,7 @@ class Problem:
         return tuple(sorted({*(np.flatnonzero(driven) + 1).tolist(), *self.settings.outputs}))
 
     def freed(self) -> "Problem":
-        """Return the same problem with every parameter free that has bounds, those held fixed included."""
+        """Return the same problem with every parameter free that can be, those held fixed included."""
         return Problem(self.settings.freed(), self.logs, self._spread)
 
     def first(self, seconds: float) -> "Problem":
@@ -102,8 +102,14 @@ class Problem:
         return Problem(settings, [log.first(seconds) for log in self.logs], self._spread)
 
     def theta(self, unit: Array) -> Array:
-        """Return candidates, (n, P), from points of the unit box, moved to where the priors hold."""
-        return self.priors.project(self.parameters.from_unit(unit))
+        """Return candidates, (n, P), from points of the search's unit box, moved to where the priors hold."""
+        return self.priors.project(self.priors.searched.from_unit(unit))
+
+    @property
+    def start(self) -> Array | None:
+        """The point of the search's unit box where it starts, shape (p,); None: not stated."""
+        searched = self.priors.searched
+        return searched.to_unit(searched.start[None])[0] if searched.has_start else None
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Evaluate theta, shape (n, P); memory does not grow with n beyond the result."""

@@ -134,7 +134,7 @@ def _text(axes: Axes, row: int, value: str, below: str) -> None:
 
 def _normal(parameter: Parameter, value: Array | float) -> Array:
     """Return the position within the bounds; a value beyond one is drawn on it."""
-    return np.clip((np.asarray(value) - parameter.lower) / (parameter.upper - parameter.lower), 0.0, 1.0)
+    return np.clip(parameter.position(value), 0.0, 1.0)
 
 
 def _dots(axes: Axes, at: Array, row: float, color: str, mark: str) -> None:

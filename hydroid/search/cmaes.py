@@ -12,21 +12,22 @@ from hydroid.settings.search import CmaesSettings
 Float = NDArray[np.float64]
 
 SIGMA = 0.3
-"""standard deviation of the first population around the middle of the unit box"""
+"""standard deviation of the first population around its mean in the unit box"""
 
 
-def cmaes(settings: CmaesSettings, parameters: int) -> LibraryAlgorithm:
-    """CMA-ES on the unit box of so many parameters, from its middle.
+def cmaes(settings: CmaesSettings, parameters: int, start: Float | None = None) -> LibraryAlgorithm:
+    """CMA-ES on the unit box of so many parameters, from a start, shape (p,), or from its middle.
 
     Raises:
         SettingsError: cma is not installed.
     """
     cma = need("cma", "cma")
-    return LibraryAlgorithm(settings, lambda rng: _Cmaes(cma, settings, parameters, rng), single=True)
+    mean = np.full(parameters, 0.5) if start is None else start
+    return LibraryAlgorithm(settings, lambda rng: _Cmaes(cma, settings, mean, rng), single=True)
 
 
 class _Cmaes:
-    def __init__(self, cma: Any, settings: CmaesSettings, parameters: int, rng: Generator) -> None:
+    def __init__(self, cma: Any, settings: CmaesSettings, mean: Float, rng: Generator) -> None:
         def normal(*shape: int) -> Float:
             return rng.standard_normal(shape)
 
@@ -42,7 +43,7 @@ class _Cmaes:
             "tolflatfitness": np.inf,
             "tolfun": 0.0,
         }
-        self._strategy = cma.CMAEvolutionStrategy(np.full(parameters, 0.5), SIGMA, options)
+        self._strategy = cma.CMAEvolutionStrategy(mean, SIGMA, options)
         self._asked: list[Float] = []
 
     def ask(self) -> Float:

@@ -25,7 +25,7 @@ class SimpleGa(GeneticAlgorithm):
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Offspring, shape (population - elitism, length): the elite is not simulated again."""
         if population is None:
-            return self.coding.random(self.settings.population, rng)
+            return self.first(rng)
         count = self.settings.population - self.settings.elitism
         parents = roulette(_objective(population), count + count % 2, rng)
         return self.breed(population.chromosomes[parents], count, rng)

@@ -33,13 +33,16 @@ DIRECTED = ("NSGA3", "MOEAD", "RVEA")
 """These take reference directions, one per candidate."""
 
 
-def pymoo(settings: PymooSettings, parameters: int, objectives: int) -> LibraryAlgorithm:
+def pymoo(
+    settings: PymooSettings, parameters: int, objectives: int, start: Float | None = None
+) -> LibraryAlgorithm:
     """The algorithm that the settings name, on the unit box.
 
     Args:
         settings: name, population, generations.
         parameters: dimensions of the box.
         objectives: number of them; an algorithm for one objective gets only one.
+        start: point that joins the first population, shape (parameters,).
 
     Raises:
         SettingsError: pymoo is not installed, or the algorithm needs more objectives.
@@ -54,7 +57,9 @@ def pymoo(settings: PymooSettings, parameters: int, objectives: int) -> LibraryA
         )
     need("pymoo", "moo")
     count = 1 if single else objectives
-    return LibraryAlgorithm(settings, lambda rng: _Pymoo(settings, parameters, count, rng), single=single)
+    return LibraryAlgorithm(
+        settings, lambda rng: _Pymoo(settings, parameters, count, start, rng), single=single
+    )
 
 
 def directions(count: int, objectives: int) -> Float:
@@ -78,7 +83,14 @@ def directions(count: int, objectives: int) -> Float:
 
 
 class _Pymoo:
-    def __init__(self, settings: PymooSettings, parameters: int, objectives: int, rng: Generator) -> None:
+    def __init__(
+        self,
+        settings: PymooSettings,
+        parameters: int,
+        objectives: int,
+        start: Float | None,
+        rng: Generator,
+    ) -> None:
         need("pymoo.config", "moo").Config.warnings["not_compiled"] = False  # else it prints a hint
         problem = need("pymoo.core.problem", "moo").Problem(
             n_var=parameters, n_obj=objectives, n_ieq_constr=0, xl=0.0, xu=1.0
@@ -88,6 +100,9 @@ class _Pymoo:
             options["ref_dirs"] = directions(settings.population, objectives)
         else:
             options["pop_size"] = settings.population
+        if start is not None:
+            others = rng.random((settings.population - 1, parameters))
+            options["sampling"] = np.vstack([start, others])
         module, name = (SINGLE | SEVERAL)[settings.algorithm]
         self._algorithm = getattr(need(module, "moo"), name)(**options)
         self._algorithm.setup(problem, termination=("n_gen", 1 + settings.generations), verbose=False)

@@ -30,7 +30,7 @@ class Nsga2(GeneticAlgorithm):
         """Offspring of parents from the crowded tournament, shape (population, length)."""
         count = self.settings.population
         if population is None:
-            return self.coding.random(count, rng)
+            return self.first(rng)
         parents = tournament(population.objectives, count + count % 2, rng)
         return self.breed(population.chromosomes[parents], count, rng)
 

@@ -103,10 +103,14 @@ def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> G
 
 @dataclass(frozen=True)
 class GeneticAlgorithm:
-    """The part that both genetic algorithms share: coding and reproduction."""
+    """The part that both genetic algorithms share: coding and reproduction.
+
+    start: point of the unit box that joins the first population, shape (p,).
+    """
 
     settings: GeneticSettings
     parameters: int
+    start: Float | None = None
 
     @property
     def coding(self) -> Coding:
@@ -116,6 +120,13 @@ class GeneticAlgorithm:
     def decode(self, chromosomes: Genes) -> Float:
         """Points of the unit box, shape (n, p)."""
         return self.coding.decode(chromosomes)
+
+    def first(self, rng: Generator) -> Genes:
+        """The first population: random but for the start, shape (population, length)."""
+        chromosomes = self.coding.random(self.settings.population, rng)
+        if self.start is not None:
+            chromosomes[:1] = self.coding.encode(self.start[None])
+        return chromosomes
 
     def breed(self, parents: Genes, count: int, rng: Generator) -> Genes:
         """Cross and mutate parents, shape (even n >= count, length); return `count` children."""

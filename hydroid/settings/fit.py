@@ -4,12 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from hydroid.parameters import Parameter, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings
 from hydroid.settings.log import LogSettings
+from hydroid.settings.parameters import expanded, parameter_set, prior
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
 from hydroid.settings.simulation import ClusterSettings, SimulationSettings
@@ -33,6 +34,9 @@ class FitSettings(Settings):
     """name of the arm's pose that joints without a measured angle hold"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
+    scale: Literal["log", "linear"] = "log"
+    """log: parameters with a lower bound above 0 are searched, refined and reported by their logarithm;
+    linear: by their value, as in equations (15) and (16)"""
     hydraulics: HydraulicSettings = HydraulicSettings()
     priors: dict[str, PriorSettings] = Field(default_factory=dict[str, PriorSettings])
     """what is known besides the logs, each under a name of your choice"""
@@ -55,7 +59,10 @@ class FitSettings(Settings):
         names = values.get("parameters") if isinstance(values, dict) else None
         if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
             raise ValueError("parameter names must be plain words such as K or M1")
-        return values
+        if not isinstance(names, dict):
+            return values
+        compared = values.get("outputs", cls.model_fields["outputs"].default)
+        return {**values, "parameters": expanded(names, compared)}
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
@@ -67,21 +74,20 @@ class FitSettings(Settings):
                 raise ValueError(f"{name}: stage mech has no {parameter.quantity}; set stage: hyd")
             if self.stage == "hyd" and parameter.quantity == "gain":
                 raise ValueError(f"{name}: stage hyd has no gain; the hydraulics take its place")
+            try:
+                prior(self, parameter)
+            except ValueError as error:
+                raise ValueError(f"parameters.{name}: {error}") from None
         return self
 
     def parameter_set(self) -> ParameterSet:
-        """Return the parameters with units, bounds and fixed values, in the order of theta."""
-        return ParameterSet(tuple(_parameter(name, p) for name, p in self.parameters.items()))
+        """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
+        return parameter_set(self)
 
     def freed(self) -> "FitSettings":
-        """Return the settings with every parameter free that has bounds, as a joint refinement has them."""
+        """Return the settings with every parameter free that can be, as a joint refinement has them."""
         free = {
-            name: p if p.bounds is None else p.model_copy(update={"fixed": None})
+            name: p.model_copy(update={"fixed": None}) if p.can_be_free else p
             for name, p in self.parameters.items()
         }
         return self.model_copy(update={"parameters": free})
-
-
-def _parameter(name: str, settings: ParameterSettings) -> Parameter:
-    lower, upper = settings.bounds or (settings.fixed or 0.0,) * 2
-    return Parameter(name, settings.unit, lower, upper, settings.fixed)

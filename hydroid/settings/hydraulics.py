@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.settings.load import NotNegative, Positive, Settings
 
 SI_FACTORS = {"mm": 1e-3, "mm²": 1e-6, "cm³": 1e-6, "N/mm": 1e3, "bar": 1e5, "L/min": 1e-3 / 60.0}
@@ -175,3 +176,17 @@ TARGETS = {name: (name,) for name in QUANTITIES} | {
     name[:-2]: (name, f"{name[:-2]}_b") for name in QUANTITIES if name.endswith("_a")
 }
 """the quantities that a name sets: itself, or both sides; parameters of a fit use these names"""
+
+
+def actuator_values(
+    actuator: LinearActuator | RotaryActuator, settings: HydraulicSettings
+) -> dict[str, float | None]:
+    """Return the value of every quantity of one actuator, in the units of QUANTITIES; None: no limit."""
+    values: dict[str, float | None] = settings.model_dump()
+    values["opening_a"] = values["opening_b"] = actuator.max_opening
+    if isinstance(actuator, LinearActuator):
+        values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
+    else:
+        values["area_a"] = values["area_b"] = actuator.displacement
+        values["dead_volume"] = settings.rotary_volume
+    return {name: values[name] for name in QUANTITIES}

@@ -25,17 +25,34 @@ UNITS = MECHANICAL_UNITS | {name: QUANTITIES[sets[0]].unit for name, sets in TAR
 
 
 class ParameterSettings(Settings):
-    """One parameter: what it is in the model, where it acts, its bounds, or the value it is held at."""
+    """One parameter: what it is in the model, where it acts, what is known of it, or the value it is held at.
+
+    parameters:
+      A_A: {quantity: area_a, joints: [2], within: 2}                  # around the value of the arm's file
+      M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}           # weighed
+      D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_2, D_3, ... of compared joints
+    """
 
     quantity: str
     """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and area_a,
     area_b, opening_a, opening_b"""
     joints: tuple[JointNumber, ...] | None = None
     """joints that share the parameter; null: all"""
+    each: bool | tuple[JointNumber, ...] = False
+    """joints that have a parameter each, NAME_2, NAME_3, ...; true: those that are compared. With one joint
+    the name stays as it is. Entries under NAME_2 change joint 2's"""
     link: str | None = None
     """link whose mass the parameter is"""
     bounds: tuple[float, float] | None = None
-    """lower and upper bound, in the unit of the quantity"""
+    """lower and upper bound, in the unit of the quantity; null: four standard deviations of the prior"""
+    nominal: float | None = None
+    """expected value, in the unit of the quantity; null: what `hydraulics` or the arm's file says"""
+    within: Annotated[float, Field(gt=1)] | None = None
+    """log-normal prior: 95 % lie between nominal / within and nominal * within"""
+    sd: Positive | None = None
+    """Gaussian prior: standard deviation around nominal, in the unit of the quantity"""
+    start: float | None = None
+    """where the search starts; null: nominal, else the middle of the bounds on the parameter's scale"""
     fixed: float | None = None
     """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
 
@@ -46,25 +63,48 @@ class ParameterSettings(Settings):
             raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
         if (self.quantity == "mass") != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
-        if self.quantity in OF_THE_PUMP and self.joints is not None:
+        if self.quantity in OF_THE_PUMP and (self.joints is not None or self.each):
             raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
-        if self.link is not None and self.joints is not None:
+        if self.link is not None and (self.joints is not None or self.each):
             raise ValueError("a mass belongs to a link, not to joints")
-        if self.bounds is None and self.fixed is None:
-            raise ValueError("needs bounds: [lower, upper], or fixed: value")
+        if self.within is not None and self.sd is not None:
+            raise ValueError("give within: factor or sd: standard deviation, not both")
+        if not self.can_be_free and self.fixed is None:
+            raise ValueError("needs bounds: [lower, upper], a prior (within: factor), or fixed: value")
         if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
             raise ValueError("bounds must be [lower, upper] with lower < upper")
-        lowest = min(self.bounds or (self.fixed or 0.0,))
-        if self.quantity == "mass" and min(lowest, self.fixed or lowest) <= 0:
+        values = [v for v in (*(self.bounds or ()), self.nominal, self.start, self.fixed) if v is not None]
+        lowest = min(values, default=1.0)
+        if self.quantity == "mass" and lowest <= 0:
             raise ValueError("a mass must be above 0 kg")
-        if min(lowest, self.fixed or 0.0) < 0:
+        if lowest < 0:
             raise ValueError(f"a {self.quantity} cannot be negative")
+        low, high = self.bounds or (0.0, math.inf)
+        for name in ("nominal", "start"):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"{name} {value:g} lies outside the bounds")
         return self
 
     @property
     def unit(self) -> str:
         """The unit of the quantity."""
         return UNITS[self.quantity]
+
+    @property
+    def has_prior(self) -> bool:
+        """Whether something besides the bounds is known of its value."""
+        return self.within is not None or self.sd is not None
+
+    @property
+    def can_be_free(self) -> bool:
+        """Whether it can be estimated: it has bounds, or a prior that gives them."""
+        return self.bounds is not None or self.has_prior
+
+    @property
+    def states_start(self) -> bool:
+        """Whether it says where a search starts."""
+        return self.has_prior or self.nominal is not None or self.start is not None
 
 
 class PriorSettings(Settings):

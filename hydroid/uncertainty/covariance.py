@@ -100,17 +100,22 @@ def uncertainty_from(
     widened = relative * quantile / float(normal.ppf(0.5 + COVERAGE / 2))
     unidentifiable = widened > UNIDENTIFIABLE_ABOVE
     relative[unidentifiable] = np.inf
-    half = quantile * relative * derivatives.scale
-    interval = np.stack([theta - half, theta + half], axis=1)
+    half, log = quantile * relative, problem.parameters.log
+    with np.errstate(over="ignore"):  # inf without an interval
+        factor = np.exp(np.where(log, half, 0.0))
+    change = np.where(log, 0.0, half * derivatives.scale)
+    interval = np.stack([theta / factor - change, theta * factor + change], axis=1)
     status: list[ParameterStatus] = []
     for i, parameter in enumerate(parameters):
+        if not free[i]:
+            status.append(ParameterStatus(Flag.FIXED))
+            continue
         bound: Side | None = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
         if bound is not None and not unidentifiable[i]:
             interval[i] = np.nan
         doubt, diverges = float(derivatives.doubt[i]), not np.isfinite(derivatives.slopes[i]).all()
         flag = Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(float(widened[i]))
-        known = ParameterStatus(flag, bound, doubt if doubt > DOUBT_ABOVE else None, diverges)
-        status.append(known if free[i] else ParameterStatus(Flag.FIXED))
+        status.append(ParameterStatus(flag, bound, doubt if doubt > DOUBT_ABOVE else None, diverges))
     deviation = np.where(unidentifiable[free], np.nan, relative[free])
     correlation = covariance / np.outer(deviation, deviation)
     return Uncertainty(
@@ -127,11 +132,11 @@ def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, NDArray[np.bool_]], ...]:
-    """Return for each bound whether values lie at it."""
-    margin = BOUND_MARGIN * (parameter.upper - parameter.lower)
+    """Return for each bound whether values lie at it, on the parameter's scale."""
+    position = parameter.position(value)
     return (
-        ("lower", np.asarray(value - parameter.lower <= margin)),
-        ("upper", np.asarray(parameter.upper - value <= margin)),
+        ("lower", np.asarray(position <= BOUND_MARGIN)),
+        ("upper", np.asarray(position >= 1 - BOUND_MARGIN)),
     )
 
 

@@ -86,8 +86,12 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
 
 
 def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
-    """Return what a relative change of 1 is, shape (P,): the value, or MIN_SCALE of the bounds' width."""
-    return np.maximum(np.abs(theta), MIN_SCALE * (parameters.upper - parameters.lower))
+    """Return what a relative change of 1 is, shape (P,).
+
+    It is the value; on a linear scale at least MIN_SCALE of the bounds' width.
+    """
+    least = np.where(parameters.log, 0.0, MIN_SCALE * (parameters.upper - parameters.lower))
+    return np.maximum(np.abs(theta), least)
 
 
 def slopes_of(

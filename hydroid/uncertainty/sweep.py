@@ -45,7 +45,7 @@ def sweep(problem: Problem, theta: Array, progress: Progress = no_progress) -> S
     parameters = problem.parameters
     free = np.flatnonzero(parameters.free)
     slopes = -0.01 * jacobian(problem, theta).slopes[free]
-    values = np.linspace(parameters.lower[free], parameters.upper[free], SWEEP_POINTS, axis=1)
+    values = np.array([parameters.parameters[i].at(np.linspace(0, 1, SWEEP_POINTS)) for i in free])
     responses = tuple(np.empty((*values.shape, len(c.measured))) for c in problem.channels)
     for i, column in enumerate(free):
         points = np.tile(theta, (SWEEP_POINTS, 1))

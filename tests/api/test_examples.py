@@ -60,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_function_has_an_example():
     functions = {n for n in hydroid.__all__ if callable(getattr(hydroid, n)) and n[0].islower()}
-    own = {"identified", "middle_of_bounds", "load_identified", "read_commands", "write_log", "open_workers"}
+    own = {"identified", "start_values", "load_identified", "read_commands", "write_log", "open_workers"}
     assert functions - own - {"load_plant"} <= set(NAMES)
 
 

@@ -1,0 +1,124 @@
+"""From the settings of parameters to parameters: one per joint, nominal values, priors, bounds and starts."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from annotated_types import Gt
+
+from hydroid.parameters import Parameter, ParameterSet, Prior
+from hydroid.settings.hydraulics import TARGETS, HydraulicSettings, actuator_values
+from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
+
+if TYPE_CHECKING:
+    from hydroid.settings.fit import FitSettings
+
+QUANTILE = 1.96
+"""standard deviations of a Gaussian that hold 95 % on both sides"""
+BOUND_SD = 4.0
+"""standard deviations of its prior that a parameter without bounds may be away"""
+SMALLEST = 0.01
+"""part of the nominal value below which a quantity that must be above 0 is not searched by default"""
+MAY_BE_ZERO = {
+    name
+    for name, field in HydraulicSettings.model_fields.items()
+    if not any(isinstance(limit, Gt) for limit in field.metadata)
+}
+POSITIVE = {"mass"} | {name for name, sides in TARGETS.items() if not MAY_BE_ZERO & set(sides)}
+"""quantities that must be above 0"""
+
+
+def expanded(parameters: Mapping[str, Any], compared: tuple[int, ...]) -> dict[str, Any]:
+    """Return the settings of parameters, as YAML gives them, with one entry for each joint of `each`.
+
+    `compared` are the joints that `each: true` means. With one of them a mechanical parameter serves all
+    joints, because those that are driven but not compared need it too.
+
+    Raises:
+        ValueError: a parameter with `joints` and `each`.
+    """
+    result: dict[str, Any] = {}
+    for name, entry in parameters.items():
+        if not isinstance(entry, dict) or not (each := entry.get("each")):
+            result[name] = {**result.get(name, {}), **entry} if isinstance(entry, dict) else entry
+            continue
+        if entry.get("joints") is not None:
+            raise ValueError(
+                f"{name}: give joints that share it or each: joints that have their own, not both"
+            )
+        shared = {key: value for key, value in entry.items() if key != "each"}
+        joints = compared if each is True else each
+        if not isinstance(joints, list | tuple) or not all(isinstance(j, int) for j in joints):
+            result[name] = entry  # refused as any other wrong value
+        elif len(joints) == 1:
+            everywhere = each is True and entry.get("quantity") in MECHANICAL_UNITS
+            result[name] = shared | ({} if everywhere else {"joints": tuple(joints)})
+        else:
+            for joint in joints:
+                own = f"{name}_{joint}"
+                changes = result.get(own, parameters.get(own, {}))
+                result[own] = {**shared, "joints": (joint,), **changes}
+    return result
+
+
+def parameter_set(settings: "FitSettings") -> ParameterSet:
+    """Return the parameters of a fit in the order of theta."""
+    starts = any(p.states_start for p in settings.parameters.values() if p.fixed is None)
+    return ParameterSet(tuple(_parameter(settings, n, p, starts) for n, p in settings.parameters.items()))
+
+
+def nominal_value(settings: "FitSettings", parameter: ParameterSettings) -> float | None:
+    """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
+    if parameter.nominal is not None:
+        return parameter.nominal
+    arm = settings.arm
+    if parameter.link is not None:
+        return next((float(part.mass) for part in arm.parts if part.name == parameter.link), None)
+    if parameter.quantity not in TARGETS:
+        return None
+    joints = parameter.joints or range(1, len(arm.joints) + 1)
+    actuators = [arm.joints[j - 1].actuator for j in joints if j <= len(arm.joints)]
+    tables = [actuator_values(a, settings.hydraulics) for a in actuators]
+    values = {table[side] for table in tables for side in TARGETS[parameter.quantity]}
+    return values.pop() if len(values) == 1 else None
+
+
+def prior(settings: "FitSettings", parameter: ParameterSettings) -> Prior | None:
+    """Return the prior of a parameter; None: it has none.
+
+    Raises:
+        ValueError: no nominal value, or one that does not fit.
+    """
+    if not parameter.has_prior:
+        return None
+    nominal = nominal_value(settings, parameter)
+    if nominal is None:
+        raise ValueError(
+            f"a prior on {parameter.quantity} needs nominal: value; neither `hydraulics` nor the arm's file "
+            "has one for all its joints"
+        )
+    if parameter.bounds is not None and not parameter.bounds[0] <= nominal <= parameter.bounds[1]:
+        raise ValueError(f"the nominal value {nominal:g} {parameter.unit} lies outside the bounds")
+    if parameter.sd is not None:
+        return Prior(nominal, parameter.sd)
+    assert parameter.within is not None
+    if nominal <= 0:
+        raise ValueError("within: factor needs a nominal value above 0; give sd: instead")
+    return Prior(nominal, math.log(parameter.within) / QUANTILE, log=True)
+
+
+def _parameter(settings: "FitSettings", name: str, own: ParameterSettings, starts: bool) -> Parameter:
+    known = prior(settings, own)
+    lower, upper = own.bounds or _default_bounds(own, known)
+    start = own.start if own.start is not None else nominal_value(settings, own)
+    start = min(max(start, lower), upper) if starts and start is not None else None
+    log = lower > 0 and (settings.scale == "log" or (known is not None and known.log))
+    return Parameter(name, own.unit, lower, upper, own.fixed, log, start, known)
+
+
+def _default_bounds(own: ParameterSettings, known: Prior | None) -> tuple[float, float]:
+    if known is None:
+        return own.fixed or 0.0, own.fixed or 0.0
+    least = SMALLEST * known.nominal if own.quantity in POSITIVE else 0.0
+    upper = known.value(BOUND_SD)
+    return max(known.value(-BOUND_SD), least), upper

@@ -1,0 +1,114 @@
+"""Settings of parameters: nominal values, priors, the bounds that follow, one parameter per joint."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hydroid import load_settings
+from hydroid.errors import SettingsError
+from hydroid.parameters import Parameter, ParameterSet
+
+
+def parameter(config: str = "fit-hyd", name: str = "A_A", **entry) -> Parameter:
+    """One parameter of a shipped config with other settings."""
+    changes = {f"parameters.{name}": entry}
+    found = load_settings(config, changes).parameter_set()
+    return found.parameters[found.names.index(name)]
+
+
+def test_nominal_values_come_from_the_arm_and_the_hydraulics():
+    area = parameter(quantity="area_a", joints=[2], within=2)
+    assert area.prior is not None
+    assert area.prior.nominal == 1000
+    assert parameter(name="M3", quantity="mass", link="link3", within=2).start == 22.5
+    assert parameter(name="A", quantity="onset_a", joints=[2], sd=0.2).start == 1.4
+    # joints 2 and 3 agree, joint 1 does not
+    assert parameter(quantity="area_a", joints=[2, 3], within=2).start == 1000
+    with pytest.raises(SettingsError, match=r"parameters.A_A: a prior on area_a needs nominal"):
+        parameter(quantity="area_a", joints=[1, 2], within=2)
+    own = parameter(quantity="area_a", joints=[1, 2], nominal=700, within=2)
+    assert own.start == 700
+
+
+def test_within_holds_95_percent_of_a_log_normal_prior():
+    prior = parameter(quantity="area_a", joints=[2], within=2).prior
+    assert prior is not None
+    assert prior.value(1.96) == pytest.approx(2000)
+    assert prior.value(-1.96) == pytest.approx(500)
+    assert prior.score(np.array([1000.0, 2000.0, 500.0])) == pytest.approx([0.0, 1.96, -1.96])
+
+
+def test_bounds_follow_from_the_prior():
+    area = parameter(quantity="area_a", joints=[2], within=2)
+    assert area.upper == pytest.approx(1000 * math.exp(4 * math.log(2) / 1.96))
+    assert area.log
+    wide = parameter(name="A", quantity="onset_a", joints=[2], nominal=1.0, sd=0.5)
+    assert (wide.lower, wide.upper) == (0.0, 3.0)
+    assert not wide.log
+    mass = parameter(name="M3", quantity="mass", link="link3", sd=10)
+    assert mass.lower == pytest.approx(0.225)
+    assert mass.log
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"within": 2, "sd": 1.0}, "not both"),
+        ({"within": 1.0}, "must be above 1"),
+        ({"sd": 0.0}, "must be above 0"),
+        ({"nominal": 3.0}, "needs bounds"),
+        ({"bounds": [10, 20], "nominal": 30}, "nominal 30 lies outside the bounds"),
+        ({"bounds": [10, 20], "start": 30}, "start 30 lies outside the bounds"),
+        ({"bounds": [10, 20], "within": 2}, "nominal value 1000 mm² lies outside the bounds"),
+        ({"nominal": 0.0, "within": 2}, "nominal value above 0"),
+        ({"nominal": -1.0, "sd": 2}, "cannot be negative"),
+        ({"each": True, "within": 2}, "not both"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(entry, words):
+    with pytest.raises(SettingsError, match=words):
+        parameter(quantity="area_a", joints=[2], **entry)
+
+
+def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():
+    changes = {
+        "outputs": [1, 2],
+        "parameters.A_A": {"quantity": "area_a", "each": True, "within": 2},
+        "parameters.A_A_2.within": 1.5,
+        "parameters.C": {"quantity": "onset_b", "each": [2], "bounds": [0.1, 3.0]},
+    }
+    settings = load_settings("fit-hyd", changes)
+    parameters = {p.name: p for p in settings.parameter_set().parameters}
+    assert (parameters["A_A_1"].start, parameters["A_A_2"].start) == (800, 1000)
+    assert parameters["A_A_2"].prior.sd == pytest.approx(math.log(1.5) / 1.96)
+    assert settings.parameters["A_A_1"].joints == (1,)
+    assert settings.parameters["C"].joints == (2,)
+
+
+def test_one_compared_joint_keeps_the_plain_name():
+    entry = {"quantity": "damping", "each": True, "bounds": [1.0, 5.0]}
+    assert load_settings("fit-mech", {"parameters.D": entry}).parameters["D"].joints is None
+    several = load_settings("fit-mech", {"parameters.D": entry, "outputs": [2, 3]}).parameters
+    assert [p.joints for n, p in several.items() if n.startswith("D")] == [(2,), (3,)]
+
+
+def test_a_log_scale_maps_the_unit_box_by_ratios_and_back():
+    parameters = ParameterSet((Parameter("a", "", 0.1, 1000.0, log=True), Parameter("b", "", 0.0, 4.0)))
+    theta = parameters.from_unit(np.array([[0.0, 0.0], [0.25, 0.25], [1.0, 1.0]]))
+    assert theta[:, 0] == pytest.approx([0.1, 1.0, 1000.0])
+    assert theta[-1, 0] == 1000.0
+    assert theta[:, 1] == pytest.approx([0.0, 1.0, 4.0])
+    assert parameters.to_unit(theta)[1] == pytest.approx([0.25, 0.25])
+
+
+def test_a_start_is_stated_clipped_or_in_the_middle_of_the_scale():
+    entry = {"quantity": "area_a", "joints": [2], "bounds": [250.0, 4000.0]}
+    assert parameter(**entry, start=300.0).start == 300
+    low = load_settings(
+        "fit-hyd", {"parameters.A_A": {**entry, "bounds": [1500.0, 4000.0], "nominal": 2000.0}}
+    )
+    assert low.parameter_set().start[low.parameter_set().names.index("A_A")] == 2000
+    plain = load_settings("article-hyd").parameter_set()
+    assert not plain.has_start
+    assert plain.start[plain.names.index("A_A")] == 0.5 * (250 + 2500)

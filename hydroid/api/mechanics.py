@@ -23,7 +23,8 @@ def with_mechanics(
     mechanical parameters where the arm is not the config's.
 
     Args:
-        mech: a run folder of stage 1, or a YAML file of values by name; None: `config` fixes them.
+        mech: a run folder of stage 1, or a YAML file of values by name; None: `config` fixes them, or says
+            what is known of them (a prior or a start), and they are estimated with the others.
         config: settings of stage 2.
         overrides: settings to replace; they have the last word.
         logs: names of the logs' files.
@@ -34,9 +35,10 @@ def with_mechanics(
     changes = dict(overrides)
     if mech is None:
         settings = load(find_config(config), FitSettings, changes)
-        free = [name for name in _mechanical(settings) if settings.parameters[name].fixed is None]
+        parameters = {name: settings.parameters[name] for name in _mechanical(settings)}
+        free = [name for name, p in parameters.items() if p.fixed is None and not p.states_start]
         if free:
-            hint = "give the run of stage 1 with --mech RUN, or set `fixed: VALUE` for each in the config"
+            hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each in the config"
             raise SettingsError(f"stage 2 needs the values of {', '.join(free)} from stage 1", hint=hint)
         return changes
     values, summary = read_values(Path(mech))

@@ -11,6 +11,7 @@ from hydroid.api.look import load_settings, read_with_findings
 from hydroid.api.mechanics import with_mechanics
 from hydroid.api.study import Study
 from hydroid.errors import RunError, SettingsError
+from hydroid.estimate import read_values
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class FitOptions:
         runs: number of runs, with the seeds from `search.seed` on.
         resume: continue the run in the folder, or begin it.
         repair: fill holes of the logs up to `log.repair_s`.
+        start: an estimate from whose values the search starts: a run folder or a YAML file of values.
         dask: where to simulate (`local[:N]`, `slurm`, an address); None: in this process.
         dask_insecure: accept an address without TLS.
         progress: opens what shows the progress of a run, given its settings and a label.
@@ -49,6 +51,7 @@ class FitOptions:
     runs: int = 1
     resume: bool = False
     repair: bool = False
+    start: str | Path | None = None
     dask: str | None = None
     dask_insecure: bool = False
     progress: "Callable[[FitSettings, str], AbstractContextManager[Progress]]" = _silent
@@ -143,6 +146,8 @@ def _fit_files(
     """Fit over one seed or several, from files to run folders."""
     if logs:
         settings = load_settings(config, overrides)
+        if options.start is not None:
+            settings = load_settings(config, _started(settings, Path(options.start)) | overrides)
     else:
         logs, settings = _own_inputs(out, overrides, options)
     folder = Path(out or Path("runs") / f"{Path(logs[0]).stem}-{settings.stage}-{settings.search.name}")
@@ -166,6 +171,15 @@ def _fit_files(
                 )
                 results.append(result)
     return FitRuns(folder, tuple(results), _spread(folder, results) if several else None)
+
+
+def _started(settings: FitSettings, start: Path) -> dict[str, Any]:
+    """Return overrides that start the free parameters at the values of an estimate, which must have one of them."""
+    values, _ = read_values(start)
+    free = [n for n, p in settings.parameters.items() if p.fixed is None]
+    if not set(free) & set(values):
+        raise SettingsError("has a value of none of the free parameters", where=str(start))
+    return {f"parameters.{name}.start": values[name] for name in free if name in values}
 
 
 def _workers(settings: FitSettings, options: FitOptions) -> "AbstractContextManager[Spread | None]":

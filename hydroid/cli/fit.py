@@ -49,6 +49,14 @@ class FitFlags:
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder [default: runs/LOG-STAGE-ALGORITHM].")
     ] = None
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="RUN|YAML",
+            help="Start the search from the values of an estimate: a run folder or a YAML file of values.",
+        ),
+    ] = None
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the stopped run in --out; start it if there is none.")
     ] = False
@@ -107,6 +115,7 @@ class FitFlags:
             runs=self.runs,
             resume=self.resume,
             repair=self.repair,
+            start=self.start,
             dask=self.dask,
             dask_insecure=self.dask_insecure,
             progress=partial(FitProgress, quiet=output.silent),

@@ -6,6 +6,11 @@ to the first quarter of a second, to the first seconds, and then to all of it (a
 fit keeps the longer response near the record. With 27 parameters and starts a factor of 10 off, 30 of 30
 starts reached the noise this way. One in eight of those fitted to the whole record at once ended at the
 stops.
+
+Several hydraulic joints are fitted joint by joint: each start is fitted to every joint alone, while the other joints
+follow their logged motion. A joint has few parameters, which are soon found, and each joint may take another start's.
+What the joints share (masses, the pump) stays at the start's values. Fitting all parameters together is left to the
+refinement that follows the search.
 """
 
 from collections.abc import Callable
@@ -48,10 +53,10 @@ class Multistart:
         progress: Callable[[int, float], None],
         checkpoints: Checkpoints | None = None,
     ) -> None:
-        self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
+        self._problem, self._memo, self._progress = problem, memo, progress
+        self._checkpoints: Checkpoints = {} if checkpoints is None else checkpoints
         self._seed, self._settings = settings.seed, settings.multistart
-        longest = max(log.duration for log in problem.logs)
-        self._parts = [problem.first(h) for h in self._settings.horizons if h < longest]
+        self._joints = problem.lone_joints
 
     def run(
         self,
@@ -86,38 +91,84 @@ class Multistart:
         if number == 0 and self._problem.start is not None:
             unit[0] = self._problem.start
         drawn = self._problem.theta(unit)
-        shortest = self._parts[0] if self._parts else self._problem
+        shortest = self._parts(self._problem)[0]
         return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
 
     def _next(self, state: SearchState | None) -> SearchState:
         """The state after one more start."""
         done = 0 if state is None else len(state.history)
-        settings = RefinementSettings(
-            iterations=self._settings.iterations, gain_tolerance=self._settings.gain_tolerance
-        )
-        theta, simulated, results = self.start(done), 0, list[Refinement]()
-        for part, problem in enumerate([*self._parts, self._problem]):
-            result = refine(
-                problem,
-                theta,
-                settings,
-                lambda n, rms, before=simulated: self._progress(before + n, rms),
-                self._checkpoints,
-                f"start {done + 1} part {part + 1}",
+        theta, simulated = self.start(done), 0 if state is None else int(state.history[-1, 1])
+        if self._joints:
+            theta, simulated = self._each_joint(done, theta, simulated)
+            rows = self._problem.residuals(theta[None])
+            point, rms, simulated = (
+                self._problem.parameters.to_unit(theta[None])[0],
+                _rms(rows),
+                simulated + 1,
             )
-            theta = problem.parameters.from_unit(result.point[None])[0]
-            simulated += result.evaluations
-            results.append(result)
-        result = results[-1]
-        rms = np.sqrt(2 * result.cost / (self._problem.measured.size + len(self._problem.priors)))
-        population = Population(result.point[None], np.array([[rms]]))
+        else:
+            result, simulated = self._over_parts(self._problem, theta, f"start {done + 1}", simulated)
+            size = self._problem.measured.size + len(self._problem.priors)
+            point, rms = result.point, np.sqrt(2 * result.cost / size)
+        population = Population(point[None], np.array([[rms]]))
         history = np.empty((0, len(HISTORY)))
         if state is not None:
             population, history = state.population.join(population), state.history
-            simulated += int(history[-1, 1])
         overall = self._memo.evaluate(self.theta(population)).overall
         finite = overall[np.isfinite(overall)]
         infeasible = int(np.sum(~population.feasible))
         median = np.median(finite) if finite.size else np.inf
         row = [done + 1, simulated, simulated, infeasible, overall.min(), median]
         return SearchState(population, {}, np.vstack([history, row]))
+
+    def _each_joint(self, number: int, theta: Array, simulated: int) -> tuple[Array, int]:
+        """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint.
+
+        Returns the point reached, shape (P,), and the number of simulations so far.
+        """
+        for joint in self._joints:
+            problem = self._problem.alone(joint, theta)
+            result, simulated = self._over_parts(
+                problem, theta, f"start {number + 1} joint {joint}", simulated
+            )
+            own = problem.parameters.free
+            if number + 1 == self._settings.starts:
+                for other in range(number):  # refinements that ended are read, not repeated
+                    name = f"start {other + 1} joint {joint}"
+                    rival, _ = self._over_parts(problem, theta, name, simulated)
+                    result = min(result, rival, key=lambda r: r.cost)
+            theta = theta.copy()
+            theta[own] = problem.parameters.from_unit(result.point[None])[0, own]
+        return theta, simulated
+
+    def _over_parts(
+        self, problem: Problem, theta: Array, name: str, simulated: int
+    ) -> tuple[Refinement, int]:
+        """Fit theta, shape (P,), to growing parts of the records; also returns the simulations so far."""
+        settings = RefinementSettings(
+            iterations=self._settings.iterations, gain_tolerance=self._settings.gain_tolerance
+        )
+        results = list[Refinement]()
+        for number, part in enumerate(self._parts(problem), 1):
+            result = refine(
+                part,
+                theta,
+                settings,
+                lambda n, rms, before=simulated: self._progress(before + n, rms),
+                self._checkpoints,
+                f"{name} part {number}",
+            )
+            theta = part.parameters.from_unit(result.point[None])[0]
+            simulated += result.evaluations
+            results.append(result)
+        return results[-1], simulated
+
+    def _parts(self, problem: Problem) -> list[Problem]:
+        """The problem's first seconds, more and more of them, and at last all of it."""
+        longest = max(log.duration for log in problem.logs)
+        return [*(problem.first(h) for h in self._settings.horizons if h < longest), problem]
+
+
+def _rms(rows: Array) -> float:
+    """Root of the mean square of residuals; inf if they are not finite."""
+    return float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf

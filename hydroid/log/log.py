@@ -27,6 +27,7 @@ class Log:
         angle: [rad], shape (T, J); a column of NaN where unmeasured.
         period: [s].
         pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None: the log has none.
+        rest: samples before the first command of the recording; None: before the first one in `command`.
     """
 
     source: str
@@ -35,6 +36,7 @@ class Log:
     angle: Floats
     period: float
     pressure: Floats | None = None
+    rest: int | None = None
 
     @property
     def joints(self) -> int:
@@ -58,15 +60,23 @@ class Log:
         A simulation starts there, and an error of its start stays in the whole response. A command moves
         nothing before the sample after it; of a log that begins with a command the first sample must do.
         """
-        moving = np.any(self.command != 0, axis=1)
-        rest = int(np.argmax(moving)) if moving.any() else 0
-        resting = self.angle[: min(rest, round(LONGEST_REST / self.period)) + 1]
+        resting = self.angle[: min(self._rest, round(LONGEST_REST / self.period)) + 1]
         return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal angles to the last bit
+
+    @property
+    def _rest(self) -> int:
+        """Samples before the first command."""
+        return int(np.argmax(np.any(self.command != 0, axis=1))) if self.rest is None else self.rest
 
     @property
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
+
+    def driving(self, joint: int) -> "Log":
+        """Return the recording without the commands of all joints but this one (number, from 1)."""
+        command = np.where(np.arange(self.joints) == joint - 1, self.command, 0.0)
+        return replace(self, command=command, rest=self._rest)
 
     def first(self, seconds: float) -> "Log":
         """Return the recording from its start to `seconds` after its first command."""

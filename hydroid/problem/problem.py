@@ -101,6 +101,37 @@ class Problem:
         settings = self.settings.model_copy(update={"objective": objective})
         return Problem(settings, [log.first(seconds) for log in self.logs], self._spread)
 
+    @property
+    def lone_joints(self) -> tuple[int, ...]:
+        """Joints that can be fitted alone, numbered from 1: hydraulic ones with parameters of their own.
+
+        None if there are fewer than two, or if a log does not measure how a driven joint moves.
+        """
+        measured = all(log.measured[log.driven].all() for log in self.logs)
+        joints = tuple(j for j in self.settings.outputs if self._own(j))
+        return joints if self.settings.stage == "hyd" and measured and len(joints) > 1 else ()
+
+    def alone(self, joint: int, theta: Array) -> "Problem":
+        """Return the problem of one joint's own parameters; all other joints follow their logged motion.
+
+        All other parameters are held at theta, shape (P,). Logs that do not drive the joint are left out.
+        """
+        own, values = self._own(joint), self.parameters.mapping(theta)
+        parameters = {
+            n: p if n in own else p.model_copy(update={"fixed": values[n]})
+            for n, p in self.settings.parameters.items()
+        }
+        simulation = self.settings.simulation.model_copy(update={"other_joints": "measured"})
+        changes = {"parameters": parameters, "outputs": (joint,), "simulation": simulation}
+        logs = [log.driving(joint) for log in self.logs if log.driven[joint - 1]]
+        return Problem(self.settings.model_copy(update=changes), logs, self._spread)
+
+    def _own(self, joint: int) -> set[str]:
+        """Names of the free parameters that act on this joint only."""
+        driven = any(log.driven[joint - 1] for log in self.logs)
+        parameters = self.settings.parameters.items()
+        return {n for n, p in parameters if driven and p.fixed is None and p.joints == (joint,)}
+
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to where the priors hold."""
         return self.priors.project(self.priors.searched.from_unit(unit))

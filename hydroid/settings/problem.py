@@ -192,6 +192,8 @@ class ObjectiveSettings(Settings):
     relative: bool = False
     """divide by the norm of the measured output of the same segment, equation (19)"""
     segments: SegmentSettings = SegmentSettings(equal=8)
+    count: Literal["samples", "logs"] = "samples"
+    """samples: every sample counts the same; logs: every log counts the same, however long"""
     weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
     pressure_weight: NotNegative = 0.0

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than 1e-6 of a radian"""
+HEAVIEST = 1e4
+"""times the largest inertia of the arm: the armature of a machine that is heavier"""
 SERVO = 10.0
 """natural frequency of the servo [rad/s], slow against a step and fast against drift"""
 
@@ -40,11 +42,12 @@ class Prescribed:
         columns: NDArray[np.intp],
         settings: SimulationSettings,
     ) -> None:
-        model.dof_armature[columns] = ARMATURE
+        armature = max(ARMATURE, HEAVIEST * float(model.dof_M0.max()))
+        model.dof_armature[columns] = armature
         model.qpos_spring[columns] = 0.0
         model.jnt_limited[columns] = False  # the machine's own stops are in the log
         self.columns = columns
-        self.damping, self.stiffness = 2 * SERVO * ARMATURE, SERVO**2 * ARMATURE
+        self.damping, self.stiffness = 2 * SERVO * armature, SERVO**2 * armature
         step = log.period / settings.steps_per_sample
         motion = smooth(log.angle[:, joints], settings.measured_cutoff_hz * log.period)
         samples = np.arange((len(motion) - 1) * settings.steps_per_sample + 1) * step
@@ -53,7 +56,7 @@ class Prescribed:
         acceleration = np.diff(velocity, axis=0) / step
         # semi-implicit Euler: the step from k to k+1 has the new velocity and the old angle
         self.torque: Array = (
-            ARMATURE * acceleration + self.damping * velocity[1:] + self.stiffness * fine[:-1]
+            armature * acceleration + self.damping * velocity[1:] + self.stiffness * fine[:-1]
         )
 
 

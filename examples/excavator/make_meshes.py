@@ -11,8 +11,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "meshes"))
 
-from shapes import both, box, canonical, join, plate, rod  # noqa: E402
-from trimesh import Trimesh  # noqa: E402
+from shapes import both, box, canonical, join, plate, rod
+from trimesh import Trimesh
 
 
 def base() -> Trimesh:

@@ -38,7 +38,7 @@ def with_mechanics(
         parameters = {name: settings.parameters[name] for name in _mechanical(settings)}
         free = [name for name, p in parameters.items() if p.fixed is None and not p.states_start]
         if free:
-            hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each in the config"
+            hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
             raise SettingsError(f"stage 2 needs the values of {', '.join(free)} from stage 1", hint=hint)
         return changes
     values, summary = read_values(Path(mech))

@@ -174,7 +174,7 @@ def _fit_files(
 
 
 def _started(settings: FitSettings, start: Path) -> dict[str, Any]:
-    """Return overrides that start the free parameters at the values of an estimate, which must have one of them."""
+    """Return overrides that start the free parameters at the values of an estimate, which must have one."""
     values, _ = read_values(start)
     free = [n for n, p in settings.parameters.items() if p.fixed is None]
     if not set(free) & set(values):

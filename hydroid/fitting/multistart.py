@@ -7,10 +7,10 @@ fit keeps the longer response near the record. With 27 parameters and starts a f
 starts reached the noise this way. One in eight of those fitted to the whole record at once ended at the
 stops.
 
-Several hydraulic joints are fitted joint by joint: each start is fitted to every joint alone, while the other joints
-follow their logged motion. A joint has few parameters, which are soon found, and each joint may take another start's.
-What the joints share (masses, the pump) stays at the start's values. Fitting all parameters together is left to the
-refinement that follows the search.
+Several hydraulic joints are fitted joint by joint: each start is fitted to every joint alone, while the other
+joints follow their logged motion. A joint has few parameters, which are soon found, and each joint may take
+another start's. What the joints share (masses, the pump) stays at the start's values. Fitting all parameters
+together is left to the refinement that follows the search.
 """
 
 from collections.abc import Callable

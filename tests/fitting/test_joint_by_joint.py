@@ -73,7 +73,7 @@ def test_a_lone_joint_moves_as_with_all_others():
 
 
 def test_the_start_pose_is_the_recordings_not_the_joints():
-    """Joint 3 rests for 1.2 s more than joint 2: its lone log must not start from the mean of joint 2's motion."""
+    """Joint 3 rests for longer than joint 2: its lone log must not start amid joint 2's motion."""
     _, log = make(noise_deg=0.1)
     log = replace(log, command=log.command * (np.arange(650) >= 120)[:, None] ** (np.arange(7) == 2))
     np.testing.assert_array_equal(log.driving(3).start, log.start)

@@ -83,17 +83,19 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
 def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
     """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own."""
     area = opening(displacement, c)
-    ahead, back = c.leakage, c.leakage  # pump to A and B to tank, pump to B and A to tank
+    pump_a, tank_a, pump_b, tank_b = c.leakage, c.leakage, c.leakage, c.leakage
     if displacement > 0.0:
-        ahead += area
+        pump_a += area
+        tank_b += area * c.return_b
     else:
-        back += area
+        pump_b += area
+        tank_a += area * c.return_a
     # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
     w.filled_a = 1.0 if w.pressure_a > c.vapour_pressure else 0.0
     w.filled_b = 1.0 if w.pressure_b > c.vapour_pressure else 0.0
     w.pushing_a, w.pushing_b = max(w.pressure_a, c.vapour_pressure), max(w.pressure_b, c.vapour_pressure)
-    w.inflow_a, w.relief_a, w.pumped_a, w.give_a = port_flow(w.pushing_a, supply, ahead, back, c)
-    w.inflow_b, w.relief_b, w.pumped_b, w.give_b = port_flow(w.pushing_b, supply, back, ahead, c)
+    w.inflow_a, w.relief_a, w.pumped_a, w.give_a = port_flow(w.pushing_a, supply, pump_a, tank_a, c)
+    w.inflow_b, w.relief_b, w.pumped_b, w.give_b = port_flow(w.pushing_b, supply, pump_b, tank_b, c)
 
 
 @compilable

@@ -9,6 +9,10 @@ to the tank; the article prints x > 0 only. Its law Q = C_q A sgn(Δp) √(2|Δp
 The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each direction with its own A_max,
 overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
 to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
+
+The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and B→T
+as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while the other
+chamber fills from the tank through an anti-cavitation check valve.
 """
 
 from typing import Any
@@ -26,7 +30,7 @@ def spool(stroke_a: Any, stroke_b: Any) -> Any:
 
 @compilable
 def opening(spool: Any, c: Any) -> Any:
-    """Opening A(x) of both metering edges [m²], without leakage, at x [m]; x > 0 opens towards A."""
+    """Opening A(x) of the pump's edge [m²], without leakage, at x [m]; x > 0 opens P→A, x < 0 P→B."""
     towards_a = spool > 0.0
     beyond = np.abs(spool) - select(towards_a, c.overlap_a, c.overlap_b)
     slot = select(towards_a, c.slot_width_a, c.slot_width_b)
@@ -63,5 +67,6 @@ def port_flow(pressure: Any, supply: Any, pump_area: Any, tank_area: Any, c: Any
     limited = (pumped >= c.flow_limit) | (pumped < c.backflow)
     pumped = np.maximum(np.minimum(pumped, c.flow_limit), c.backflow)
     pumped_slope = select(limited, 0.0, pumped_slope)
-    drained = c.conductance * tank_area
+    filling = select(pressure < c.tank_pressure, c.anticavitation, 0.0)
+    drained = c.conductance * (tank_area + filling)
     return pumped - drained * out, pumped_slope + drained * out_slope, pumped, pumped_slope

@@ -89,6 +89,15 @@ class HydraulicSettings(Settings):
         "1: opening proportional to spool travel; above 1: it grows faster towards the end; towards A",
     )
     opening_exponent_b: Positive = _quantity(1.0, "", "the same towards B")
+    return_a: Positive = _quantity(
+        1.0, "", "opening of edge A→T as a multiple of edge P→B's; both open for a motion towards B"
+    )
+    return_b: Positive = _quantity(1.0, "", "opening of edge B→T as a multiple of edge P→A's")
+    anticavitation: NotNegative = _quantity(
+        0.0,
+        "mm²",
+        "opening of the check valve that fills a chamber from the tank where it lacks oil; 0: none",
+    )
     leakage: NotNegative = _quantity(1e-4, "mm²", "leakage area of every metering edge, open or shut")
     flow_coefficient: Positive = _quantity(0.7, "", "C_q of equation (7)")
     transition_pressure: Positive = _quantity(0.2, "bar", "pressure drop below which flow is laminar")

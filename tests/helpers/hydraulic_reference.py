@@ -157,13 +157,11 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
                 v["opening_a" if spool > 0 else "opening_b"]
                 * share ** v["opening_exponent_a" if spool > 0 else "opening_exponent_b"]
             )
-            ahead, back = (
-                v["leakage"] + (area if spool > 0 else 0),
-                v["leakage"] + (area if spool <= 0 else 0),
-            )
-            in_a, in_b = (max(flow(a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
-            qa = in_a - flow(back, pa - pt)
-            qb = in_b - flow(ahead, pb - pt)
+            ahead, back = (area, 0.0) if spool > 0 else (0.0, area)
+            in_a, in_b = (max(flow(v["leakage"] + a, ps - p), backflow) for a, p in ((ahead, pa), (back, pb)))
+            fill_a, fill_b = (v["anticavitation"] if p < pt else 0.0 for p in (pa, pb))
+            qa = in_a - flow(v["leakage"] + back * v["return_a"] + fill_a, pa - pt)
+            qb = in_b - flow(v["leakage"] + ahead * v["return_b"] + fill_b, pb - pt)
             rise = 0.0
             if pump < inf:
                 left = v["supply_pressure"] - ps

@@ -139,6 +139,7 @@ def test_port_flow_against_equation_7_and_its_limit():
         transition_pressure=0.2e5,
         flow_limit=np.inf,
         backflow=-np.inf,
+        anticavitation=0.0,
     )
     flow, slope, pumped, _ = port_flow(50e5, 150e5, 0.4e-6, 0.0, c)
     assert pumped == flow

@@ -19,7 +19,7 @@ def test_every_setting_is_described():
 
 
 def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
-    assert len(QUANTITIES) == 45
+    assert len(QUANTITIES) == 48
     arm = {"area_a", "area_b", "opening_a", "opening_b"}
     other = {"rotary_volume", "start_pressure", "substeps"}
     assert set(QUANTITIES) - arm == set(HydraulicSettings.model_fields) - other

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydroid.hydraulics import kernel
-from hydroid.hydraulics.cylinder import holding_pressures, oil_pressure, triangle, volume
+from hydroid.hydraulics.cylinder import GIVE, holding_pressures, oil_pressure, triangle, volume
 from hydroid.hydraulics.records import JOINT_STATE, LINEAR, NONE, Array, Records, coefficients
 from hydroid.hydraulics.solenoid import resting_stroke
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -59,7 +59,7 @@ class Actuator:
         linkages: from `records.linkages`, shape (J,).
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
-        settings: for the sub-steps and the start pressure.
+        settings: for the sub-steps.
         entries: where M[i, j] stands in a row of `mass`, shape (J, J); by default rows are whole matrices.
     """
 
@@ -86,18 +86,21 @@ class Actuator:
             period=period,
             substeps=settings.substeps,
         )
-        self._level = 1e5 * settings.start_pressure
         self._history = 2 + int(np.ceil(max(parameters.delay_a.max(), parameters.delay_b.max()) / period))
 
     def start(self, angle: Array, torque: Array) -> ActuatorState:
         """Return the state at rest at `angle` [rad], with the plungers' coils at I_min.
 
-        The torque g(q) [N·m] is what the actuators must hold; both have the shape (n, J).
+        The torque g(q) [N·m] is what the actuators must hold, or what a joint rests on where oil is trapped;
+        both have the shape (n, J).
         """
         c = self.plugin.coefficients
-        force = torque / np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
-        limits = c["supply_pressure"], c["tank_pressure"]
-        pressure_a, pressure_b = holding_pressures(force, c["area_a"], c["area_b"], *limits, self._level)
+        lever = np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
+        limits, areas, level = (c["supply_pressure"], c["tank_pressure"]), (c["area_a"], c["area_b"]), c["start_pressure"]
+        pressure_a, pressure_b = holding_pressures(torque / lever, *areas, *limits, level)
+        rests = np.isfinite(c["trapped_pressure"]) & (c["kind"] != NONE)
+        pressure_a = np.where(rests, c["trapped_pressure"], pressure_a)
+        pressure_b = np.where(rests, level, pressure_b)
         fill_a, fill_b = _fills(c, angle)
         z = np.zeros(self.shape, JOINT_STATE)
         z["oil_a"] = pressure_a + c["bulk_modulus"] * fill_a
@@ -105,6 +108,8 @@ class Actuator:
         rest = resting_stroke(c["coil"] * c["current_min"] ** 2, c["gap"], c["plunger_stiffness"])
         z["stroke_a"] = z["stroke_b"] = rest
         z["hold"], z["external"] = torque, -torque
+        carried = np.where(rests, torque - lever * (areas[0] * pressure_a - areas[1] * pressure_b), 0.0)
+        z["contact"], z["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE
         z["line"], z["share"] = c["relief"], c["pump_idle"]
         return ActuatorState(z, np.zeros((self._history, self.shape[1])))
 

@@ -21,6 +21,8 @@ from hydroid.settings import linkage
 
 SLIDING = 1e-3
 """speed [m/s, or rad/s] above which dry friction is nearly full; ours"""
+GIVE = 5e-4
+"""what a joint's rest gives under the load that it carries at the start [rad]; ours"""
 SMALLEST = 0.1
 """part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
 
@@ -54,6 +56,15 @@ def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
 def friction_damping(speed: Any, friction: Any) -> Any:
     """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
     return friction / np.sqrt(speed * speed + SLIDING * SLIDING)
+
+
+@compilable
+def contact_torque(depth: Any, contact: Any) -> Any:
+    """Torque [N·m] of what a joint rests on, at the angle [rad] left until they part.
+
+    The stiffness `contact` [N·m/rad] is below 0, and so is the angle, if it holds the joint from above.
+    """
+    return np.abs(contact) * select(depth * contact > 0.0, depth, 0.0)
 
 
 def holding_pressures(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.cylinder import friction_damping, stop_damping, triangle, volume
+from hydroid.hydraulics.cylinder import contact_torque, friction_damping, stop_damping, triangle, volume
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
 from hydroid.hydraulics.solenoid import coil_current, plunger_step, plunger_weight, side_voltage
@@ -99,7 +99,7 @@ def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
 
 
 @compilable
-def load(c: Any, w: Any, damping: float, step: float) -> None:
+def load(c: Any, z: Any, w: Any, damping: float, step: float) -> None:
     """Torque, oil stiffness and resistance of the sub-step, with both chambers eliminated."""
     turn = w.way + 0.5 * step * w.speed
     arm = w.arm + w.slope * turn
@@ -120,8 +120,15 @@ def load(c: Any, w: Any, damping: float, step: float) -> None:
     w.stiffness = (
         w.filled_a * w.lever_a * w.lever_a * w.rise_a + w.filled_b * w.lever_b * w.lever_b * w.rise_b
     )
+    rest = 0.0
+    if z.contact != 0.0:
+        rest = contact_torque(z.stop - z.angle - w.way, z.contact)
+        if rest != 0.0:
+            w.stiffness += step * abs(z.contact)
+            if z.contact * w.speed < 0.0:  # further in: damped, so that it does not bounce
+                w.drag += 2.0 * np.sqrt(abs(z.contact) * w.inertia)
     w.weight = implicit_weight(max(np.sqrt(step * w.stiffness / w.inertia), step * w.drag / w.inertia))
-    w.push = w.lever_a * w.pushing_a - w.lever_b * w.pushing_b
+    w.push = rest + w.lever_a * w.pushing_a - w.lever_b * w.pushing_b
     w.push += w.weight * (
         w.filled_a * w.lever_a * w.rise_a * w.inflow_a - w.filled_b * w.lever_b * w.rise_b * w.inflow_b
     )

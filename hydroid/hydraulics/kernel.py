@@ -175,7 +175,7 @@ def look_ahead(
             if a >= idle:
                 supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
                 meter(c, w, move_spool(c, z, w, i, step), supply)
-                load(c, w, damping[candidate, j], step)
+                load(c, z, w, damping[candidate, j], step)
                 if shared:
                     draw(line, c, w)
             resistance = w.weight * w.stiffness + w.drag

@@ -3,7 +3,7 @@
 A population's parameters are a record array, shape (n, J), with one field per quantity of
 `hydroid.settings.hydraulics` in SI: `parameters.area_a` is an array, shape (n, J), and `parameters[i, j]`
 one actuator. Of a rotary actuator area_a and area_b are displacements [m³/rad], dead_volume is the constant
-volume of a chamber, and dry_friction a torque [N·m]. flow_limit and pump_flow are inf where there is none.
+volume of a chamber, and dry_friction a torque [N·m]. Quantities that may be null are inf where they are.
 """
 
 import math
@@ -48,6 +48,9 @@ JOINT_STATE = np.dtype(
         "external hold "  # torque e that is neither oil nor damping; torque that held the start pose [N·m]
         "angle velocity "  # at the start of the step [rad, rad/s]
         "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
+        # contact with what the joint rests on at the start: stiffness, below 0 if it holds from above [N·m/rad],
+        # and angle at which it ends [rad]
+        "contact stop "
         # of the pump, the same at all joints: pressure of its line [Pa], its φ, time of the demand [s]
         "line share demand"
     )

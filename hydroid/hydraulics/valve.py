@@ -10,9 +10,9 @@ The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each di
 overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
 to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
 
-The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and B→T
-as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while the other
-chamber fills from the tank through an anti-cavitation check valve.
+The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
+B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
+the other chamber fills from the tank through an anti-cavitation check valve.
 """
 
 from typing import Any

@@ -134,13 +134,20 @@ class HydraulicSettings(Settings):
     stop_penetration: NotNegative = _quantity(
         1e10, "N·s/m²", "K_p of equation (9): force of the end stops per penetration and speed"
     )
+    start_pressure: Positive = _quantity(
+        50.0, "bar", "pressure in B at the start, as far as both chambers can then hold the arm; a log's own replaces it"
+    )
+    trapped_pressure: NotNegative | None = _quantity(
+        None,
+        "bar",
+        "pressure in A at the start of a joint that rests on a stop, which carries the rest of the load; null: the "
+        "oil carries all of it",
+    )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
     delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
-    start_pressure: Positive = 50.0
-    """pressure on the rod side at the start, where static balance leaves it open [bar]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3
     """sub-steps of valves and oil in one MuJoCo step"""
 

@@ -19,9 +19,9 @@ def test_every_setting_is_described():
 
 
 def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
-    assert len(QUANTITIES) == 48
+    assert len(QUANTITIES) == 50
     arm = {"area_a", "area_b", "opening_a", "opening_b"}
-    other = {"rotary_volume", "start_pressure", "substeps"}
+    other = {"rotary_volume", "substeps"}
     assert set(QUANTITIES) - arm == set(HydraulicSettings.model_fields) - other
     assert all(q.meaning for q in QUANTITIES.values())
     assert QUANTITIES["flow_limit"].factor == 1e-3 / 60

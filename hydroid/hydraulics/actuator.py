@@ -96,8 +96,9 @@ class Actuator:
         """
         c = self.plugin.coefficients
         lever = np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
-        limits, areas, level = (c["supply_pressure"], c["tank_pressure"]), (c["area_a"], c["area_b"]), c["start_pressure"]
-        pressure_a, pressure_b = holding_pressures(torque / lever, *areas, *limits, level)
+        area_a, area_b, level = c["area_a"], c["area_b"], c["start_pressure"]
+        limits = c["supply_pressure"], c["tank_pressure"]
+        pressure_a, pressure_b = holding_pressures(torque / lever, area_a, area_b, *limits, level)
         rests = np.isfinite(c["trapped_pressure"]) & (c["kind"] != NONE)
         pressure_a = np.where(rests, c["trapped_pressure"], pressure_a)
         pressure_b = np.where(rests, level, pressure_b)
@@ -108,7 +109,7 @@ class Actuator:
         rest = resting_stroke(c["coil"] * c["current_min"] ** 2, c["gap"], c["plunger_stiffness"])
         z["stroke_a"] = z["stroke_b"] = rest
         z["hold"], z["external"] = torque, -torque
-        carried = np.where(rests, torque - lever * (areas[0] * pressure_a - areas[1] * pressure_b), 0.0)
+        carried = np.where(rests, torque - lever * (area_a * pressure_a - area_b * pressure_b), 0.0)
         z["contact"], z["stop"] = carried / GIVE, angle + np.sign(carried) * GIVE
         z["line"], z["share"] = c["relief"], c["pump_idle"]
         return ActuatorState(z, np.zeros((self._history, self.shape[1])))

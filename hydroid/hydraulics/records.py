@@ -38,7 +38,7 @@ LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
 joint angle 0 [rad]; cylinder length with the rod fully in [m], as at the joint's lower limit; stroke [m]"""
 
 COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance backflow relief")])
-"""what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them:
+"""what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them;
 backflow is the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
 
 JOINT_STATE = np.dtype(
@@ -48,7 +48,7 @@ JOINT_STATE = np.dtype(
         "external hold "  # torque e that is neither oil nor damping; torque that held the start pose [N·m]
         "angle velocity "  # at the start of the step [rad, rad/s]
         "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
-        # contact with what the joint rests on at the start: stiffness, below 0 if it holds from above [N·m/rad],
+        # contact with what the joint rests on at the start: stiffness, below 0 if from above [N·m/rad],
         # and angle at which it ends [rad]
         "contact stop "
         # of the pump, the same at all joints: pressure of its line [Pa], its φ, time of the demand [s]

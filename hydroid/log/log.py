@@ -60,8 +60,16 @@ class Log:
         A simulation starts there, and an error of its start stays in the whole response. A command moves
         nothing before the sample after it; of a log that begins with a command the first sample must do.
         """
-        resting = self.angle[: min(self._rest, round(LONGEST_REST / self.period)) + 1]
-        return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal angles to the last bit
+        return self._at_rest(self.angle)
+
+    @property
+    def start_pressure(self) -> Floats | None:
+        """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
+        return None if self.pressure is None else self._at_rest(self.pressure)
+
+    def _at_rest(self, signal: Floats) -> Floats:
+        resting = signal[: min(self._rest, round(LONGEST_REST / self.period)) + 1]
+        return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal values to the last bit
 
     @property
     def _rest(self) -> int:

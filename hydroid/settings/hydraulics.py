@@ -135,13 +135,15 @@ class HydraulicSettings(Settings):
         1e10, "N·s/m²", "K_p of equation (9): force of the end stops per penetration and speed"
     )
     start_pressure: Positive = _quantity(
-        50.0, "bar", "pressure in B at the start, as far as both chambers can then hold the arm; a log's own replaces it"
+        50.0,
+        "bar",
+        "pressure in B at the start, if both chambers can hold the arm then; a log's replaces it",
     )
     trapped_pressure: NotNegative | None = _quantity(
         None,
         "bar",
-        "pressure in A at the start of a joint that rests on a stop, which carries the rest of the load; null: the "
-        "oil carries all of it",
+        "pressure in A at the start of a joint that rests on a stop, which carries what A and B do not; null: "
+        "the oil carries all; a log's replaces it",
     )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
     delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")

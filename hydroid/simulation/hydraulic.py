@@ -79,13 +79,21 @@ class ArmActuators:
         self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
         self._period, self._settings = locked.model.opt.timestep, settings
 
-    def start(self, candidates: Candidates, pose: Array, balance: Array) -> tuple[Actuator, ActuatorState]:
+    def start(
+        self, candidates: Candidates, pose: Array, balance: Array, pressure: Array | None = None
+    ) -> tuple[Actuator, ActuatorState]:
         """Return the actuators of n candidates, with a force-stroke curve each, and their state at rest.
 
         `pose` is the moving joints' [rad], shape (V,); `balance` holds them there [N·m], shape (n, V).
+        Chamber pressures measured there [Pa], shape (V, 2), NaN where there are none, replace theirs.
         """
         assert candidates.actuators is not None
         chosen: Records = candidates.actuators[:, self.joints]  # pyright: ignore[reportAssignmentType]
+        if pressure is not None:
+            trapped, level = pressure[self.columns].T
+            rests = np.isfinite(chosen.trapped_pressure) & np.isfinite(trapped)
+            chosen["trapped_pressure"] = np.where(rests, trapped, chosen.trapped_pressure)
+            chosen["start_pressure"] = np.where(np.isfinite(level), level, chosen.start_pressure)
         damping = candidates.damping[:, self.joints]
         actuator = Actuator(chosen, self._linkages, damping, self._period, self._settings, self._entries)
         angle = np.tile(pose[self.columns], (len(balance), 1))
@@ -180,7 +188,8 @@ class HydraulicSimulation:
         """Balance all candidates, one after another, on one arm."""
         values, pose = self.scenario.values(candidates), self.scenario.arm.pose
         balance = np.array([arm.start(values, row, pose) for row in range(len(candidates))])
-        return _Start(values, *self._actuators.start(candidates, pose, balance))
+        started = self._actuators.start(candidates, pose, balance, self.scenario.pressure)
+        return _Start(values, *started)
 
     def _follow(
         self, arm: HydraulicArm, start: _Start, row: int, *, observe: bool

@@ -67,6 +67,8 @@ class Scenario:
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
         prescribed: the joints that follow the log, if any.
+        pressure: in which the moving joints' chambers rest at the start [Pa], shape (V, 2), NaN where the log
+            has none.
     """
 
     def __init__(
@@ -81,6 +83,8 @@ class Scenario:
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
         self.command = np.repeat(log.command[:-1, moving], settings.steps_per_sample, axis=0)
+        start = log.start_pressure
+        self.pressure = np.full((len(self.arm.columns), 2), np.nan) if start is None else start[moving]
         self.prescribed = None
         if settings.other_joints == "measured" and not self.active.all():
             follows = np.flatnonzero(~self.active)

@@ -1,0 +1,96 @@
+"""How a machine stood: oil trapped in the chambers, a stop that carries the rest, pressures from the log."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hydraulic_reference import CYLINDER, START, parameters, simulate
+from recovery import assert_recovered, duties, recover, settings_of
+
+from hydroid.arm.model import load_model
+from hydroid.hydraulics.cylinder import triangle
+from hydroid.problem.problem import make_simulation
+from hydroid.problem.stage import Stage
+from hydroid.settings.hydraulics import HydraulicSettings
+
+TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
+
+
+def dead_time(command: float, trapped: float | None) -> float:
+    """Time [s] until the shoulder has moved by 0.1 deg."""
+    values = {} if trapped is None else {"trapped_pressure": trapped}
+    angle = simulate(parameters(TIGHT, dead_volume=200.0, **values), np.full(200, command), TIGHT)[0]
+    return 0.01 * float(np.argmax(abs(angle - START) > np.radians(0.1)))
+
+
+@pytest.mark.parametrize("trapped", [0.0, 5.0, 30.0])
+def test_a_joint_stands_on_its_stop_whatever_is_trapped(trapped: float):
+    angle = simulate(parameters(TIGHT, trapped_pressure=trapped), np.zeros(1000), TIGHT)
+    assert abs(angle - START).max() < 1e-9
+
+
+def test_the_oil_must_first_be_pressed():
+    """The flow of the valve compresses the trapped oil until it carries the load: V Δp / β."""
+    seen: list = []
+    p = parameters(TIGHT, trapped_pressure=5.0)
+    angle = simulate(p, np.full(200, 30.0), TIGHT, observe=seen)[0]
+    moved = int(np.argmax(angle - START > np.radians(0.1)))
+    pressure = np.array([o.pressure[0, 0, 0] for o, _ in seen])[:moved]
+    flow = np.array([o.flow[0, 0, 0] for o, _ in seen])[:moved]
+    ends = triangle(angle[[0, moved]], *(float(CYLINDER[k][0]) for k in ("a", "b", "theta0", "shortest")))[0]
+    compressed = (30e-6 + 1e-3 * ends[0]) * (pressure[-1] - 5e5) / 8e8
+    swept = 1e-3 * (ends[1] - ends[0])
+    assert 0.01 * flow.sum() == pytest.approx(compressed + swept, rel=0.05)
+    assert compressed > 3 * swept
+
+
+def test_dead_time_depends_on_the_command_only_where_oil_is_trapped():
+    slow, fast = dead_time(20.0, 1.0), dead_time(100.0, 1.0)
+    assert slow > 2 * fast
+    assert dead_time(20.0, None) < 0.5 * slow
+
+
+def test_a_stop_lets_go_and_holds_again():
+    """Up from the stop, down onto it: the joint comes to rest where it began."""
+    command = np.repeat([60.0, -60.0], [100, 400])
+    angle = simulate(parameters(TIGHT, trapped_pressure=5.0), command, TIGHT)[0]
+    assert angle.max() - START > np.radians(3)
+    assert angle.min() - START > -np.radians(0.2)
+    assert abs(angle[-50:] - START).max() < np.radians(0.2)
+    assert abs(np.diff(angle[-50:])).max() < 1e-5
+    free = simulate(parameters(TIGHT), command, TIGHT)[0]
+    assert free[-1] < START - np.radians(1)
+
+
+def test_more_than_the_load_presses_against_a_stop_above():
+    up, down = ([u] * 100 for u in (60.0, -60.0))
+    p = parameters(TIGHT, trapped_pressure=140.0)
+    assert simulate(p, np.array(up), TIGHT)[0].max() - START < np.radians(0.2)
+    assert simulate(p, np.array(down), TIGHT)[0].min() - START < -np.radians(1)
+
+
+def test_a_log_says_in_which_pressures_it_rested():
+    settings = settings_of(
+        {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
+    )
+    log = duties(settings.arm.pose("study"), {2: [0, 50]})
+    pressure = np.full((len(log.time), 7, 2), np.nan)
+    pressure[:, 1] = 12e5, 3e5
+    spec, stage = load_model(settings.arm.model, settings.arm), Stage(settings)
+    for measured, wanted in ((None, (40e5, 50e5)), (pressure, (12e5, 3e5))):
+        simulation = make_simulation(spec, replace(log, pressure=measured), [1], settings, [1])
+        response = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, 40.0]])))
+        assert response.pressure is not None
+        np.testing.assert_allclose(response.pressure[0, 0, 0], wanted)
+
+
+def test_trapped_pressure_is_recovered():
+    truth = {"trapped": 25.0, "volume": 60.0}
+    parameters = {
+        "trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 100.0]},
+        "volume": {"quantity": "dead_volume", "joints": [2], "bounds": [5.0, 300.0]},
+    }
+    settings = settings_of(parameters)
+    logs = [duties(settings.arm.pose("study"), {2: [u]}) for u in (25, 50, 100)]
+    start = {"trapped": 10.0, "volume": 40.0}
+    assert_recovered(recover(settings, logs, truth, start), settings, truth)

@@ -142,7 +142,7 @@ class HydraulicSettings(Settings):
     trapped_pressure: NotNegative | None = _quantity(
         None,
         "bar",
-        "pressure in A at the start of a joint that rests on a stop, which carries what A and B do not; null: "
+        "pressure in A at the start of a joint on a stop, which carries what A and B do not; null: "
         "the oil carries all; a log's replaces it",
     )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")

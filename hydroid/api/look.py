@@ -145,6 +145,8 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
 
         hydroid.plot_actuator("runs/hyd", joint=2)
 
+    The curves of a fit have bands, their 95 % intervals.
+
     Args:
         model: of stage 2: a run folder, a YAML file of values or an identified model.
         joint: numbered from 1.
@@ -160,11 +162,15 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
     model = open_model(model)
     _require_hydraulics(model)
     from hydroid.problem.stage import Stage
-    from hydroid.report.actuator_report import actuator_page, joint_actuator
+    from hydroid.quantities.delta import stored_precision
+    from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
     from hydroid.report.page import write_page
 
-    candidate = Stage(model.settings).candidates(model.theta[None])
-    actuator = joint_actuator(model.settings.arm, candidate, joint, model.source)
+    stage, arm = Stage(model.settings), model.settings.arm
+    actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)
+    if (precision := stored_precision(model)) is not None:
+        known = KnownActuator(precision, lambda theta: joint_records(arm, stage.candidates(theta), joint))
+        actuator = replace(actuator, known=known)
     return write_page(actuator_page(actuator), Path(out))
 
 

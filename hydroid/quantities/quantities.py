@@ -8,9 +8,9 @@ import numpy as np
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
+from hydroid.quantities.bench import Bench, make_bench
 from hydroid.quantities.column import SIGNS, Column, Measure, Measured
 from hydroid.quantities.delta import Known, Precision, precision
-from hydroid.quantities.joint import TestedJoint, tested_joint
 from hydroid.quantities.speeds import SpeedTests
 from hydroid.quantities.statics import gain_model, gravity, oil
 from hydroid.simulation import Candidates
@@ -39,8 +39,8 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     scalars: dict[str, QuantityEstimate] = {}
     curves: dict[str, CurveEstimate] = {}
     for joint in problem.active_joints:
-        tested = tested_joint(problem.settings, problem.logs, joint)
-        measure = joint_measure(tested, estimate)
+        bench = make_bench(problem.settings, problem.logs, joint)
+        measure = joint_measure(bench, estimate)
         columns = [column for column, _ in measure(estimate)]
 
         def values(theta: Array, measure: Measure = measure) -> Array:
@@ -62,21 +62,21 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     return Quantities(scalars, curves, known)
 
 
-def joint_measure(tested: TestedJoint, estimate: Candidates) -> Measure:
+def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     """Return what computes the quantities of one joint; test movements are planned at the estimate."""
-    if tested.settings.stage == "mech":
-        return lambda candidates: [*gain_model(tested, candidates), *gravity(tested, candidates)]
-    torque = float(tested.weigh(estimate, np.array([tested.angle]))[0][0, 0])
+    if bench.settings.stage == "mech":
+        return lambda candidates: [*gain_model(bench, candidates), *gravity(bench, candidates)]
+    torque = float(bench.weigh(estimate, np.array([bench.angle]))[0][0, 0])
     words = ("raising", "lowering") if torque > 0 else ("lowering", "raising")
     words = words if abs(torque) >= LEAST_GRAVITY else SIGNS
     tests = [
-        SpeedTests(tested, estimate, sign, named)
+        SpeedTests(bench, estimate, sign, named)
         for sign, named in zip((1.0, -1.0), zip(SIGNS, words, strict=True), strict=True)
     ]
 
     def measure(candidates: Candidates) -> Measured:
         moved = [pair for test in tests for pair in test.measure(candidates)]
-        return [*moved, *oil(tested, candidates), *gravity(tested, candidates)]
+        return [*moved, *oil(bench, candidates), *gravity(bench, candidates)]
 
     return measure
 

@@ -3,13 +3,13 @@
 import numpy as np
 
 from hydroid.parameters import Array
+from hydroid.quantities.bench import Bench
 from hydroid.quantities.column import Column, Measured
-from hydroid.quantities.joint import TestedJoint
 from hydroid.quantities.movement import Movement, movement
 from hydroid.quantities.statics import actuator
 from hydroid.simulation import Candidates
 
-COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0)
+COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 """of the curve of speed [%]"""
 GAIN = (40.0, 60.0)
 """commands between which the gain is taken [%]"""
@@ -29,22 +29,20 @@ reach the second"""
 class SpeedTests:
     """Test movements of one joint in one direction.
 
-    They are planned at the estimate: each passes the joint's angle at its end.
+    They are planned so that the estimate passes the joint's angle at their end.
 
     Args:
-        tested: the joint.
+        bench: the joint.
         estimate: one candidate.
         sign: of the commands.
         words: ends the names of the quantities, and their labels.
     """
 
-    def __init__(
-        self, tested: TestedJoint, estimate: Candidates, sign: float, words: tuple[str, str]
-    ) -> None:
-        self._tested, self._sign, self._words = tested, sign, words
-        self._steps = {u: movement(tested, sign * u).through_pose(estimate) for u in COMMANDS}
-        low, high = tested.travel
-        poses = [tested.at(low + part * (high - low)) for part in POSES]
+    def __init__(self, bench: Bench, estimate: Candidates, sign: float, words: tuple[str, str]) -> None:
+        self._bench, self._sign, self._words = bench, sign, words
+        self._steps = {u: movement(bench, sign * u).through_pose(estimate) for u in COMMANDS}
+        low, high = bench.travel
+        poses = [bench.at(low + part * (high - low)) for part in POSES]
         self._over_poses = [movement(pose, sign * STEP).through_pose(estimate) for pose in poses]
         self._onset = self._enclose(estimate)
 
@@ -52,7 +50,7 @@ class SpeedTests:
         """Return the quantities of n candidates."""
         runs = {u: step.speeds(candidates) for u, step in self._steps.items()}
         speed = {u: self._steps[u].final(run) for u, run in runs.items()}
-        name = self._tested.name
+        name = self._bench.name
         curve = [
             (
                 Column(f"{name}_speed", "speed", "deg/s", False, "command [%]", self._sign * u),
@@ -62,12 +60,12 @@ class SpeedTests:
         ]
         poses = [
             self._named("speed_50_over_poses", "speed at 50 % command", "deg/s", step.speed(candidates),
-                        "angle [deg]", float(np.degrees(step.tested.angle)))
+                        "angle [deg]", float(np.degrees(step.bench.angle)))
             for step in self._over_poses
         ]  # fmt: skip
         rises = [self._steps[STEP].reaches(runs[STEP], part * speed[STEP]) for part in (ONSET, RISEN)]
         gain = (speed[GAIN[1]] - speed[GAIN[0]]) / (GAIN[1] - GAIN[0])
-        c, arm = actuator(self._tested, candidates)
+        c, arm = actuator(self._bench, candidates)
         flow = (c.area_a if self._sign > 0 else c.area_b) * arm * np.radians(speed[100.0])
         return [
             *curve,
@@ -85,7 +83,7 @@ class SpeedTests:
         self, name: str, label: str, unit: str, value: Array, along: str = "", at: float = 0.0
     ) -> tuple[Column, Array]:
         ending, word = self._words
-        column = Column(f"{self._tested.name}_{name}_{ending}", f"{label}, {word}", unit, True, along, at)
+        column = Column(f"{self._bench.name}_{name}_{ending}", f"{label}, {word}", unit, True, along, at)
         return column, value
 
     def _dead_band(self, candidates: Candidates, full: Array) -> Measured:
@@ -99,7 +97,7 @@ class SpeedTests:
 
     def _rest(self, candidates: Candidates) -> Array:
         """Speed without a command, shape (n,)."""
-        return self._sign * movement(self._tested, 0.0).speed(candidates)
+        return self._sign * movement(self._bench, 0.0).speed(candidates)
 
     def _enclose(self, estimate: Candidates) -> tuple[Movement, Movement] | None:
         """Return movements just below and above the dead band of the estimate; None where it has none."""
@@ -111,9 +109,9 @@ class SpeedTests:
         low = max((u for u in COMMANDS if u < high), default=0.0)
         while high - low > BRACKET:
             middle = (low + high) / 2
-            moving = movement(self._tested, self._sign * middle).speed(estimate)[0] > level
+            moving = movement(self._bench, self._sign * middle).speed(estimate)[0] > level
             low, high = (low, middle) if moving else (middle, high)
         if low == 0.0:
             return None
-        first, second = (movement(self._tested, self._sign * u) for u in (low, high))
+        first, second = (movement(self._bench, self._sign * u) for u in (low, high))
         return first, second

@@ -5,8 +5,8 @@ import numpy as np
 from hydroid.hydraulics.cylinder import triangle, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, linkages
 from hydroid.parameters import Array
+from hydroid.quantities.bench import Bench
 from hydroid.quantities.column import Column, Measured
-from hydroid.quantities.joint import TestedJoint
 from hydroid.simulation import Candidates
 
 GRAVITY_POINTS = 9
@@ -14,21 +14,21 @@ COMMANDS = (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0)
 """at which stage 1's speeds are stated [%]"""
 
 
-def gravity(tested: TestedJoint, candidates: Candidates) -> Measured:
+def gravity(bench: Bench, candidates: Candidates) -> Measured:
     """The torque that holds the joint against gravity, over its travel and where it is tested [N·m]."""
-    angles = np.append(np.linspace(*tested.travel, GRAVITY_POINTS), tested.angle)
-    torque = tested.weigh(candidates, angles)[0].T
-    name, label = f"{tested.name}_gravity_torque", "gravity torque"
+    angles = np.append(np.linspace(*bench.travel, GRAVITY_POINTS), bench.angle)
+    torque = bench.weigh(candidates, angles)[0].T
+    name, label = f"{bench.name}_gravity_torque", "gravity torque"
     curve = [Column(name, label, "N·m", False, "angle [deg]", float(np.degrees(q))) for q in angles[:-1]]
-    one = Column(f"{name}_at_pose", f"{label} at {np.degrees(tested.angle):.0f} deg", "N·m", False)
+    one = Column(f"{name}_at_pose", f"{label} at {np.degrees(bench.angle):.0f} deg", "N·m", False)
     return list(zip((*curve, one), torque, strict=True))
 
 
-def gain_model(tested: TestedJoint, candidates: Candidates) -> Measured:
+def gain_model(bench: Bench, candidates: Candidates) -> Measured:
     """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
-    j, name = tested.joint - 1, tested.name
+    j, name = bench.joint - 1, bench.name
     gain, damping, friction = candidates.gain[:, j], candidates.damping[:, j], candidates.friction[:, j]
-    inertia = tested.weigh(candidates, np.array([tested.angle]))[1][:, 0]
+    inertia = bench.weigh(candidates, np.array([bench.angle]))[1][:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         torques = [np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0) for u in COMMANDS]
         return [
@@ -48,22 +48,22 @@ def gain_model(tested: TestedJoint, candidates: Candidates) -> Measured:
         ]
 
 
-def oil(tested: TestedJoint, candidates: Candidates) -> Measured:
+def oil(bench: Bench, candidates: Candidates) -> Measured:
     """Stage 2: the arm on its oil with the valve shut, and the ratio of areas.
 
     The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals' friction
     are left out of the damping.
     """
-    c, arm = actuator(tested, candidates)
+    c, arm = actuator(bench, candidates)
     if c.kind[0] == LINEAR:
-        travel = triangle(tested.angle, c.a, c.b, c.theta0, c.shortest)[0]
+        travel = triangle(bench.angle, c.a, c.b, c.theta0, c.shortest)[0]
         volumes = volume(travel, c.area_a, c.dead_volume), volume(c.stroke - travel, c.area_b, c.dead_volume)
     else:
         volumes = c.dead_volume, c.dead_volume
     stiffness = arm**2 * c.bulk_modulus * (c.area_a**2 / volumes[0] + c.area_b**2 / volumes[1])
-    inertia = tested.weigh(candidates, np.array([tested.angle]))[1][:, 0]
-    damping = candidates.damping[:, tested.joint - 1] / (2.0 * np.sqrt(stiffness * inertia))
-    name = tested.name
+    inertia = bench.weigh(candidates, np.array([bench.angle]))[1][:, 0]
+    damping = candidates.damping[:, bench.joint - 1] / (2.0 * np.sqrt(stiffness * inertia))
+    name = bench.name
     return [
         (
             Column(f"{name}_natural_frequency", "natural frequency of the arm on the oil", "Hz"),
@@ -74,15 +74,15 @@ def oil(tested: TestedJoint, candidates: Candidates) -> Measured:
     ]
 
 
-def actuator(tested: TestedJoint, candidates: Candidates) -> tuple[Records, Array]:
+def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
     """Return n candidates' COEFFICIENTS of the joint, (n,), and their moment arm at its angle [m], (n,).
 
     Of a rotary actuator, whose areas are displacements, the moment arm is 1.
     """
     assert candidates.actuators is not None
-    j = tested.joint - 1
+    j = bench.joint - 1
     parameters: Records = candidates.actuators[:, [j]].view(np.recarray)
-    c: Records = coefficients(parameters, linkages(tested.settings.arm, [j], [j]))[:, 0].view(np.recarray)
+    c: Records = coefficients(parameters, linkages(bench.settings.arm, [j], [j]))[:, 0].view(np.recarray)
     if c.kind[0] == LINEAR:
-        return c, triangle(tested.angle, c.a, c.b, c.theta0, c.shortest)[1]
+        return c, triangle(bench.angle, c.a, c.b, c.theta0, c.shortest)[1]
     return c, np.ones(len(c))

@@ -1,5 +1,6 @@
 """The report of one actuator: its curves at rest, from the command to the joint's torque."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,6 +14,7 @@ from hydroid.hydraulics.records import coefficients, linkages
 from hydroid.hydraulics.solenoid import coil_current, coil_force, curve_exists, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
+from hydroid.quantities.delta import Precision
 from hydroid.report import style
 from hydroid.report.page import Page, Plot, Section
 from hydroid.settings.arm import Arm
@@ -38,6 +40,24 @@ class JointActuator:
     parameters: Any
     linkage: LinearActuator | RotaryActuator
     range: tuple[float, float]
+    known: "KnownActuator | None" = None
+    """how precisely a fit knows it"""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownActuator:
+    """The precision of a fit, and the joint's COEFFICIENTS for candidates, (n, P) -> (n,)."""
+
+    precision: Precision
+    records: Callable[[Array], Any]
+
+    def band(self, function: Callable[[Any], Array]) -> Array:
+        """Return the 95 % interval of a curve, shape (m, 2), from its points of one record, shape (m,)."""
+
+        def curves(theta: Array) -> Array:
+            return np.stack([function(record) for record in self.records(theta)])
+
+        return style.finite(self.precision.propagate(curves, positive=False).interval)
 
 
 def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> JointActuator:
@@ -48,9 +68,7 @@ def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> 
     """
     if not 1 <= joint <= len(arm.joints):
         raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joint {joint}")
-    assert candidate.actuators is not None
-    one = candidate.actuators[:1, [joint - 1]].view(np.recarray)
-    p = coefficients(one, linkages(arm, [joint - 1], [joint - 1])).view(np.recarray)[0, 0]
+    p = joint_records(arm, candidate, joint)[0]
     if not curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2):
         raise SettingsError(
             f"joint {joint}: no force-stroke curve runs through {p.force_1:g} N at {1e3 * p.stroke_1:g} mm "
@@ -62,11 +80,20 @@ def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> 
     return JointActuator(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)
 
 
+def joint_records(arm: Arm, candidates: Candidates, joint: int) -> Any:
+    """Return one joint's COEFFICIENTS, joint 1-based, of n candidates with hydraulics, shape (n,)."""
+    assert candidates.actuators is not None
+    chosen = candidates.actuators[:, [joint - 1]].view(np.recarray)
+    return coefficients(chosen, linkages(arm, [joint - 1], [joint - 1])).view(np.recarray)[:, 0]
+
+
 def actuator_page(actuator: JointActuator) -> Page:
     """Return the page of an actuator: all its curves as one figure."""
     caption = (
         "Numbers in brackets are the article's equations. Dots: where the plunger rests at each current."
     )
+    if actuator.known is not None:
+        caption += " Bands: 95 % intervals. A curve without a band is given, or not determined by the logs."
     section = Section(
         "From the command to the torque", plots=(Plot("actuator", caption, partial(draw, actuator)),)
     )
@@ -86,13 +113,12 @@ def draw(actuator: JointActuator) -> Figure:
 
 
 def _calibration(axes: Axes, actuator: JointActuator) -> None:
-    a, b = _voltages(actuator.parameters, _COMMAND)
-    _sides(axes, _COMMAND, a, b)
+    _sides(axes, actuator, _COMMAND, lambda p: _voltages(p, _COMMAND))
     _name(axes, "Calibration, (2) and (3)", "command [%]", "voltage [V]")
 
 
 def _current(axes: Axes, actuator: JointActuator) -> None:
-    _sides(axes, _COMMAND, *_currents(actuator.parameters, _COMMAND))
+    _sides(axes, actuator, _COMMAND, lambda p: _currents(p, _COMMAND))
     axes.set_ylim(0, 1.1 * float(actuator.parameters.current_max))
     _name(axes, "Coil current, (4)", "command [%]", "current [A]")
 
@@ -104,7 +130,8 @@ def _force(axes: Axes, actuator: JointActuator) -> None:
     currents = {float(i) for i in (p.current_min, 0.5 * (p.current_min + p.current_max), p.current_max)}
     for shade, current in zip(_SHADES, sorted(currents | {float(p.rated_current)}), strict=False):
         drive = coil * current**2
-        axes.plot(1e3 * stroke, coil_force(drive, stroke, gap), color=shade, label=f"{current:.3g} A")
+        force = partial(_coil_force, current=current, stroke=stroke)
+        _curve(axes, actuator, 1e3 * stroke, force, color=shade, label=f"{current:.3g} A")
         rest = resting_stroke(drive, gap, p.plunger_stiffness)
         axes.plot(1e3 * rest, p.plunger_stiffness * rest, "o", color=shade, markeredgecolor="white", zorder=4)
     axes.plot(1e3 * stroke, p.plunger_stiffness * stroke, color=style.MEASURED, linewidth=1.0, label="spring")
@@ -118,7 +145,7 @@ def _force(axes: Axes, actuator: JointActuator) -> None:
 
 def _spool(axes: Axes, actuator: JointActuator) -> None:
     p = actuator.parameters
-    axes.plot(_COMMAND, 1e3 * _displacement(p, _COMMAND), **SIDE_A)
+    _curve(axes, actuator, _COMMAND, lambda p: 1e3 * _displacement(p, _COMMAND), **SIDE_A)
     for sign, overlap, slot in ((1.0, p.overlap_a, p.slot_width_a), (-1.0, p.overlap_b, p.slot_width_b)):
         for edge, label in ((0.0, "opens"), (slot, "fully open")):
             at = 1e3 * sign * (overlap + edge)
@@ -130,8 +157,12 @@ def _spool(axes: Axes, actuator: JointActuator) -> None:
 
 def _opening(axes: Axes, actuator: JointActuator) -> None:
     at = _spool_range(actuator.parameters)
-    area = 1e6 * opening(at, actuator.parameters)
-    _sides(axes, 1e3 * at, np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan))
+
+    def areas(p: Any) -> tuple[Array, Array]:
+        area = 1e6 * opening(at, p)
+        return np.where(at >= 0, area, np.nan), np.where(at <= 0, area, np.nan)
+
+    _sides(axes, actuator, 1e3 * at, areas)
     _name(axes, "Valve opening", "spool displacement [mm]", "opening [mm²]")
 
 
@@ -139,7 +170,8 @@ def _flow(axes: Axes, actuator: JointActuator) -> None:
     p = actuator.parameters
     at = _spool_range(p)
     for shade, drop in zip(_SHADES, _DROPS, strict=False):
-        axes.plot(1e3 * at, _pump_flow(p, 1e5 * drop, opening(at, p)), color=shade, label=f"{drop:g} bar")
+        flow = partial(_edge_flow, drop=1e5 * drop, spool=at)
+        _curve(axes, actuator, 1e3 * at, flow, color=shade, label=f"{drop:g} bar")
     axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
     _name(axes, "Flow from the pump, (7)", "spool displacement [mm]", "flow [L/min]", "upper center", 3)
 
@@ -148,22 +180,24 @@ def _pressure_flow(axes: Axes, actuator: JointActuator) -> None:
     p = actuator.parameters
     pressure = np.linspace(p.tank_pressure, p.supply_pressure, 400)
     for shade, share in zip(_SHADES, _OPENINGS, strict=True):
-        flow = _pump_flow(p, p.supply_pressure - pressure, share * p.opening_a)
-        axes.plot(1e-5 * pressure, flow, color=shade, label=f"{100 * share:g} % open")
+        flow = partial(_chamber_flow, pressure=pressure, share=share)
+        _curve(axes, actuator, 1e-5 * pressure, flow, color=shade, label=f"{100 * share:g} % open")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
     across = "pressure in chamber A [bar]"
     _name(axes, "Flow from the pump into A, (7)", across, "flow [L/min]", "upper right", 2)
 
 
 def _torque(axes: Axes, actuator: JointActuator) -> None:
-    p = actuator.parameters
     angle = np.linspace(*actuator.range, 400)
     # a rotary actuator's areas are its displacement
     linkage = actuator.linkage if isinstance(actuator.linkage, LinearActuator) else None
     arm = linkage.moment_arm(np.radians(angle)) if linkage else np.ones_like(angle)
-    most, least = p.supply_pressure, p.tank_pressure
-    axes.plot(angle, arm * (p.area_a * most - p.area_b * least), label="A at supply", **SIDE_A)
-    axes.plot(angle, arm * (p.area_a * least - p.area_b * most), label="B at supply", **SIDE_B)
+
+    def torques(p: Any) -> tuple[Array, Array]:
+        most, least = p.supply_pressure, p.tank_pressure
+        return arm * (p.area_a * most - p.area_b * least), arm * (p.area_a * least - p.area_b * most)
+
+    _sides(axes, actuator, angle, torques, ("A at supply", "B at supply"))
     axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     lever = f", moment arm {1e3 * arm.min():.0f} to {1e3 * arm.max():.0f} mm" if linkage else ""
     _name(axes, "Largest static torque", f"angle [deg]{lever}", "torque [N·m]")
@@ -189,15 +223,43 @@ def _spool_range(p: Any) -> Array:
     return np.linspace(-1.15 * (p.overlap_b + p.slot_width_b), 1.15 * (p.overlap_a + p.slot_width_a), 2001)
 
 
+def _coil_force(p: Any, current: float, stroke: Array) -> Array:
+    return coil_force(p.coil * current**2, stroke, p.gap)
+
+
+def _edge_flow(p: Any, drop: float, spool: Array) -> Array:
+    return _pump_flow(p, drop, opening(spool, p))
+
+
+def _chamber_flow(p: Any, pressure: Array, share: float) -> Array:
+    return _pump_flow(p, p.supply_pressure - pressure, share * p.opening_a)
+
+
 def _pump_flow(p: Any, drop: Array | float, area: Array | float) -> Array:
     """Flow [L/min] from the pump over a pressure drop [Pa] through an edge of area [m²] and its leakage."""
     flow = port_flow(p.supply_pressure - drop, p.supply_pressure, area + p.leakage, 0.0, p)[0]
     return _LITRES * flow
 
 
-def _sides(axes: Axes, at: Array, a: Array, b: Array) -> None:
-    axes.plot(at, a, label="side A", **SIDE_A)
-    axes.plot(at, b, label="side B", **SIDE_B)
+def _sides(
+    axes: Axes,
+    actuator: JointActuator,
+    at: Array,
+    function: Callable[[Any], tuple[Array, Array]],
+    labels: tuple[str, str] = ("side A", "side B"),
+) -> None:
+    for side, look, label in zip((0, 1), (SIDE_A, SIDE_B), labels, strict=True):
+        _curve(axes, actuator, at, lambda p, side=side: function(p)[side], label=label, **look)
+
+
+def _curve(
+    axes: Axes, actuator: JointActuator, at: Array, function: Callable[[Any], Array], **look: Any
+) -> None:
+    """Draw a curve, which a function computes from one record, with its band where that is known."""
+    axes.plot(at, function(actuator.parameters), **look)
+    if actuator.known is not None:
+        ends = actuator.known.band(function)
+        axes.fill_between(at, *ends.T, color=look["color"], alpha=0.2, linewidth=0)
 
 
 def _name(axes: Axes, title: str, across: str, up: str, place: Any = "best", columns: int = 1) -> None:

@@ -99,14 +99,14 @@ def draw_speeds(quantities: Quantities, logs: Sequence[Log]) -> Figure:
         at = np.array(curve.at)
         for side, color in ((at > 0, style.SEARCH), (at < 0, style.REFINED)):
             _band(row[0], curve, side, color)
-        row[0].set_title(f"Joint {joint}: speed against command")
+        row[0].set_title(f"Joint {joint}: speed in mid travel")
         row[0].set_xlabel("command [%]")
         row[0].set_ylabel("speed [deg/s]")
         poses = [c for n, c in curves.items() if n.startswith(f"joint{joint}_speed_50_over_poses")]
         for one, color in zip(poses, (style.SEARCH, style.REFINED), strict=False):
             _band(row[-1], one, np.ones(len(one.at), bool), color, one.label.rpartition(", ")[2])
         if poses:
-            row[-1].set_title("at 50 % over its travel")
+            row[-1].set_title("Speed at 50 % over its travel")
             row[-1].set_xlabel("angle [deg]")
             row[-1].legend(fontsize=8)
     return drawing

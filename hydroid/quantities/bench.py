@@ -20,7 +20,7 @@ LEAST_TRAVEL = float(np.radians(5.0))
 
 
 @dataclass(frozen=True, eq=False)
-class TestedJoint:
+class Bench:
     """A joint whose quantities are wanted.
 
     Attributes:
@@ -44,7 +44,7 @@ class TestedJoint:
         """Begins the names of its quantities."""
         return f"joint{self.joint}"
 
-    def at(self, angle: float) -> "TestedJoint":
+    def at(self, angle: float) -> "Bench":
         """Return the joint tested at another angle [rad]."""
         return replace(self, angle=angle)
 
@@ -69,14 +69,15 @@ class TestedJoint:
         simulation = HydraulicSimulation(scenario, self.settings.arm, self.settings.hydraulics)
         return simulation.simulate(candidates).angle[:, :, 0]
 
-    def room(self, towards: float) -> float:
-        """Return how far the joint can turn from its angle before the stop on that side [rad]."""
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Smallest and largest angle from which a test movement may start [rad]."""
         arm, i = self.settings.arm, self.joint - 1
-        limit = arm.upper[i] if towards > 0 else arm.lower[i]
-        return max(abs(float(limit) - self.angle) - MARGIN, 0.0)
+        low, high = float(arm.lower[i]) + MARGIN, float(arm.upper[i]) - MARGIN
+        return min(low, self.angle), max(high, self.angle)
 
 
-def tested_joint(settings: FitSettings, logs: Sequence[Log], joint: int) -> TestedJoint:
+def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     """Return a joint at the middle of its logged travel; the other joints are as the first log starts."""
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
@@ -87,4 +88,4 @@ def tested_joint(settings: FitSettings, logs: Sequence[Log], joint: int) -> Test
     )
     alone = settings.simulation.model_copy(update={"other_joints": "locked"})
     scenario = Scenario(load_model(arm.model, arm), arm, rest, [joint - 1], alone)
-    return TestedJoint(settings, joint, middle, (middle - half, middle + half), period, scenario)
+    return Bench(settings, joint, middle, (middle - half, middle + half), period, scenario)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from hydroid.errors import RunError
 from hydroid.estimate import Covariance
@@ -132,7 +131,7 @@ class Precision:
 
 def precision(parameters: ParameterSet, uncertainty: Uncertainty) -> Precision:
     """Return the precision of a fit's estimate."""
-    quantile = float(student.ppf(0.5 + COVERAGE / 2, uncertainty.freedom))
+    quantile = float(np.nanmax(uncertainty.quantile))  # a quantity may depend on the least known direction
     scale = uncertainty.jacobian.scale
     return Precision(parameters, uncertainty.theta, scale, uncertainty.root, quantile)
 

@@ -11,6 +11,11 @@ For white noise of one level this is the usual s² (J J')^-1. It is computed fro
 decomposition J = V D U as C^-1 = G' G with G = (U S U')^-1/2 D V'. No product J J' is formed, and a direction
 that the residuals do not depend on keeps a singular value of exactly zero.
 
+The process that describes the noise is estimated too. The variance of a parameter is then uncertain, and its
+interval must be wider than one with a known variance. The logarithm of the estimated variance is about
+normal: `quantile`. (Student's t, for a variance that follows a χ², is far too wide where the noise is slow:
+its quantile grows without limit, while a variance from a spectrum errs to both sides.)
+
 The covariance is a local, first-order approximation. It assumes that the model is right: a wrong model shifts
 the estimate by more than an interval says. At a bound the covariance is computed as if there were none, and
 the parameter gets no interval.
@@ -19,15 +24,17 @@ the parameter gets no interval.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import NDArray
+from scipy.optimize import root_scalar
 from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
-from hydroid.uncertainty.noise import Noise, channel_noise, unbiased
+from hydroid.uncertainty.noise import Noise, covariances
+from hydroid.uncertainty.restricted import STEP, neighbours, restricted_noise
 
 COVERAGE = 0.95
 """probability with which an interval covers the true value"""
@@ -39,6 +46,10 @@ NULL_COMPONENT = 0.01
 """component in an unmeasured direction below which a parameter does not depend on it"""
 DOUBT_ABOVE = 0.1
 """relative difference between two steps' derivatives above which it is reported"""
+TINY = float(np.finfo(float).tiny)
+MAX_LOG_SPREAD = 5.0
+"""beyond it nothing is known of a variance, and no interval is of use"""
+_NODES, _WEIGHTS = hermegauss(60)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +65,9 @@ class Uncertainty:
             deviations long.
         relative: relative standard deviation of each parameter, shape (P,); inf where it is not
             identifiable, NaN where it is fixed.
-        interval: of 95 %, from Student's t, shape (P, 2); infinite where not identifiable, NaN where fixed
-            or at a bound.
+        interval: of 95 %, shape (P, 2); infinite where not identifiable, NaN where fixed or at a bound.
+        quantile: half the interval in standard deviations, shape (P,): 1.96 where the noise is well known.
         correlation: of the free parameters' estimates, shape (p, p); NaN where not identifiable.
-        freedom: degrees of freedom of the noise's level.
         status: of each parameter.
     """
 
@@ -68,8 +78,8 @@ class Uncertainty:
     root: Array
     relative: Array
     interval: Array
+    quantile: Array
     correlation: Array
-    freedom: float
     status: tuple[ParameterStatus, ...]
 
     @property
@@ -80,27 +90,24 @@ class Uncertainty:
 
 def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
     """Return the uncertainty of theta, shape (P,), for the noise that its residuals show."""
-    derivatives = jacobian(problem, theta)
-    residual, objective = derivatives.residual, problem.settings.objective
-    noise = tuple(channel_noise(c, residual[c.rows], objective) for c in problem.channels)
-    return uncertainty_from(problem, theta, derivatives, noise)
+    return uncertainty_from(problem, theta, jacobian(problem, theta))
 
 
 def uncertainty_from(
-    problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...]
+    problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...] | None = None
 ) -> Uncertainty:
-    """Return the uncertainty from the derivatives and the residual's noise, without simulations."""
+    """Return the uncertainty from the derivatives, without simulations; None: for the residual's noise."""
     free, parameters = problem.parameters.free, problem.parameters.parameters
-    root, noise, freedom = _root(problem, derivatives, noise)
+    root, noise, changes = _root(problem, theta, derivatives, noise)
     covariance, unmeasured = covariance_of(root)
-    relative = np.full(len(theta), np.nan)
+    relative, widths = np.full((2, len(theta)), np.nan)
     relative[free] = np.where(unmeasured, np.inf, np.sqrt(np.diag(covariance)))
-    quantile = float(student.ppf(0.5 + COVERAGE / 2, freedom))
-    # with a small effective sample size the intervals are wider, and the flags are set accordingly
-    widened = relative * quantile / float(normal.ppf(0.5 + COVERAGE / 2))
+    widths[free] = [quantile(spread) for spread in np.minimum(_log_spread(root, changes), MAX_LOG_SPREAD)]
+    # where the noise is not well known the intervals are wider, and the flags are set accordingly
+    widened = relative * widths / float(normal.ppf(0.5 + COVERAGE / 2))
     unidentifiable = widened > UNIDENTIFIABLE_ABOVE
     relative[unidentifiable] = np.inf
-    half, log = quantile * relative, problem.parameters.log
+    half, log = widths * relative, problem.parameters.log
     with np.errstate(over="ignore"):  # inf without an interval
         factor = np.exp(np.where(log, half, 0.0))
     change = np.where(log, 0.0, half * derivatives.scale)
@@ -119,7 +126,7 @@ def uncertainty_from(
     deviation = np.where(unidentifiable[free], np.nan, relative[free])
     correlation = covariance / np.outer(deviation, deviation)
     return Uncertainty(
-        theta, derivatives, noise, free, root, relative, interval, correlation, freedom, tuple(status)
+        theta, derivatives, noise, free, root, relative, interval, widths, correlation, tuple(status)
     )
 
 
@@ -153,27 +160,54 @@ def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Ar
     return directions, values, effects
 
 
+def quantile(spread: float) -> float:
+    """Half the interval of a normal estimate whose variance is estimated, in standard deviations.
+
+    `spread` is the standard deviation of the logarithm of the estimated variance: 0 gives 1.96.
+    """
+
+    def outside(half: float) -> float:
+        chance = _WEIGHTS @ (2 * normal.sf(half * np.exp(spread * _NODES / 2))) / _WEIGHTS.sum()
+        return float(chance) - (1 - COVERAGE)
+
+    return float(root_scalar(outside, bracket=(1.0, 3.0 * np.exp(3 * spread))).root)
+
+
+def _log_spread(root: Array, changes: Array) -> Array:
+    """Standard deviation of the logarithm of each free parameter's estimated variance, shape (p,).
+
+    `changes`, (m, p, p), are those of G^-T C^-1 G^-1 when the noise changes by each of its standard errors.
+    """
+    left, values, directions = np.linalg.svd(root)
+    measured = values > RANK_TOLERANCE * values.max(initial=0.0)
+    # columns: G^-T of one parameter's change
+    rows = left[:, measured] @ (directions[measured] / values[measured, None])
+    length = np.sum(rows**2, axis=0)
+    moved = np.einsum("ip,mij,jp->mp", rows, changes, rows) / np.where(length > 0, length, 1.0)
+    return np.sqrt(np.sum(moved**2, axis=0))
+
+
 def _root(
-    problem: Problem, derivatives: Jacobian, noise: tuple[Noise, ...]
-) -> tuple[Array, tuple[Noise, ...], float]:
-    """Return G, shape (p, p), the noise with what the fit absorbed, its degrees of freedom."""
+    problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...] | None
+) -> tuple[Array, tuple[Noise, ...], Array]:
+    """Return G, shape (p, p), the noise with what the fit absorbed, and the changes for `_log_spread`."""
     directions, values, effects = decompose(problem.parameters.free, derivatives)
-    priors = effects[:, len(derivatives.residual) :]
-    parts = [effects[:, channel.rows] for channel in problem.channels]
-
-    def scatter(noise: tuple[Noise, ...]) -> Array:
-        """U S U', shape (p, p)."""
-        channels = [process.covariance_of(part) for process, part in zip(noise, parts, strict=True)]
-        return derivatives.prior_weight**2 * priors @ priors.T + np.sum(channels, axis=0)
-
     fitted = values > 0
-    spread = scatter(noise)[np.ix_(fitted, fitted)]
-    noise = tuple(
-        unbiased(process, part[fitted], spread) if process.source == "residual" else process
-        for process, part in zip(noise, parts, strict=True)
-    )
-    variance, axes = np.linalg.eigh(scatter(noise))
-    inverse = (axes / np.sqrt(np.maximum(variance, np.finfo(float).tiny))) @ axes.T
-    # the level of slow noise is known as from half its effective samples: AR(1), delta method at 0 Hz
-    freedom = 0.5 * sum(process.effective_sample_size for process in noise) - np.count_nonzero(values)
-    return inverse @ (values[:, None] * directions.T), noise, max(freedom, 1.0)
+    samples, weight = len(derivatives.residual), derivatives.prior_weight
+    if noise is None:
+        scores = problem.priors.scores(theta[None])[0]
+        unit = np.append(np.ones(samples), np.full(len(scores), 1 / weight if weight else 0.0))
+        residual = np.append(derivatives.residual, scores)
+        objective, seen = problem.settings.objective, effects[fitted] * unit
+        noise = restricted_noise(problem.channels, residual, seen, objective)
+    scatter = weight**2 * effects[:, samples:] @ effects[:, samples:].T
+    moved: list[Array] = []
+    for channel, process in zip(problem.channels, noise, strict=True):
+        each = covariances([process, *neighbours(process)], effects[:, channel.rows])
+        scatter += each[0]
+        moved += [(other - each[0]) / STEP for other in each[1:]]
+    variance, axes = np.linalg.eigh(scatter[np.ix_(fitted, fitted)])
+    inverse = np.zeros_like(scatter)  # along a direction without effect, effects are rounding only
+    inverse[np.ix_(fitted, fitted)] = (axes / np.sqrt(np.maximum(variance, TINY))) @ axes.T
+    changes = np.array([inverse @ m @ inverse for m in moved]).reshape(-1, *inverse.shape)
+    return inverse @ (values[:, None] * directions.T), noise, changes

@@ -6,11 +6,10 @@ that last for many samples. An autoregressive (AR) process describes them. It is
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter, lfiltic
 
 from hydroid.parameters import Array
@@ -19,10 +18,6 @@ from hydroid.settings.problem import ObjectiveSettings
 
 MAX_AR_ORDER = 30
 """the highest order of the AR process"""
-ABSORBED_ROUNDS = 4
-"""rounds in which the noise that a fit has absorbed is estimated"""
-MAX_ABSORBED = 0.5
-"""part of the noise; a fit that has absorbed more leaves too little to correct the level with"""
 MIN_LEVEL = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest noise level that a residual can show [rad, Pa]: no potentiometer or gauge is better (ours)"""
 
@@ -35,7 +30,7 @@ class Noise:
         samples: T.
         level: standard deviation, in units of the channel's residual [rad].
         reflection: coefficients k_1..k_p of its Levinson recursion, shape (p,), each within (-1, 1).
-        source: of the level; "smallest" is MIN_LEVEL.
+        source: of the level; "smallest" is MIN_LEVEL, as the residual shows less.
     """
 
     samples: int
@@ -57,11 +52,15 @@ class Noise:
             known[order + 1 :], _ = lfilter([1.0], last, np.zeros(self.samples - order - 1), zi=start)
         return known
 
+    @property
+    def spectrum(self) -> Array:
+        """Power at T + 1 frequencies from 0 to half the sampling rate, shape (T + 1,)."""
+        polynomial, variance = self._predictors()[-1]
+        return variance / np.abs(np.fft.rfft(polynomial, 2 * self.samples)) ** 2
+
     def covariance_of(self, rows: Array) -> Array:
         """Return rows S rows', shape (n, n), where rows is (n, T) and S the noise's covariance matrix."""
-        if not len(self.reflection):
-            return self.level**2 * (rows @ rows.T)
-        return rows @ np.asarray(matmul_toeplitz(self.autocovariance, rows.T), dtype=np.float64)
+        return covariances([self], rows)[0]
 
     def whitened(self, rows: Array) -> Array:
         """Return L^-1 rows' of S = L L', shape (n, T), which makes this noise white with unit variance."""
@@ -105,9 +104,9 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
 
 
 def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
-    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,).
+    """Return a channel's noise: white as the settings give it, else from its residual (`fit_noise`).
 
-    Simulated data without noise leave a residual below MIN_LEVEL, which then counts instead.
+    Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
     if channel.quantity == "angle":
         given = objective.noise_deg
@@ -115,68 +114,57 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
         level = None if given is None else float(np.deg2rad(given))
     else:
         level = None if objective.noise_bar is None else objective.noise_bar * 1e5
+    rows = np.atleast_2d(residual)
+    samples = rows.shape[1]
     if level is not None:
-        return Noise(len(residual), level * channel.weight, np.empty(0), "settings")
-    noise, smallest = fit_noise(residual), MIN_LEVEL[channel.quantity] * channel.weight
-    return noise if noise.level > smallest else Noise(len(residual), smallest, np.empty(0), "smallest")
+        return Noise(samples, level * channel.weight, np.empty(0), "settings")
+    lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(np.sum(rows**2))
+    if lacking <= 0:
+        return fit_noise(rows)
+    impulse = np.zeros(samples)  # its products are those expected of white noise
+    impulse[samples // 2] = np.sqrt(lacking)
+    return replace(fit_noise(np.vstack([rows, impulse])), source="smallest")
 
 
-def fit_noise(residual: Array, max_order: int = MAX_AR_ORDER) -> Noise:
-    """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,)."""
-    samples = len(residual)
-    level = float(np.sqrt(np.mean(residual**2)))
+def covariances(processes: Sequence[Noise], rows: Array) -> Array:
+    """Return rows S rows' of each process's S, shape (m, n, n), where rows is (n, T).
+
+    S is a part of a circulant matrix of 2 T rows, which the discrete Fourier transform makes diagonal.
+    """
+    samples = rows.shape[1]
+    if not any(len(process.reflection) for process in processes):
+        square = rows @ rows.T
+        return np.array([process.level**2 * square for process in processes])
+    spectrum = np.fft.rfft(rows, 2 * samples)
+    spectrum[:, 1:-1] *= np.sqrt(2)  # frequencies that stand for their negative ones as well
+    out = np.empty((len(processes), len(rows), len(rows)))
+    for square, process in zip(out, processes, strict=True):
+        lags = process.autocovariance
+        power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real
+        square[:] = ((spectrum * power) @ spectrum.conj().T).real / (2 * samples)
+    return out
+
+
+def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
+    """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,).
+
+    More rows, (n, T), are parts of the noise that the residual lacks: their products are added to its own.
+    """
+    forward = backward = rows = np.atleast_2d(rows)
+    samples = rows.shape[1]
+    level = float(np.sqrt(np.sum(rows**2) / samples))
     reflection: list[float] = []
     criterion = [0.0]
-    forward = backward = residual
     for _ in range(min(max_order, samples // 4)):
-        forward, backward = forward[1:], backward[:-1]
-        power = float(forward @ forward + backward @ backward)
-        k = -2 * float(forward @ backward) / power if power > 0 else np.inf
+        forward, backward = forward[:, 1:], backward[:, :-1]
+        power = float(np.vdot(forward, forward) + np.vdot(backward, backward))
+        k = -2 * float(np.vdot(forward, backward)) / power if power > 0 else np.inf
         if not abs(k) < 1:
             break
         forward, backward = forward + k * backward, backward + k * forward
         reflection.append(k)
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
     return Noise(samples, level, np.array(reflection[: int(np.argmin(criterion))]))
-
-
-def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
-    """Return the noise before a least-squares fit absorbed a part of it.
-
-    A fit absorbs the part of the noise that resembles its derivatives, slow noise above all. Let U be the
-    orthonormal rows that span them, `effects`, (p, T), the channel's part of U, and `spread`, (p, p), U S U'
-    of all channels. The covariance of the residual is (1 - U'U) S (1 - U'U). The autocovariances of `noise`
-    are raised by the difference to S, in a few rounds because S is not known beforehand.
-    """
-    samples, order = noise.samples, len(noise.reflection)
-    left, whole = noise.autocovariance[: order + 1], noise
-    for _ in range(ABSORBED_ROUNDS):
-        smooth = np.asarray(matmul_toeplitz(whole.autocovariance, effects.T), dtype=np.float64).T
-        absorbed = np.array(
-            [
-                np.sum(effects[:, : samples - k] * smooth[:, k:])
-                + np.sum(smooth[:, : samples - k] * effects[:, k:])
-                - np.sum((spread @ effects[:, : samples - k]) * effects[:, k:])
-                for k in range(order + 1)
-            ]
-        )
-        reflection = _levinson(left + absorbed / (samples - np.arange(order + 1)))
-        if reflection is None or absorbed[0] > MAX_ABSORBED * samples * left[0]:
-            break
-        whole = Noise(samples, float(np.sqrt(left[0] + absorbed[0] / samples)), reflection)
-    return whole
-
-
-def _levinson(autocovariance: Array) -> Array | None:
-    """Reflection coefficients from lags 0 to p; None where no AR process has these autocovariances."""
-    polynomial, variance, reflection = np.ones(1), float(autocovariance[0]), np.empty(0)
-    for m in range(1, len(autocovariance)):
-        k = float(-(polynomial @ autocovariance[m:0:-1]) / variance)
-        if not abs(k) < 1:
-            return None
-        polynomial, variance = _next_predictor(polynomial, variance, k)
-        reflection = np.append(reflection, k)
-    return reflection
 
 
 def _next_predictor(polynomial: Array, variance: float, k: float) -> tuple[Array, float]:

@@ -12,11 +12,12 @@ from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings, PriorSettings
-from hydroid.uncertainty.covariance import uncertainty, uncertainty_from
+from hydroid.uncertainty.covariance import quantile, uncertainty, uncertainty_from
 from hydroid.uncertainty.flags import Flag, ParameterStatus
 from hydroid.uncertainty.intervals import THRESHOLD, bootstrap, profile
 from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.noise import MIN_LEVEL, Noise, channel_noise, fit_noise
+from hydroid.uncertainty.restricted import STEP, neighbours, restricted_noise
 
 DEG = np.deg2rad(1.0)
 AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
@@ -231,7 +232,12 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     how, rng = problem.settings.objective, np.random.default_rng(6)
     residual = rng.normal(0, 0.3 * DEG, 1000)
     assert channel_noise(channel, residual, how).source == "residual"
-    assert channel_noise(channel, 1e-6 * residual, how).level == MIN_LEVEL["angle"]
+    quiet = channel_noise(channel, 1e-6 * residual, how)
+    assert (quiet.source, quiet.level) == ("smallest", pytest.approx(MIN_LEVEL["angle"]))
+    assert quiet.correlation_time == 0
+    # a slow residual just below the smallest level stays slow
+    slow_residual = ar1(rng, 1000, AR1, 0.04 * DEG)
+    assert channel_noise(channel, slow_residual, how).correlation_time > 5
     given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
     assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
     weighted = channel_noise(
@@ -240,8 +246,47 @@ def test_noise_is_taken_from_settings_residual_or_floor():
     assert weighted.level == pytest.approx(2.1 * DEG)
 
 
+def test_what_a_fit_absorbs_comes_back():
+    """Ten slow effects take a third of slow noise out of a residual; the restricted estimate knows of it."""
+    samples, phi = 2000, np.exp(-0.01 / 2.0)
+    effects = np.linalg.svd(slow(10, samples, seed=3), full_matrices=False)[2]
+    channel = Channel(0, 2, "angle", 0, np.empty(samples), 1.0, slice(0, samples))
+    objective = white_problem()[0].settings.objective
+    rng, raw, restored = np.random.default_rng(4), [], []
+    for _ in range(100):
+        noise = ar1(rng, samples, phi, 0.1 * DEG)
+        residual = noise - effects.T @ (effects @ noise)
+        raw.append(fit_noise(residual).covariance_of(effects).trace())
+        (process,) = restricted_noise((channel,), residual, effects, objective)
+        restored.append(process.covariance_of(effects).trace())
+    true = Noise(samples, 0.1 * DEG, np.array([-phi])).covariance_of(effects).trace()
+    assert np.mean(raw) < 0.6 * true
+    assert np.mean(restored) == pytest.approx(true, rel=0.15)
+
+
+def test_the_errors_of_a_process_are_those_of_its_estimates():
+    """Variances that follow from estimated processes scatter as the delta method says."""
+    samples, rng, rows = 4000, np.random.default_rng(5), slow(2, 4000)
+    true = Noise(samples, 1.0, np.array([-AR1]))
+    seen = [fit_noise(ar1(rng, samples, AR1, 1.0), 1).covariance_of(rows).diagonal() for _ in range(400)]
+    base = true.covariance_of(rows).diagonal()
+    moved = [(other.covariance_of(rows).diagonal() / base - 1) / STEP for other in neighbours(true)]
+    expected = np.sqrt(np.sum(np.square(moved), axis=0))
+    np.testing.assert_allclose(np.std(np.log(seen), axis=0), expected, rtol=0.1)
+    assert neighbours(replace(true, source="settings")) == []
+
+
+def test_the_quantile_covers_an_estimate_whose_variance_is_log_normal():
+    rng = np.random.default_rng(6)
+    estimates = rng.normal(size=200_000)
+    assert quantile(0.0) == pytest.approx(1.95996, abs=1e-4)
+    for spread in (0.3, 1.0, 2.0):
+        deviation = np.exp(spread * rng.normal(size=estimates.size) / 2)
+        assert np.mean(np.abs(estimates) <= quantile(spread) * deviation) == pytest.approx(0.95, abs=0.002)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("phi", [0.0, AR1])
+@pytest.mark.parametrize("phi", [0.0, AR1, float(np.exp(-0.01 / 4.0))])
 def test_intervals_cover_the_truth_as_often_as_they_say(phi):
     """400 linear fits, noise estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""
     columns, hits, rng = slow(3, 1500, seed=7), [], np.random.default_rng(8)
@@ -255,8 +300,10 @@ def test_intervals_cover_the_truth_as_often_as_they_say(phi):
         estimates.append(theta)
     cover = np.mean(hits, axis=0)
     assert (cover > 0.92).all(), cover
-    assert (cover < 0.98).all(), cover
-    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1)
+    assert (cover < 0.985).all(), cover
+    # a record of four correlation times shows a little too little of its noise
+    within = 0.1 if phi <= AR1 else 0.15
+    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=within)
 
 
 def test_the_profile_of_a_linear_problem_is_its_parabola():

@@ -18,14 +18,16 @@ from hydroid.hydraulics.valve import opening, port_flow, spool
 @compilable
 def drive_a(c: Any, command: float) -> float:
     """Drive k i² [N·m²] of coil A at a command [%]: equations (2) to (5)."""
-    current = coil_current(side_voltage(command, c.onset_a, c.full_a), c.current_max, c.current_min)
+    voltage = side_voltage(command, c.onset_a, c.full_a, c.dead_band_a)
+    current = coil_current(voltage, c.current_max, c.current_min)
     return c.coil * current * current
 
 
 @compilable
 def drive_b(c: Any, command: float) -> float:
     """Drive k i² [N·m²] of coil B at a command [%]."""
-    current = coil_current(side_voltage(-command, c.onset_b, c.full_b), c.current_max, c.current_min)
+    voltage = side_voltage(-command, c.onset_b, c.full_b, c.dead_band_b)
+    current = coil_current(voltage, c.current_max, c.current_min)
     return c.coil * current * current
 
 

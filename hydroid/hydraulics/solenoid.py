@@ -27,13 +27,14 @@ FULL_SCALE = 10.0
 
 
 @compilable
-def side_voltage(command: Any, onset: Any, full: Any) -> Any:
+def side_voltage(command: Any, onset: Any, full: Any, dead_band: Any = 0.0) -> Any:
     """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
 
     For side A give (u, A, B), for side B (-u, C, D): command towards this side [%], voltage at the smallest
-    command and at 100 % [V]. It is 0 unless the command is positive.
+    command and at 100 % [V]. It is 0 unless the command exceeds the dead band [%] of the pilot stage, ours.
     """
-    return select(command > 0.0, onset + command * (full - onset) / 100.0, 0.0)
+    beyond = command - dead_band
+    return select(beyond > 0.0, onset + beyond * (full - onset) / (100.0 - dead_band), 0.0)
 
 
 @compilable

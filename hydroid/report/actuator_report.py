@@ -204,7 +204,10 @@ def _torque(axes: Axes, actuator: JointActuator) -> None:
 
 
 def _voltages(p: Any, command: Array) -> tuple[Array, Array]:
-    return side_voltage(command, p.onset_a, p.full_a), side_voltage(-command, p.onset_b, p.full_b)
+    return (
+        side_voltage(command, p.onset_a, p.full_a, p.dead_band_a),
+        side_voltage(-command, p.onset_b, p.full_b, p.dead_band_b),
+    )
 
 
 def _currents(p: Any, command: Array) -> tuple[Array, Array]:

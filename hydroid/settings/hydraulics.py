@@ -55,6 +55,7 @@ def _quantity(default: float | None, unit: str, meaning: str, source: str = "our
 
 
 Delay = Annotated[float, Field(ge=0, le=5)]
+DeadBand = Annotated[float, Field(ge=0, lt=100)]
 
 
 class HydraulicSettings(Settings):
@@ -64,6 +65,12 @@ class HydraulicSettings(Settings):
     full_a: float = _quantity(10.0, "V", "B of equation (2): voltage at 100 %")
     onset_b: float = _quantity(1.2, "V", "C of equation (3)", "article")
     full_b: float = _quantity(10.0, "V", "D of equation (3)")
+    dead_band_a: DeadBand = _quantity(
+        0.0,
+        "%",
+        "command below which the pilot stage gives nothing, towards A; an overlap acts after the lag",
+    )
+    dead_band_b: DeadBand = _quantity(0.0, "%", "the same towards B")
     current_max: Positive = _quantity(0.9, "A", "I_max of equation (4)", "article")
     current_min: Positive = _quantity(0.3, "A", "I_min of equation (4)", "article")
     force_1: Positive = _quantity(8.0, "N", "F1: solenoid force at x1 and rated current", "article")

@@ -41,6 +41,13 @@ def test_voltage_jumps_to_the_onset_and_reaches_full_scale():
     np.testing.assert_allclose(side_voltage(-command, 1.2, 10.0), [10, 1.2, 0, 0, 0, 0], atol=1e-9)
 
 
+def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
+    voltage = side_voltage(np.array([-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0]), 1.4, 10.0, 40.0)
+    np.testing.assert_allclose(voltage, [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
+    command = np.linspace(-100, 100, 201)
+    np.testing.assert_array_equal(side_voltage(command, 1.4, 10.0, 0.0), side_voltage(command, 1.4, 10.0))
+
+
 def test_components_broadcast_over_a_population():
     onset = np.array([[1.4], [0.7]])
     assert side_voltage(np.linspace(-100, 100, 11), onset, 10.0).shape == (2, 11)

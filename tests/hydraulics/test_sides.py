@@ -17,6 +17,7 @@ UNLIKE = {
     "delay_a": 0.05, "delay_b": 0.12, "plunger_damping_a": 60.0, "plunger_damping_b": 20.0,
     "opening_exponent_a": 2.0, "opening_exponent_b": 1.3, "slot_width_a": 2.5, "slot_width_b": 1.5,
     "overlap_a": 0.2, "overlap_b": 0.1, "opening_a": 0.4, "opening_b": 0.3, "onset_a": 1.0, "onset_b": 2.0,
+    "dead_band_a": 5.0, "dead_band_b": 12.0,
 }  # fmt: skip
 
 
@@ -73,12 +74,14 @@ def test_two_parameters_for_one_side_are_refused():
 
 
 def test_a_valve_that_differs_by_side_is_recovered():
-    """Delay, lag and exponent of each direction, from one log of duties."""
+    """Dead band, delay, lag and exponent of each direction, from one log of duties."""
     truth = {"t_A": 0.15, "t_B": 0.06, "lag_A": 160.0, "lag_B": 60.0, "n_A": 1.8, "n_B": 1.2}
+    truth |= {"dead_A": 20.0, "dead_B": 8.0}
     rows = {
         "t_A": ("delay_a", 0.0, 0.5), "t_B": ("delay_b", 0.0, 0.5), "n_A": ("opening_exponent_a", 0.7, 3.0),
         "lag_A": ("plunger_damping_a", 5.0, 500.0), "lag_B": ("plunger_damping_b", 5.0, 500.0),
         "n_B": ("opening_exponent_b", 0.7, 3.0),
+        "dead_A": ("dead_band_a", 0.0, 40.0), "dead_B": ("dead_band_b", 0.0, 40.0),
     }  # fmt: skip
     parameters = {
         name: {"quantity": quantity, "joints": [2], "bounds": [low, high]}
@@ -88,4 +91,5 @@ def test_a_valve_that_differs_by_side_is_recovered():
     pose = settings.arm.pose("study")
     log = duties(pose, {2: [50, -40, 80, -90, 60, 0, -60, 40, -30, 90, -70, 30]}, dwell=0.8)
     start = {"t_A": 0.1, "t_B": 0.1, "lag_A": 100.0, "lag_B": 100.0, "n_A": 1.5, "n_B": 1.5}
+    start |= {"dead_A": 12.0, "dead_B": 12.0}
     assert_recovered(recover(settings, [log], truth, start), settings, truth)

@@ -19,7 +19,7 @@ def test_every_setting_is_described():
 
 
 def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
-    assert len(QUANTITIES) == 50
+    assert len(QUANTITIES) == 52
     arm = {"area_a", "area_b", "opening_a", "opening_b"}
     other = {"rotary_volume", "substeps"}
     assert set(QUANTITIES) - arm == set(HydraulicSettings.model_fields) - other

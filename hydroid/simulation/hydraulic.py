@@ -25,6 +25,10 @@ from hydroid.simulation.rollout import HydraulicArm, compile_rollout
 from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
 
 
+STOP_REACH = np.radians(1.0)
+"""how near an end of its range a joint must start to rest on its stop"""
+
+
 @dataclass(frozen=True)
 class Trace:
     """What one candidate's actuators did at the log's samples; J active joints.
@@ -75,6 +79,7 @@ class ArmActuators:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), follows)
         self.joints = locked.columns[self.columns]
         everyone = [int(j) for j in self.joints]
+        self._range = np.array([arm.lower, arm.upper])[:, self.joints]
         self._linkages = linkages(arm, everyone, [j for j in everyone if active[j]])
         self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
         self._period, self._settings = locked.model.opt.timestep, settings
@@ -89,6 +94,8 @@ class ArmActuators:
         """
         assert candidates.actuators is not None
         chosen: Records = candidates.actuators[:, self.joints]  # pyright: ignore[reportAssignmentType]
+        away = np.min(abs(self._range - pose[self.columns]), axis=0) > STOP_REACH
+        chosen.trapped_pressure[:, away] = np.inf
         if pressure is not None:
             trapped, level = pressure[self.columns].T
             rests = np.isfinite(chosen.trapped_pressure) & np.isfinite(trapped)

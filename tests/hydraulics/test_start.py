@@ -13,6 +13,8 @@ from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
 from hydroid.settings.hydraulics import HydraulicSettings
 
+STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
+"""the shoulder at the lower end of its range"""
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
 
 
@@ -73,7 +75,7 @@ def test_a_log_says_in_which_pressures_it_rested():
     settings = settings_of(
         {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
     )
-    log = duties(settings.arm.pose("study"), {2: [0, 50]})
+    log = duties(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5
     spec, stage = load_model(settings.arm.model, settings.arm), Stage(settings)
@@ -84,6 +86,16 @@ def test_a_log_says_in_which_pressures_it_rested():
         np.testing.assert_allclose(response.pressure[0, 0, 0], wanted)
 
 
+def test_a_joint_away_from_its_stops_is_held_by_its_oil():
+    settings = settings_of(
+        {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
+    )
+    log, stage = duties(settings.arm.pose("study"), {2: [50, -50]}), Stage(settings)
+    simulation = make_simulation(load_model(settings.arm.model, settings.arm), log, [1], settings)
+    angle = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
+    np.testing.assert_array_equal(angle[0], angle[1])
+
+
 def test_trapped_pressure_is_recovered():
     truth = {"trapped": 25.0, "volume": 60.0}
     parameters = {
@@ -91,6 +103,6 @@ def test_trapped_pressure_is_recovered():
         "volume": {"quantity": "dead_volume", "joints": [2], "bounds": [5.0, 300.0]},
     }
     settings = settings_of(parameters)
-    logs = [duties(settings.arm.pose("study"), {2: [u]}) for u in (25, 50, 100)]
+    logs = [duties(STOPPED, {2: [u]}) for u in (25, 50, 100)]
     start = {"trapped": 10.0, "volume": 40.0}
     assert_recovered(recover(settings, logs, truth, start), settings, truth)

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -57,6 +57,9 @@ search-budget: setup  ## generations against the share of seeds that reach the o
 many-parameters: setup  ## 27 parameters from far-off starts, beside mujoco.sysid; half an hour
 	$(BIN)/pip install --quiet --disable-pip-version-check 'mujoco[sysid]'
 	$(BIN)/python benchmarks/many_parameters.py
+
+virtual-boom: setup  ## duties that a fit has not seen, on a boom simulated by other equations; about ten minutes
+	$(BIN)/python benchmarks/virtual_boom.py
 
 design-study: setup  ## a designed experiment against random ones of the same length; about ten minutes
 	$(BIN)/python benchmarks/designed_experiment.py

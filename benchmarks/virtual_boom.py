@@ -2,7 +2,7 @@
 
 The boom is no hydroid model. It is a separate simulation in plain equations (Radau, rtol 1e-7), and it
 differs where a machine would: pilot pressure with a lag instead of solenoids, a polynomial valve curve,
-another one for each edge, an engine whose speed lifts flow and pressure together, oil with air in it, Stribeck
+another one for each edge, an engine whose speed lifts flow and pressure together, oil with air, Stribeck
 friction, a spring for a stop, and a pendulum for the arm. Its sizes are near those of our shoulder, all ours.
 What it shares with the model is the kind of physics: so this shows that the terms are the right ones for such
 a machine, not that a real machine is one.
@@ -16,6 +16,7 @@ It is logged at constant duties of 40, 60 and 100 %, up from its stop and down f
 import sys
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from math import cos, exp, radians, sin, sqrt, tanh
 
 import numpy as np
@@ -123,7 +124,7 @@ def boom(duty: float, way: str) -> np.ndarray:
     events = [0.0, REST + PILOT_DELAY[side], REST + ENGINE_DELAY, LENGTH]
     grid, out = np.arange(0.0, LENGTH + PERIOD / 2, PERIOD), []
     scale = np.array([1e-7, 1e-7, 1e-7, 10.0, 10.0, 10.0, 1e-9, 1e-8])
-    for k, (first, last) in enumerate(zip(events[:-1], events[1:], strict=True)):
+    for k, (first, last) in enumerate(pairwise(events)):
         pilot = duty / 100 if k > 0 else 0.0
         drive = Drive(pilot * (sign > 0), pilot * (sign < 0), k == 2)
         solver = Radau(slope(drive, stop), first, z, last, rtol=1e-7, atol=scale, max_step=0.05)

@@ -149,8 +149,8 @@ class HydraulicSettings(Settings):
     trapped_pressure: NotNegative | None = _quantity(
         None,
         "bar",
-        "pressure in A of a joint that starts within 1 deg of an end of its range, where its stop carries what "
-        "the oil does not; null: the oil carries all; a log's replaces it",
+        "pressure in A of a joint that starts within 1 deg of an end of its range, where its stop carries "
+        "what the oil does not; null: the oil carries all; a log's replaces it",
     )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
     delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")

@@ -24,7 +24,6 @@ from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout
 from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
 
-
 STOP_REACH = np.radians(1.0)
 """how near an end of its range a joint must start to rest on its stop"""
 

@@ -23,6 +23,9 @@ from hydroid.hydraulics.records import JOINT_STATE, LINEAR, NONE, Array, Records
 from hydroid.hydraulics.solenoid import resting_stroke
 from hydroid.settings.hydraulics import HydraulicSettings
 
+START_PRESSURE = 50e5
+"""in chamber B at the start where neither settings nor log say [Pa]; ours"""
+
 
 @dataclass
 class ActuatorState:
@@ -96,7 +99,8 @@ class Actuator:
         """
         c = self.plugin.coefficients
         lever = np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
-        area_a, area_b, level = c["area_a"], c["area_b"], c["start_pressure"]
+        area_a, area_b = c["area_a"], c["area_b"]
+        level = np.where(np.isfinite(c["start_pressure"]), c["start_pressure"], START_PRESSURE)
         limits = c["supply_pressure"], c["tank_pressure"]
         pressure_a, pressure_b = holding_pressures(torque / lever, area_a, area_b, *limits, level)
         rests = np.isfinite(c["trapped_pressure"]) & (c["kind"] != NONE)

@@ -141,16 +141,16 @@ class HydraulicSettings(Settings):
     stop_penetration: NotNegative = _quantity(
         1e10, "N·s/m²", "K_p of equation (9): force of the end stops per penetration and speed"
     )
-    start_pressure: Positive = _quantity(
+    start_pressure: Positive | None = _quantity(
         50.0,
         "bar",
-        "pressure in B at the start, if both chambers can hold the arm then; a log's replaces it",
+        "pressure in B at the start, if that can hold the arm; null: the log's pressures, if it has any",
     )
     trapped_pressure: NotNegative | None = _quantity(
         None,
         "bar",
         "pressure in A of a joint that starts within 1 deg of an end of its range, where its stop carries "
-        "what the oil does not; null: the oil carries all; a log's replaces it",
+        "what the oil does not; null: the oil carries all",
     )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
     delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")

@@ -89,7 +89,8 @@ class ArmActuators:
         """Return the actuators of n candidates, with a force-stroke curve each, and their state at rest.
 
         `pose` is the moving joints' [rad], shape (V,); `balance` holds them there [N·m], shape (n, V).
-        Chamber pressures measured there [Pa], shape (V, 2), NaN where there are none, replace theirs.
+        Chamber pressures measured there [Pa], shape (V, 2), NaN where there are none, are taken by
+        candidates that have no start pressure of their own.
         """
         assert candidates.actuators is not None
         chosen: Records = candidates.actuators[:, self.joints]  # pyright: ignore[reportAssignmentType]
@@ -97,9 +98,10 @@ class ArmActuators:
         chosen.trapped_pressure[:, away] = np.inf
         if pressure is not None:
             trapped, level = pressure[self.columns].T
-            rests = np.isfinite(chosen.trapped_pressure) & np.isfinite(trapped)
+            asked = np.isinf(chosen.start_pressure) & np.isfinite(pressure[self.columns]).all(axis=1)
+            rests = asked & np.isfinite(chosen.trapped_pressure)
             chosen["trapped_pressure"] = np.where(rests, trapped, chosen.trapped_pressure)
-            chosen["start_pressure"] = np.where(np.isfinite(level), level, chosen.start_pressure)
+            chosen["start_pressure"] = np.where(asked, level, chosen.start_pressure)
         damping = candidates.damping[:, self.joints]
         actuator = Actuator(chosen, self._linkages, damping, self._period, self._settings, self._entries)
         angle = np.tile(pose[self.columns], (len(balance), 1))

@@ -29,7 +29,7 @@ def duties(pose: np.ndarray, levels: Mapping[int, Sequence[float]], dwell: float
     return Log("duties", time, command, np.tile(pose, (length, 1)), period)
 
 
-def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: float) -> FitSettings:
+def settings_of(parameters: Mapping[str, Mapping[str, object]], **hydraulics: float | None) -> FitSettings:
     """Stage 2 with known mechanics and the given parameters; other settings of the chain by name."""
     known = {
         "D": {"quantity": "damping", "fixed": 231.8},

@@ -72,9 +72,8 @@ def test_more_than_the_load_presses_against_a_stop_above():
 
 
 def test_a_log_says_in_which_pressures_it_rested():
-    settings = settings_of(
-        {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
-    )
+    trapped = {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}
+    settings = settings_of({"trapped": trapped}, start_pressure=None)
     log = duties(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5

@@ -15,6 +15,7 @@ It is logged at constant duties of 40, 60 and 100 %, up from its stop and down f
 
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, exp, radians, sin, sqrt, tanh
@@ -198,10 +199,12 @@ def errors(model: hydroid.FitResult, logs: dict[tuple[str, int], Log]) -> dict[t
     }
 
 
-def study(seed: int, what: str, parameters: dict[str, object]) -> dict[tuple[str, int], float]:
+def study(
+    seed: int, what: str, parameters: Mapping[str, Mapping[str, object]]
+) -> dict[tuple[str, int], float]:
     """Fit the logs of the fitted duties, print the errors of all, return those of the unseen ones."""
     changes = {
-        "parameters": {"S": {"quantity": "stiffness", "fixed": 0.0}} | parameters,
+        "parameters": {"S": {"quantity": "stiffness", "fixed": 0.0}} | dict(parameters),
         "joint_refinement": False,
         "hydraulics.substeps": 10,
         "hydraulics.anticavitation": 2.0 if "out_A" in parameters else 0.0,

@@ -27,6 +27,7 @@ import hydroid
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 
+Parameters = Mapping[str, Mapping[str, object]]
 FITTED, UNSEEN = (40, 60, 100), (50, 70, 80, 90)
 PERIOD, REST, LENGTH, NOISE_DEG = 0.01, 0.5, 5.0, 0.02
 STAGES = {"up": (-30.0, 1.0), "down": (60.0, -1.0)}

@@ -167,7 +167,7 @@ def _exclude_contacts(spec: mujoco.MjSpec) -> None:
 
 
 def pivots(joint: Joint, actuator: LinearActuator) -> tuple[Array, Array]:
-    """Place a cylinder's pivots so that the angle from the parent's to the child's is q + θ0 about the axis.
+    """Place a cylinder's pivots so that the angle from the parent's to the child's is q ± θ0 about the axis.
 
     The triangle itself is `hydroid.settings.linkage`'s.
 
@@ -177,7 +177,7 @@ def pivots(joint: Joint, actuator: LinearActuator) -> tuple[Array, Array]:
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     towards = np.array(actuator.towards) - axis * (axis @ np.array(actuator.towards))
     towards /= np.linalg.norm(towards)
-    theta0 = math.radians(actuator.theta0)
+    theta0 = actuator.sense * math.radians(actuator.theta0)
     turned = math.cos(theta0) * towards + math.sin(theta0) * np.cross(axis, towards)
     on_parent, on_child = (actuator.a, actuator.b) if actuator.a_on == "parent" else (actuator.b, actuator.a)
     shift = actuator.offset * axis

@@ -59,7 +59,7 @@ class Actuator:
     Args:
         parameters: from `records.nominal_parameters`, shape (n, J); the coil of an infeasible candidate has
             no force, its spool never moves.
-        linkages: from `records.linkages`, shape (J,).
+        linkages: from `records.linkages`, shape (J,), (1, J) or (n, J).
         damping: viscous damping D of the joints, the arm's own [N·m·s/rad], shape (n, J).
         period: MuJoCo's step [s].
         settings: for the sub-steps.
@@ -77,7 +77,7 @@ class Actuator:
     ) -> None:
         self.shape = parameters.shape
         joints = self.shape[1]
-        driven = linkages.kind != NONE
+        driven = np.atleast_2d(linkages.kind)[0] != NONE
         order = np.argsort(driven, stable=True)
         places = np.arange(joints**2).reshape(joints, joints) if entries is None else entries
         self.plugin = kernel.Plugin(

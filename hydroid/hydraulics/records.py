@@ -17,7 +17,7 @@ from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings, actuator_values
-from hydroid.settings.linkage import LinearActuator
+from hydroid.settings.linkage import LinearActuator, triangle
 
 Array = NDArray[np.float64]
 Records: TypeAlias = np.recarray[Any, Any]
@@ -35,7 +35,8 @@ PARAMETERS = np.dtype([(name, np.float64) for name in QUANTITIES])
 
 LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
 """how a joint is moved: kind (NONE, LINEAR or ROTARY); pivots' distances a, b [m]; their angle theta0 at
-joint angle 0 [rad]; cylinder length with the rod fully in [m], as at the joint's lower limit; stroke [m]"""
+joint angle 0 [rad], below 0 if the rod runs out towards negative angles; cylinder length with the rod fully
+in [m], as at the end of the joint's range; stroke [m]"""
 
 COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance backflow relief")])
 """what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them;
@@ -131,21 +132,30 @@ def has_force_curve(parameters: Records) -> NDArray[np.bool_]:
     return np.asarray(curve_exists(p.force_1, p.force_2, p.stroke_1, p.stroke_2).all(axis=1), dtype=bool)
 
 
-def linkages(arm: Arm, joints: Sequence[int], driven: Sequence[int]) -> Records:
-    """Return how the moving joints (0-based, as stepped) are moved, a record array of LINKAGE, shape (J,).
+def linkages(
+    arm: Arm, joints: Sequence[int], driven: Sequence[int], parameters: Records | None = None
+) -> Records:
+    """Return how the moving joints (0-based, as stepped) are moved, a record array of LINKAGE, shape (n, J).
 
-    Those that are not `driven` have no hydraulic actuator.
+    Those that are not `driven` have no hydraulic actuator. Pivots are those of the parameters, shape (n, J),
+    or the arm's own, with n = 1.
     """
-    table = np.zeros(len(joints), LINKAGE)
+    table = np.zeros((1 if parameters is None else len(parameters), len(joints)), LINKAGE)
     for place, j in enumerate(joints):
         actuator = arm.joints[j].actuator
         if j not in driven:
             continue
-        table[place]["kind"] = ROTARY
+        one = table[:, place]
+        one["kind"] = ROTARY
         if isinstance(actuator, LinearActuator):
-            shortest = actuator.length(math.radians(arm.joints[j].range[0]))
-            theta0, stroke = math.radians(actuator.theta0), 1e-3 * actuator.stroke
-            table[place] = (LINEAR, actuator.a, actuator.b, theta0, shortest, stroke)
+            one["kind"], one["stroke"] = LINEAR, 1e-3 * actuator.stroke
+            own = actuator.a, actuator.b, math.radians(actuator.theta0)
+            if parameters is not None:
+                p = parameters[:, place]
+                own = p["pivot_distance_1"], p["pivot_distance_2"], p["pivot_angle"]
+            one["a"], one["b"], one["theta0"] = own[0], own[1], actuator.sense * own[2]
+            retracted = math.radians(arm.joints[j].range[0 if actuator.sense > 0 else 1])
+            one["shortest"] = triangle(retracted, one["a"], one["b"], one["theta0"])[0]
     return table.view(np.recarray)
 
 

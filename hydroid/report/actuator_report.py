@@ -84,7 +84,7 @@ def joint_records(arm: Arm, candidates: Candidates, joint: int) -> Any:
     """Return one joint's COEFFICIENTS, joint 1-based, of n candidates with hydraulics, shape (n,)."""
     assert candidates.actuators is not None
     chosen = candidates.actuators[:, [joint - 1]].view(np.recarray)
-    return coefficients(chosen, linkages(arm, [joint - 1], [joint - 1])).view(np.recarray)[:, 0]
+    return coefficients(chosen, linkages(arm, [joint - 1], [joint - 1], chosen)).view(np.recarray)[:, 0]
 
 
 def actuator_page(actuator: JointActuator) -> Page:

@@ -185,15 +185,16 @@ def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
     """Refuse a triangle that is flat within the joint's range, and a stroke too short for the range."""
     if joint.continuous:
         raise ValueError(f"joint {joint.name}: a continuous joint needs a rotary actuator")
-    first, last = (angle + actuator.theta0 for angle in joint.range)
+    first, last = sorted(actuator.sense * angle + actuator.theta0 for angle in joint.range)
     if first <= 0 or last >= 180:
+        what = "range + theta0" if actuator.extends == "positive" else "theta0 - range"
         raise ValueError(
-            f"joint {joint.name}: range + theta0 runs from {first:g} to {last:g} deg, "
+            f"joint {joint.name}: {what} runs from {first:g} to {last:g} deg, "
             "and the cylinder has no moment arm at 0 and 180"
         )
     if not np.cross(joint.axis, actuator.towards).any():
         raise ValueError(f"joint {joint.name}: `towards` must not lie along the joint's axis")
-    shortest, longest = actuator.length(np.radians(joint.range))
+    shortest, longest = sorted(actuator.length(np.radians(joint.range)))
     needed = 1e3 * (longest - shortest)
     if actuator.stroke < (1 - STROKE_TOLERANCE) * needed:
         raise ValueError(

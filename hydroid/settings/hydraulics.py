@@ -7,6 +7,7 @@ Units are those of a drawing or data sheet. Values marked as the article's are t
 others are ours: plausible sizes, not measurements of a HydroLek.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -15,7 +16,15 @@ from pydantic import Field, model_validator
 from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.settings.load import NotNegative, Positive, Settings
 
-SI_FACTORS = {"mm": 1e-3, "mm²": 1e-6, "cm³": 1e-6, "N/mm": 1e3, "bar": 1e5, "L/min": 1e-3 / 60.0}
+SI_FACTORS = {
+    "mm": 1e-3,
+    "mm²": 1e-6,
+    "cm³": 1e-6,
+    "N/mm": 1e3,
+    "bar": 1e5,
+    "L/min": 1e-3 / 60.0,
+    "deg": math.pi / 180.0,
+}
 """what one of a unit is in SI; units that are SI already are not listed"""
 
 SPANS = {
@@ -182,6 +191,9 @@ def _quantities() -> dict[str, Quantity]:
         ("area_b", "mm²", "A_B: the same of chamber B"),
         ("opening_a", "mm²", "largest opening of the valve, towards A"),
         ("opening_b", "mm²", "largest opening of the valve, towards B"),
+        ("pivot_distance_1", "m", "a: distance of one pivot of a cylinder from the joint's axis"),
+        ("pivot_distance_2", "m", "b: distance of the other pivot"),
+        ("pivot_angle", "deg", "theta0: angle between both pivots at joint angle 0"),
     )
     of_settings = [
         Quantity(name, str(extra["unit"]), field.description or "", str(extra["source"]))
@@ -208,9 +220,12 @@ def actuator_values(
 ) -> dict[str, float | None]:
     """Return the value of every quantity of one actuator, in the units of QUANTITIES; None: no limit."""
     values: dict[str, float | None] = settings.model_dump()
+    values["pivot_distance_1"] = values["pivot_distance_2"] = values["pivot_angle"] = 0.0
     values["opening_a"] = values["opening_b"] = actuator.max_opening
     if isinstance(actuator, LinearActuator):
         values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
+        values["pivot_distance_1"], values["pivot_distance_2"] = actuator.a, actuator.b
+        values["pivot_angle"] = actuator.theta0
     else:
         values["area_a"] = values["area_b"] = actuator.displacement
         values["dead_volume"] = settings.rotary_volume

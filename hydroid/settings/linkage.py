@@ -31,7 +31,8 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
 
     The hydraulic kernel compiles this very function.
 
-    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0;
+    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0, below 0 if
+    the rod runs out towards negative angles;
     `shortest` is the cylinder's length with the rod fully in [m]: with 0 the travel is the length itself.
     """
     theta = angle + theta0
@@ -56,10 +57,13 @@ class LinearActuator(Settings):
     """distance of the other pivot from the joint's axis [m]"""
     theta0: float
     """angle between the two pivots at joint angle 0 [deg]"""
+    extends: Literal["positive", "negative"] = "positive"
+    """direction in which the joint turns when the rod runs out: with negative the angle between the pivots is
+    theta0 - q, and a positive command turns the joint to negative angles"""
     stroke: Positive
     """stroke of the rod [mm]"""
     area_a: Positive
-    """piston area that pushes the joint to positive angles [mm²]"""
+    """piston area that pushes the rod out [mm²]"""
     area_b: Positive
     """annulus area on the rod side [mm²]"""
     max_opening: Positive
@@ -72,13 +76,18 @@ class LinearActuator(Settings):
     offset: float = 0.0
     """distance of both pivots from the joint's origin along its axis [m]"""
 
+    @property
+    def sense(self) -> float:
+        """1 if the rod runs out towards positive angles, else -1."""
+        return 1.0 if self.extends == "positive" else -1.0
+
     def length(self, angle: Any) -> Any:
         """Distance between the pivots [m] at joint angles [rad] of any shape."""
-        return triangle(angle, self.a, self.b, math.radians(self.theta0))[0]
+        return triangle(angle, self.a, self.b, self.sense * math.radians(self.theta0))[0]
 
     def moment_arm(self, angle: Any) -> Any:
         """Torque per force, and rod speed per joint speed [m], at joint angles [rad] of any shape."""
-        return triangle(angle, self.a, self.b, math.radians(self.theta0))[1]
+        return triangle(angle, self.a, self.b, self.sense * math.radians(self.theta0))[1]
 
 
 class RotaryActuator(Settings):

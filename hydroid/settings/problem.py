@@ -35,7 +35,7 @@ class ParameterSettings(Settings):
 
     quantity: str
     """gain, damping, stiffness, friction or mass; in stage 2 also any quantity of `hydraulics` and area_a,
-    area_b, opening_a, opening_b"""
+    area_b, opening_a, opening_b, pivot_distance_1, pivot_distance_2, pivot_angle"""
     joints: tuple[JointNumber, ...] | None = None
     """joints that share the parameter; null: all"""
     each: bool | tuple[JointNumber, ...] = False

@@ -79,7 +79,7 @@ class ArmActuators:
         self.joints = locked.columns[self.columns]
         everyone = [int(j) for j in self.joints]
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
-        self._linkages = linkages(arm, everyone, [j for j in everyone if active[j]])
+        self._moves = arm, everyone, [j for j in everyone if active[j]]
         self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
         self._period, self._settings = locked.model.opt.timestep, settings
 
@@ -103,7 +103,8 @@ class ArmActuators:
             chosen["trapped_pressure"] = np.where(rests, trapped, chosen.trapped_pressure)
             chosen["start_pressure"] = np.where(asked, level, chosen.start_pressure)
         damping = candidates.damping[:, self.joints]
-        actuator = Actuator(chosen, self._linkages, damping, self._period, self._settings, self._entries)
+        moved = linkages(*self._moves, chosen)
+        actuator = Actuator(chosen, moved, damping, self._period, self._settings, self._entries)
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return actuator, actuator.start(angle, balance[:, self.columns])
 

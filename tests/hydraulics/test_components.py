@@ -174,7 +174,7 @@ def test_triangle_is_a_derivative_chain():
 
 
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
-    moved = linkages(arm, range(7), range(7))
+    moved = linkages(arm, range(7), range(7))[0]
     for joint, c in zip(arm.joints, moved, strict=True):
         if joint.actuator.kind != "linear":
             continue

@@ -19,8 +19,16 @@ def test_every_setting_is_described():
 
 
 def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
-    assert len(QUANTITIES) == 52
-    arm = {"area_a", "area_b", "opening_a", "opening_b"}
+    assert len(QUANTITIES) == 55
+    arm = {
+        "area_a",
+        "area_b",
+        "opening_a",
+        "opening_b",
+        "pivot_distance_1",
+        "pivot_distance_2",
+        "pivot_angle",
+    }
     other = {"rotary_volume", "substeps"}
     assert set(QUANTITIES) - arm == set(HydraulicSettings.model_fields) - other
     assert all(q.meaning for q in QUANTITIES.values())

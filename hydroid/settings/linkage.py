@@ -31,8 +31,8 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
 
     The hydraulic kernel compiles this very function.
 
-    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0, below 0 if
-    the rod runs out towards negative angles;
+    The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0. It is
+    below 0 if the rod runs out towards negative angles.
     `shortest` is the cylinder's length with the rod fully in [m]: with 0 the travel is the length itself.
     """
     theta = angle + theta0

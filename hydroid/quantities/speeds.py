@@ -14,7 +14,7 @@ COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 GAIN = (40.0, 60.0)
 """commands between which the gain is taken [%]"""
 STEP = 50.0
-"""command of the speed over poses, of dead time and time constant [%]"""
+"""command of the speed over poses [%]; of dead time and time constant too, where it moves the joint"""
 POSES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """parts of the travel at which the speed over poses is stated"""
 MOVES = 0.02
@@ -45,6 +45,7 @@ class SpeedTests:
         poses = [bench.at(low + part * (high - low)) for part in POSES]
         self._over_poses = [movement(pose, sign * STEP).through_pose(estimate) for pose in poses]
         self._onset = self._enclose(estimate)
+        self._rise = self._moving_step(estimate)
 
     def measure(self, candidates: Candidates) -> Measured:
         """Return the quantities of n candidates."""
@@ -63,7 +64,8 @@ class SpeedTests:
                         "angle [deg]", float(np.degrees(step.bench.angle)))
             for step in self._over_poses
         ]  # fmt: skip
-        rises = [self._steps[STEP].reaches(runs[STEP], part * speed[STEP]) for part in (ONSET, RISEN)]
+        step = self._rise
+        rises = [self._steps[step].reaches(runs[step], part * speed[step]) for part in (ONSET, RISEN)]
         gain = (speed[GAIN[1]] - speed[GAIN[0]]) / (GAIN[1] - GAIN[0])
         c, arm = actuator(self._bench, candidates)
         flow = (c.area_a if self._sign > 0 else c.area_b) * arm * np.radians(speed[100.0])
@@ -73,8 +75,8 @@ class SpeedTests:
             self._named("speed_50", "speed at 50 % command", "deg/s", speed[50.0]),
             self._named("speed_100", "speed at 100 % command", "deg/s", speed[100.0]),
             self._named("gain", "gain between command and speed", "deg/s per %", gain),
-            self._named("dead_time", "dead time", "s", rises[0]),
-            self._named("time_constant", "time constant", "s", rises[1] - rises[0]),
+            self._named("dead_time", f"dead time at {step:g} % command", "s", rises[0]),
+            self._named("time_constant", f"time constant at {step:g} % command", "s", rises[1] - rises[0]),
             *self._dead_band(candidates, speed[100.0]),
             self._named("full_flow", "flow at 100 % command", "L/min", 6e4 * flow),
         ]
@@ -94,6 +96,12 @@ class SpeedTests:
         low, high = (abs(step.command) for step in self._onset)
         part = (MOVES * full + self._rest(candidates) - below) / (above - below)
         return [self._named("dead_band", "dead band", "%", low + part * (high - low))]
+
+    def _moving_step(self, estimate: Candidates) -> float:
+        """Return the smallest command from STEP on that clearly moves the estimate, or the largest."""
+        full = self._steps[100.0].speed(estimate)[0]
+        enough = (u for u in COMMANDS if u >= STEP and self._steps[u].speed(estimate)[0] > ONSET * full)
+        return next(enough, 100.0)
 
     def _rest(self, candidates: Candidates) -> Array:
         """Speed without a command, shape (n,)."""

@@ -68,7 +68,7 @@ def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
             tables={"errors": objective_table(problem, fit)},
             plots=drawn,
         ),
-        quantity_section(fit.quantities, problem.logs),
+        quantity_section(problem, fit.quantities),
         Section(
             "Parameters",
             rank_phrase(fit.identifiability),

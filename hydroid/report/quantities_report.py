@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hydroid.estimate import CurveEstimate, QuantityEstimate
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
 from hydroid.quantities.quantities import Quantities
 from hydroid.report import style
 from hydroid.report.page import Plot, Section
@@ -33,18 +34,19 @@ _CAPTION = (
 )
 
 
-def quantity_section(quantities: Quantities, logs: Sequence[Log]) -> Section:
+def quantity_section(problem: Problem, quantities: Quantities) -> Section:
     """Return the section with all quantities and the curves of speed."""
+    logs, source = problem.logs, "logs and priors" if len(problem.priors) else "logs"
     lost = [_name(q, quantities) for q in quantities.scalars.values() if not _within(q) <= DETERMINED_WITHIN]
     text = (
         "These quantities follow from all parameters together. They can be known well although no single "
         "parameter is: all parameter sets that explain the logs agree on them."
     )
-    points = (f"Not determined by these logs: {listed(lost)}.",) if lost else ()
+    points = (f"Not determined: {listed(lost)}.",) if lost else ()
     speeds = {c.joint: c for n, c in quantities.curves.items() if n.endswith("_speed")}
     plots = (Plot("speed", _CAPTION, partial(draw_speeds, quantities, logs)),) if speeds else ()
     table = quantity_table(quantities)
-    return Section("What the logs determine", text, points, tables={"quantities": table}, plots=plots)
+    return Section(f"What the {source} determine", text, points, tables={"quantities": table}, plots=plots)
 
 
 def quantity_table(quantities: Quantities) -> Table:
@@ -59,7 +61,7 @@ def quantity_table(quantities: Quantities) -> Table:
         "the final speed. Time constant: from there to 63 % of it. docs/quantities.md defines every quantity."
     )
     header = ("joint", "quantity", "unit", "value", "from", "to", "± [%]")
-    return Table("What the logs determine", header, tuple(rows), note, ("± [%]",))
+    return Table("Quantities", header, tuple(rows), note, ("± [%]",))
 
 
 def best_known(quantities: Quantities) -> list[str]:

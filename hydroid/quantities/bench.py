@@ -9,6 +9,7 @@ from hydroid.arm.model import load_model, quiet_mujoco
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.linkage import LinearActuator
 from hydroid.simulation import Candidates, HydraulicSimulation
 from hydroid.simulation.rollout import SingleArm
 from hydroid.simulation.scenario import Scenario
@@ -43,6 +44,12 @@ class Bench:
     def name(self) -> str:
         """Begins the names of its quantities."""
         return f"joint{self.joint}"
+
+    @property
+    def sense(self) -> float:
+        """Direction in which a positive command turns the joint, 1 or -1."""
+        actuator = self.settings.arm.joints[self.joint - 1].actuator
+        return actuator.sense if isinstance(actuator, LinearActuator) else 1.0
 
     def at(self, angle: float) -> "Bench":
         """Return the joint tested at another angle [rad]."""

@@ -34,4 +34,4 @@ Measured: TypeAlias = list[tuple[Column, Array]]
 Measure: TypeAlias = Callable[[Candidates], Measured]
 """computes the same quantities for every population; it is smooth in the parameters"""
 SIGNS = ("positive", "negative")
-"""ends the names of quantities that belong to a direction of motion"""
+"""ends the names of quantities that belong to commands of one sign"""

@@ -75,7 +75,8 @@ class Movement:
 
     @property
     def _sign(self) -> float:
-        return -1.0 if self.command < 0 else 1.0
+        """Direction in which the command turns the joint."""
+        return -self.bench.sense if self.command < 0 else self.bench.sense
 
 
 def movement(bench: Bench, command: float) -> Movement:

@@ -67,7 +67,7 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     if bench.settings.stage == "mech":
         return lambda candidates: [*gain_model(bench, candidates), *gravity(bench, candidates)]
     torque = float(bench.weigh(estimate, np.array([bench.angle]))[0][0, 0])
-    words = ("raising", "lowering") if torque > 0 else ("lowering", "raising")
+    words = ("raising", "lowering") if torque * bench.sense > 0 else ("lowering", "raising")
     words = words if abs(torque) >= LEAST_GRAVITY else SIGNS
     tests = [
         SpeedTests(bench, estimate, sign, named)

@@ -55,7 +55,7 @@ class SpeedTests:
         curve = [
             (
                 Column(f"{name}_speed", "speed", "deg/s", False, "command [%]", self._sign * u),
-                self._sign * value,
+                self._sign * self._bench.sense * value,
             )
             for u, value in speed.items()
         ]
@@ -68,7 +68,7 @@ class SpeedTests:
         rises = [self._steps[step].reaches(runs[step], part * speed[step]) for part in (ONSET, RISEN)]
         gain = (speed[GAIN[1]] - speed[GAIN[0]]) / (GAIN[1] - GAIN[0])
         c, arm = actuator(self._bench, candidates)
-        flow = (c.area_a if self._sign > 0 else c.area_b) * arm * np.radians(speed[100.0])
+        flow = (c.area_a if self._sign > 0 else c.area_b) * np.abs(arm) * np.radians(speed[100.0])
         return [
             *curve,
             *poses,

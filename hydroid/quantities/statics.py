@@ -82,9 +82,8 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
     assert candidates.actuators is not None
     j = bench.joint - 1
     parameters: Records = candidates.actuators[:, [j]].view(np.recarray)
-    c: Records = coefficients(parameters, linkages(bench.settings.arm, [j], [j], parameters))[:, 0].view(
-        np.recarray
-    )
+    table = coefficients(parameters, linkages(bench.settings.arm, [j], [j], parameters))
+    c: Records = table[:, 0].view(np.recarray)
     if c.kind[0] == LINEAR:
         return c, triangle(bench.angle, c.a, c.b, c.theta0, c.shortest)[1]
     return c, np.ones(len(c))

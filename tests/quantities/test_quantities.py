@@ -158,3 +158,20 @@ def test_quantities_are_smooth_in_the_parameters(shoulder):
     for column, value in measure(Stage(one.settings).candidates(rows)):
         near, far = (value[3] - value[1]) / 2, (value[4] - value[0]) / 20
         assert near == pytest.approx(far, rel=0.2, abs=2e-5 * (abs(value[2]) + 1)), column.label
+
+
+def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(shoulder):
+    one = model()
+    joints = list(one.settings.arm.joints)
+    cylinder = joints[1].actuator
+    turned = cylinder.model_copy(
+        update={"extends": "negative", "theta0": 180 - cylinder.theta0, "area_a": 750.0, "area_b": 1000.0}
+    )
+    joints[1] = joints[1].model_copy(update={"actuator": turned})
+    arm = one.settings.arm.model_copy(update={"joints": tuple(joints)})
+    settings = one.settings.model_copy(update={"arm": arm})
+    found = measured(*shoulder_bench(replace(one, settings=settings)))
+    assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)
+    speed = np.array(found["joint2_speed"])
+    assert np.all(np.diff(speed) < 0)
+    assert found["joint2_full_flow_positive"][0] > 0

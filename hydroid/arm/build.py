@@ -70,7 +70,7 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
     for link, joint in zip(arm.links, arm.joints, strict=True):
         child = body.add_body(name=link.name, pos=joint.at)
         _add_joint(spec, child, joint)
-        if isinstance(joint.actuator, LinearActuator):
+        if isinstance(joint.actuator, LinearActuator) and joint.actuator.four_bar is None:
             _add_cylinder(spec, body, child, joint, joint.actuator)
         _add_part(spec, child, link, folder, "steel" if link is arm.links[-1] else "paint")
         for part in arm.fixed:

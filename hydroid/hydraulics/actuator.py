@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydroid.hydraulics import kernel
-from hydroid.hydraulics.cylinder import GIVE, holding_pressures, oil_pressure, triangle, volume
+from hydroid.hydraulics.cylinder import GIVE, four_bar, holding_pressures, oil_pressure, triangle, volume
 from hydroid.hydraulics.records import JOINT_STATE, LINEAR, NONE, Array, Records, coefficients
 from hydroid.hydraulics.solenoid import resting_stroke
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -177,4 +177,11 @@ def _triangle(c: NDArray[np.void], angle: Array) -> tuple[Array, Array, Array]:
     linear = c["kind"] == LINEAR
     # joints without a triangle get a harmless one
     a, b = np.where(linear, c["a"], 2.0), np.where(linear, c["b"], 1.0)
-    return triangle(angle, a, b, c["theta0"], c["shortest"])
+    rocks = c["rocker"] > 0
+    if not rocks.any():
+        return triangle(angle, a, b, c["theta0"], c["shortest"])
+    with np.errstate(all="ignore"):  # joints without a rocker
+        bars = four_bar(angle, c.view(np.recarray))
+    psi, first, second = (np.where(rocks, x, y) for x, y in zip(bars, (angle, 1.0, 0.0), strict=True))
+    travel, arm, slope = triangle(psi, a, b, c["theta0"], c["shortest"])
+    return travel, arm * first, slope * first**2 + arm * second

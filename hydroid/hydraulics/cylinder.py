@@ -27,6 +27,7 @@ SMALLEST = 0.1
 """part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
 
 triangle = compilable(linkage.triangle)
+four_bar = compilable(linkage.four_bar)
 
 
 @compilable

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.hydraulics.cylinder import contact_torque, friction_damping, stop_damping, triangle, volume
+from hydroid.hydraulics.cylinder import (
+    contact_torque,
+    four_bar,
+    friction_damping,
+    stop_damping,
+    triangle,
+    volume,
+)
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
 from hydroid.hydraulics.solenoid import coil_current, plunger_step, plunger_weight, side_voltage
@@ -38,7 +45,12 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
     w.way, w.speed, w.torque, w.resistance, w.oil_stiffness = 0.0, velocity, 0.0, 0.0, 0.0
     w.flow_a, w.flow_b = 0.0, 0.0
     if c.kind == LINEAR:
-        w.travel, w.arm, w.slope = triangle(angle, c.a, c.b, c.theta0, c.shortest)
+        if c.rocker > 0.0:
+            psi, first, second = four_bar(angle, c)
+            w.travel, arm, slope = triangle(psi, c.a, c.b, c.theta0, c.shortest)
+            w.arm, w.slope = arm * first, slope * first * first + arm * second
+        else:
+            w.travel, w.arm, w.slope = triangle(angle, c.a, c.b, c.theta0, c.shortest)
         volume_a = volume(w.travel, c.area_a, c.dead_volume)
         volume_b = volume(c.stroke - w.travel, c.area_b, c.dead_volume)
         w.pressure_a = z.oil_a - c.bulk_modulus * np.log(volume_a / c.dead_volume)

@@ -17,7 +17,7 @@ from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings, actuator_values
-from hydroid.settings.linkage import LinearActuator, triangle
+from hydroid.settings.linkage import LinearActuator, four_bar, triangle
 
 Array = NDArray[np.float64]
 Records: TypeAlias = np.recarray[Any, Any]
@@ -33,10 +33,12 @@ def _fields(names: str) -> list[tuple[str, type]]:
 PARAMETERS = np.dtype([(name, np.float64) for name in QUANTITIES])
 """all quantities of an actuator, in SI"""
 
-LINKAGE = np.dtype([("kind", np.int64), *_fields("a b theta0 shortest stroke")])
+BARS = ("ground", "rocker", "coupler", "child", "phase", "branch")
+LINKAGE = np.dtype([("kind", np.int64), *_fields(" ".join(("a b theta0 shortest stroke", *BARS)))])
 """how a joint is moved: kind (NONE, LINEAR or ROTARY); pivots' distances a, b [m]; their angle theta0 at
 joint angle 0 [rad], below 0 if the rod runs out towards negative angles; cylinder length with the rod fully
-in [m], as at the end of the joint's range; stroke [m]"""
+in [m], as at the end of the joint's range; stroke [m]; ground to branch are those of `linkage.four_bar`, and
+rocker is 0 where there is none"""
 
 COEFFICIENTS = np.dtype([*PARAMETERS.descr, *LINKAGE.descr, *_fields("coil gap conductance backflow relief")])
 """what the kernel reads of an actuator: its parameters, its linkage, and constants that follow from them;
@@ -154,7 +156,12 @@ def linkages(
                 p = parameters[:, place]
                 own = p["pivot_distance_1"], p["pivot_distance_2"], p["pivot_angle"]
             one["a"], one["b"], one["theta0"] = own[0], own[1], actuator.sense * own[2]
-            retracted = math.radians(arm.joints[j].range[0 if actuator.sense > 0 else 1])
+            ends = np.radians(arm.joints[j].range)
+            retracted = float(ends[int(np.argmin(actuator.length(ends)))])
+            if actuator.four_bar is not None:
+                for name in BARS:
+                    one[name] = getattr(actuator.four_bar, name)
+                retracted = four_bar(retracted, actuator.four_bar)[0]
             one["shortest"] = triangle(retracted, one["a"], one["b"], one["theta0"])[0]
     return table.view(np.recarray)
 

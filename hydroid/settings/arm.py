@@ -13,7 +13,14 @@ from pydantic import Field, Strict, model_validator
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.settings.linkage import STROKE_TOLERANCE, Direction, LinearActuator, RotaryActuator, Vector
+from hydroid.settings.linkage import (
+    STROKE_TOLERANCE,
+    Direction,
+    LinearActuator,
+    RotaryActuator,
+    Vector,
+    four_bar,
+)
 from hydroid.settings.load import Positive, Settings, load
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
@@ -181,12 +188,25 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     return arm.model_copy(update=places)
 
 
+def _check_four_bar(joint: Joint, actuator: LinearActuator) -> None:
+    """Refuse a linkage that cannot be closed, or that passes a dead centre, within the joint's range."""
+    with np.errstate(all="ignore"):
+        arm = actuator.moment_arm(np.radians(np.linspace(*joint.range, 181)))
+        turned = four_bar(np.radians(np.linspace(*joint.range, 181)), actuator.four_bar)[1]
+    if not (np.isfinite(arm).all() and (turned * turned[0] > 0).all() and (arm * arm[0] > 0).all()):
+        raise ValueError(
+            f"joint {joint.name}: its four-bar linkage does not reach all of its range or has a dead centre"
+        )
+
+
 def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
     """Refuse a triangle that is flat within the joint's range, and a stroke too short for the range."""
     if joint.continuous:
         raise ValueError(f"joint {joint.name}: a continuous joint needs a rotary actuator")
+    if actuator.four_bar is not None:
+        _check_four_bar(joint, actuator)
     first, last = sorted(actuator.sense * angle + actuator.theta0 for angle in joint.range)
-    if first <= 0 or last >= 180:
+    if actuator.four_bar is None and (first <= 0 or last >= 180):
         what = "range + theta0" if actuator.extends == "positive" else "theta0 - range"
         raise ValueError(
             f"joint {joint.name}: {what} runs from {first:g} to {last:g} deg, "

@@ -42,8 +42,58 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
     return length - shortest, arm, (cosine - arm * arm) / length
 
 
+def four_bar(angle: Any, bars: Any) -> Any:
+    """Angle ψ [rad] of a rocker that turns a joint by a coupler, dψ/dq and d²ψ/dq², elementwise.
+
+    The hydraulic kernel compiles this very function. In the parent's plane the joint's axis is the origin and
+    the rocker's pivot lies at (ground, 0); ψ is the direction from there to the coupler's pin on the rocker.
+    The coupler's other pin, on the child, lies at the angle q + phase. `bars` has ground, rocker, coupler,
+    child [m], phase [rad] and `branch`, 1 or -1: the rocker's pin lies to the left or to the right of the
+    line from its pivot to the child's pin. NaN where the coupler cannot reach.
+    """
+    along, across = bars.child * np.cos(angle + bars.phase), bars.child * np.sin(angle + bars.phase)
+    square = (along - bars.ground) ** 2 + across**2
+    reach = (bars.rocker**2 + square - bars.coupler**2) / (2.0 * bars.rocker * np.sqrt(square))
+    psi = np.arctan2(across, along - bars.ground) + bars.branch * np.arccos(reach)
+    # with the coupler (x, y), x² + y² = coupler²: its derivatives for q give those of ψ
+    cosine, sine = bars.rocker * np.cos(psi), bars.rocker * np.sin(psi)
+    x, y = bars.ground + cosine - along, sine - across
+    lever = y * cosine - x * sine
+    first = (y * along - x * across) / lever
+    dx, dy = across - first * sine, first * cosine - along
+    bent = dx * dx + dy * dy + x * (along - first * first * cosine) + y * (across - first * first * sine)
+    return psi, first, -bent / lever
+
+
 STROKE_TOLERANCE = 0.02
 """part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
+
+
+class FourBar(Settings):
+    """A rocker on the parent link, which a cylinder turns, and a coupler to the child link: a bucket's."""
+
+    ground: Positive
+    """distance of the rocker's pivot from the joint's axis [m]"""
+    rocker: Positive
+    """length of the rocker, from its pivot to the coupler's pin [m]"""
+    coupler: Positive
+    """length of the coupler [m]"""
+    child: Positive
+    """distance of the coupler's pin on the child link from the joint's axis [m]"""
+    phase_deg: float
+    """angle at the joint from the rocker's pivot to the pin on the child link, at joint angle 0 [deg]"""
+    side: Literal["left", "right"]
+    """side of the line from the rocker's pivot to the pin on the child link on which the rocker's pin lies"""
+
+    @property
+    def branch(self) -> float:
+        """1 for left, -1 for right."""
+        return 1.0 if self.side == "left" else -1.0
+
+    @property
+    def phase(self) -> float:
+        """The same as `phase_deg` [rad]."""
+        return math.radians(self.phase_deg)
 
 
 class LinearActuator(Settings):
@@ -62,6 +112,9 @@ class LinearActuator(Settings):
     theta0 - q, and a positive command turns the joint to negative angles"""
     stroke: Positive
     """stroke of the rod [mm]"""
+    four_bar: FourBar | None = None
+    """linkage between cylinder and joint; a, b and theta0 are then those of the triangle at the rocker's
+    pivot, with the rocker's angle for the joint's; null: the cylinder acts on the joint itself"""
     area_a: Positive
     """piston area that pushes the rod out [mm²]"""
     area_b: Positive
@@ -83,11 +136,19 @@ class LinearActuator(Settings):
 
     def length(self, angle: Any) -> Any:
         """Distance between the pivots [m] at joint angles [rad] of any shape."""
-        return triangle(angle, self.a, self.b, self.sense * math.radians(self.theta0))[0]
+        return self._cylinder(angle)[0]
 
     def moment_arm(self, angle: Any) -> Any:
         """Torque per force, and rod speed per joint speed [m], at joint angles [rad] of any shape."""
-        return triangle(angle, self.a, self.b, self.sense * math.radians(self.theta0))[1]
+        return self._cylinder(angle)[1]
+
+    def _cylinder(self, angle: Any) -> tuple[Any, Any]:
+        theta0 = self.sense * math.radians(self.theta0)
+        if self.four_bar is None:
+            return triangle(angle, self.a, self.b, theta0)[:2]
+        psi, first, _ = four_bar(angle, self.four_bar)
+        length, arm, _ = triangle(psi, self.a, self.b, theta0)
+        return length, arm * first
 
 
 class RotaryActuator(Settings):

@@ -14,14 +14,15 @@ from numpy.typing import ArrayLike
 from scipy.integrate import Radau
 
 from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import LINEAR, LINKAGE, PARAMETERS, Records, with_values
+from hydroid.hydraulics.records import BARS, LINEAR, LINKAGE, PARAMETERS, Records, with_values
 from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
 
 INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, radians(-15.0)
 START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
 A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
 SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
-CYLINDER = np.array([(LINEAR, A, B, THETA0, SHORTEST, STROKE)], LINKAGE).view(np.recarray)
+NO_BARS = (0.0,) * len(BARS)
+CYLINDER = np.array([(LINEAR, A, B, THETA0, SHORTEST, STROKE, *NO_BARS)], LINKAGE).view(np.recarray)
 TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
 TEN = {
     "area_a": 1000.0, "area_b": 750.0, "current_max": 0.9, "current_min": 0.3, "onset_a": 1.4, "onset_b": 1.2,

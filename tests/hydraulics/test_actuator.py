@@ -243,7 +243,7 @@ def test_an_infeasible_member_stands_still_and_harms_nobody():
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    linkage = np.array([(ROTARY, 0, 0, 0, 0, 0)], LINKAGE).view(np.recarray)
+    linkage = np.array([(ROTARY, *[0] * (len(LINKAGE) - 1))], LINKAGE).view(np.recarray)
     p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0)
     actuator = Actuator(p, linkage, 5.0, 0.01, TIGHT)
     angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05

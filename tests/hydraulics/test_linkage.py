@@ -10,6 +10,7 @@ from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.records import linkages, nominal_parameters, with_values
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.linkage import four_bar
 
 SETTINGS = HydraulicSettings()
 SHOULDER = 1
@@ -77,6 +78,52 @@ def test_pivots_of_parameters_take_the_place_of_the_arms(arm: Arm):
     assert moved[0, 0] == own[0, 0]
     assert moved.b[1, 0] == 0.1
     assert moved.shortest[1, 0] < own.shortest[0, 0]
+
+
+BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}
+"""a bucket's linkage; ours"""
+
+
+def bucket(joint: Joint) -> Joint:
+    """The shoulder moved by a four-bar linkage."""
+    changes = {"four_bar": BARS, "a": 0.8, "b": 0.45, "theta0": 10.0, "stroke": 560.0}
+    return Joint.model_validate(joint.model_dump() | {"actuator": joint.actuator.model_dump() | changes})
+
+
+def test_the_coupler_of_a_four_bar_linkage_keeps_its_length(arm: Arm):
+    actuator = bucket(arm.joints[SHOULDER]).actuator
+    bars = actuator.four_bar
+    q = np.radians(np.linspace(-30, 90, 25))
+    psi, first, second = four_bar(q, bars)
+    pin = bars.ground + bars.rocker * np.exp(1j * psi)
+    child = bars.child * np.exp(1j * (q + bars.phase))
+    np.testing.assert_allclose(abs(pin - child), bars.coupler, rtol=1e-12)
+    ahead, behind = four_bar(q + 1e-6, bars), four_bar(q - 1e-6, bars)
+    np.testing.assert_allclose(first, (np.unwrap(ahead[0]) - np.unwrap(behind[0])) / 2e-6, rtol=1e-6)
+    np.testing.assert_allclose(second, (ahead[1] - behind[1]) / 2e-6, rtol=1e-4, atol=1e-7)
+    arms = (actuator.length(q + 1e-6) - actuator.length(q - 1e-6)) / 2e-6
+    np.testing.assert_allclose(actuator.moment_arm(q), arms, rtol=1e-6)
+
+
+def test_a_bucket_turns_by_flow_over_area_and_moment_arm(arm: Arm):
+    joints = list(arm.joints)
+    joints[SHOULDER] = bucket(joints[SHOULDER])
+    other = arm.model_copy(update={"joints": tuple(joints)})
+    angle = motion(other, np.full(150, 60.0), 0.0)
+    length = joints[SHOULDER].actuator.length(angle)
+    rod = np.diff(length)[60:] / 0.01
+    plain = np.diff(arm.joints[SHOULDER].actuator.length(motion(arm, np.full(150, 60.0), 0.0)))[60:] / 0.01
+    # without much load the rod's speed is that of the valve's flow, whatever it moves
+    assert rod.mean() == pytest.approx(plain.mean(), rel=0.05)
+    assert np.ptp(rod[-30:]) < 0.1 * rod.mean()  # the oil has rung out
+
+
+def test_a_linkage_that_does_not_reach_is_refused(arm: Arm):
+    joint = bucket(arm.joints[SHOULDER])
+    values = joint.model_dump()
+    values["actuator"]["four_bar"]["coupler"] = 0.05
+    with pytest.raises(ValueError, match="does not reach all of its range or has a dead centre"):
+        Joint.model_validate(values)
 
 
 def test_pivots_are_recovered():

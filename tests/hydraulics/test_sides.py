@@ -23,7 +23,7 @@ UNLIKE = {
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
     """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
-    linkage = np.array([(ROTARY, 0, 0, 0, 0, 0)], LINKAGE).view(np.recarray)
+    linkage = np.array([(ROTARY, *[0] * (len(LINKAGE) - 1))], LINKAGE).view(np.recarray)
     nominal = nominal_parameters(arm, SETTINGS, [3])
     actuator = Actuator(with_values(nominal, values), linkage, 5.0, 0.01, SETTINGS)
     angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05

@@ -24,6 +24,7 @@ SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
 NO_BARS = (0.0,) * len(BARS)
 CYLINDER = np.array([(LINEAR, A, B, THETA0, SHORTEST, STROKE, *NO_BARS)], LINKAGE).view(np.recarray)
 TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
+PIVOTS = {"pivot_distance_1": A, "pivot_distance_2": B, "pivot_angle": 70.0}
 TEN = {
     "area_a": 1000.0, "area_b": 750.0, "current_max": 0.9, "current_min": 0.3, "onset_a": 1.4, "onset_b": 1.2,
     "force_1": 8.0, "force_2": 0.7, "stroke_1": 0.8, "stroke_2": 12.0,
@@ -32,7 +33,7 @@ TEN = {
 
 def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
     """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
-    base = {k: inf if v is None else v for k, v in settings.model_dump().items()} | TRUTH
+    base = {k: inf if v is None else v for k, v in settings.model_dump().items()} | TRUTH | PIVOTS
     one = np.zeros((1, 1), PARAMETERS).view(np.recarray)
     return with_values(
         one,

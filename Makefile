@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -29,6 +29,18 @@ demo: setup  ## both stages on one log of the virtual rig, and the other log to 
 	$(BIN)/hydroid fit-hyd examples/logs/rig_shoulder_1.csv --mech runs/demo/nsga2 --out runs/demo/hyd
 	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
 		--fit runs/demo/ga --fit runs/demo/nsga2 --fit runs/demo/hyd --out runs/demo/validation
+
+excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the other six
+	@echo "The logs are real; the geometry of the arm is ours: see examples/excavator/README.md."
+	rm -rf runs/excavator
+	$(BIN)/hydroid fit-hyd examples/excavator/fit_*.csv --config examples/excavator/fit.yaml --out runs/excavator/fit
+	$(BIN)/hydroid validate examples/excavator/check_*.csv --fit runs/excavator/fit --out runs/excavator/validation
+
+excavator-seeds: setup  ## the same over five seeds, with time and simulations (docs/measured.md)
+	$(BIN)/python benchmarks/excavator.py 5
+
+six-joints: setup  ## six hydraulic joints at once, 54 parameters (docs/measured.md)
+	$(BIN)/python benchmarks/six_joints.py
 
 bench: setup  ## the time to an answer, what a simulation costs, and what hydroid adds to it (docs/measured.md)
 	$(BIN)/python benchmarks/answer.py

@@ -98,7 +98,7 @@ class Actuator:
         both have the shape (n, J).
         """
         c = self.plugin.coefficients
-        lever = np.where(c["kind"] == LINEAR, _triangle(c, angle)[1], 1.0)
+        lever = np.where(c["kind"] == LINEAR, rod_motion(c, angle)[1], 1.0)
         area_a, area_b = c["area_a"], c["area_b"]
         level = np.where(np.isfinite(c["start_pressure"]), c["start_pressure"], START_PRESSURE)
         limits = c["supply_pressure"], c["tank_pressure"]
@@ -163,7 +163,7 @@ class Actuator:
 
 def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:
     """Fill of chambers A and B, as `hydroid.hydraulics.cylinder` defines it."""
-    travel = _triangle(c, angle)[0]
+    travel = rod_motion(c, angle)[0]
     linear = [
         np.log(volume(x, c[area], c["dead_volume"]) / c["dead_volume"])
         for x, area in ((travel, "area_a"), (c["stroke"] - travel, "area_b"))
@@ -173,7 +173,11 @@ def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:
     return chosen[0], chosen[1]
 
 
-def _triangle(c: NDArray[np.void], angle: Array) -> tuple[Array, Array, Array]:
+def rod_motion(c: NDArray[np.void], angle: Array) -> tuple[Array, Array, Array]:
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
+
+    Of a joint without a cylinder they mean nothing.
+    """
     linear = c["kind"] == LINEAR
     # joints without a triangle get a harmless one
     a, b = np.where(linear, c["a"], 2.0), np.where(linear, c["b"], 1.0)

@@ -49,7 +49,9 @@ class Bench:
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
         actuator = self.settings.arm.joints[self.joint - 1].actuator
-        return actuator.sense if isinstance(actuator, LinearActuator) else 1.0
+        return (
+            float(np.sign(actuator.moment_arm(self.angle))) if isinstance(actuator, LinearActuator) else 1.0
+        )
 
     def at(self, angle: float) -> "Bench":
         """Return the joint tested at another angle [rad]."""

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from hydroid.hydraulics.cylinder import triangle, volume
+from hydroid.hydraulics.actuator import rod_motion
+from hydroid.hydraulics.cylinder import volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, linkages
 from hydroid.parameters import Array
 from hydroid.quantities.bench import Bench
@@ -56,7 +57,7 @@ def oil(bench: Bench, candidates: Candidates) -> Measured:
     """
     c, arm = actuator(bench, candidates)
     if c.kind[0] == LINEAR:
-        travel = triangle(bench.angle, c.a, c.b, c.theta0, c.shortest)[0]
+        travel = rod_motion(c, np.full(len(c), bench.angle))[0]
         volumes = volume(travel, c.area_a, c.dead_volume), volume(c.stroke - travel, c.area_b, c.dead_volume)
     else:
         volumes = c.dead_volume, c.dead_volume
@@ -85,5 +86,5 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
     table = coefficients(parameters, linkages(bench.settings.arm, [j], [j], parameters))
     c: Records = table[:, 0].view(np.recarray)
     if c.kind[0] == LINEAR:
-        return c, triangle(bench.angle, c.a, c.b, c.theta0, c.shortest)[1]
+        return c, rod_motion(c, np.full(len(c), bench.angle))[1]
     return c, np.ones(len(c))

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage quantity-coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -78,6 +78,9 @@ design-study: setup  ## a designed experiment against random ones of the same le
 
 coverage: setup  ## whether the intervals hold the truth as often as they say (docs/uncertainty.md)
 	$(BIN)/python benchmarks/interval_coverage.py
+
+quantity-coverage: setup  ## the same for quantities such as speeds and dead bands (docs/quantities.md)
+	$(BIN)/python benchmarks/quantity_coverage.py
 
 fuzz: setup  ## 12,000 damaged files of every kind; a quarter of an hour
 	$(BIN)/python benchmarks/fuzz.py

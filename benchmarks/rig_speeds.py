@@ -4,8 +4,9 @@
 
 RUN is a fit of stage 2 to examples/logs/rig_shoulder_1.csv. Wherever a log holds a command while the joint
 passes the middle of its travel, a straight line through WINDOW seconds of angles around that moment gives the
-speed that the rig really had. Log 1 was fitted, log 2 was not. A speed counts as inside where the 95 %
-intervals of fit and slope meet: both have an error. The slope's is that of white noise about its line.
+speed that the rig really had. Log 1 was fitted, log 2 was not. A speed counts as inside where the difference
+is within the root of the summed squares of both 95 % half intervals. The slope's error is that of white noise
+about its line.
 """
 
 import argparse
@@ -64,7 +65,7 @@ def main() -> None:
         print("| ---: | ---: | ---: | --- | --- |")
         for command, speed, sd in rows:
             value, first, last = (np.interp(command, curve.at, ends) for ends in (curve.value, low, high))
-            meets = first - 1.96 * sd <= speed <= last + 1.96 * sd
+            meets = abs(speed - value) <= np.hypot((last - first) / 2, 1.96 * sd)
             inside += meets
             rig, ends = f"{speed:.2f} ± {1.96 * sd:.2f}", f"{first:.2f} to {last:.2f}"
             print(f"| {command:.1f} | {rig} | {value:.2f} | {ends} | {'yes' if meets else 'no'} |")

@@ -102,7 +102,7 @@ class Plant:
 
     @property
     def angle(self) -> Array:
-        """Joint angles [rad], shape (J,), a copy."""
+        """Joint angles [rad], shape (J,), a copy; the true ones, whatever lag or scale their sensors have."""
         angle = self._pose.copy()
         angle[self._columns] = self.data.qpos
         return angle

@@ -163,6 +163,8 @@ class HydraulicSettings(Settings):
     )
     delay_a: Delay = _quantity(0.0, "s", "transport delay of the command to coil A")
     delay_b: Delay = _quantity(0.0, "s", "transport delay of the command to coil B")
+    sensor_scale: Positive = _quantity(1.0, "", "turn that the angle's sensor reads, over the true one")
+    sensor_lag: NotNegative = _quantity(0.0, "s", "time constant with which the sensor's reading follows")
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""

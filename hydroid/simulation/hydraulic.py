@@ -23,6 +23,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout
 from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
+from hydroid.simulation.sensor import reading
 
 STOP_REACH = np.radians(1.0)
 """how near an end of its range a joint must start to rest on its stop"""
@@ -138,6 +139,8 @@ class HydraulicSimulation:
     ) -> None:
         compile_rollout()
         self.scenario, self._steps = scenario, scenario.settings.steps_per_sample
+        self._measured = scenario.arm.columns[scenario.outputs]
+        self._period = self._steps * scenario.arm.model.opt.timestep
         self._threads = scenario.settings.threads or os.cpu_count() or 1
         prescribed = scenario.prescribed
         self._follows = np.array([], np.intp) if prescribed is None else prescribed.columns
@@ -151,8 +154,8 @@ class HydraulicSimulation:
         """Simulate n candidates, whatever n is.
 
         Returns:
-            Angles of the outputs, and the pressures asked for, at the log's samples; the first is the start.
-            A candidate without a force-stroke curve, or that diverged, is infeasible.
+            Angles of the outputs, as their sensors read them, and the pressures asked for, at the log's samples;
+            the first is the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
         return self.scenario.in_chunks(self._simulate_chunk, candidates)
 
@@ -166,7 +169,8 @@ class HydraulicSimulation:
 
     def _simulate_chunk(self, candidates: Candidates) -> Response:
         assert candidates.actuators is not None
-        n, samples = len(candidates), 1 + len(self._command) // self._steps
+        actuators, n = candidates.actuators, len(candidates)
+        samples = 1 + len(self._command) // self._steps
         angle = np.full((n, samples, len(self.scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
         exists = np.flatnonzero(has_force_curve(candidates.actuators))
@@ -179,7 +183,8 @@ class HydraulicSimulation:
             arm = free.pop()
             followed, seen = self._follow(arm, start, row, observe=pressure is not None)
             if arm.healthy:
-                angle[exists[row]] = followed[:, self.scenario.outputs]
+                sensors = actuators[exists[row], self._measured]
+                angle[exists[row]] = reading(followed[:, self.scenario.outputs], sensors, self._period)
                 if pressure is not None and seen is not None:
                     pressure[exists[row]] = seen.pressure[:, self._pressures]
             free.append(arm)

@@ -1,0 +1,47 @@
+"""What a sensor reads: its scale and lag against closed forms, and recovered from a log."""
+
+import numpy as np
+import pytest
+from recovery import assert_recovered, duties, recover, settings_of
+
+from hydroid.simulation.sensor import reading
+
+TIME = 0.01 * np.arange(300)
+
+
+def sensors(scale: float, lag: float) -> np.ndarray:
+    return np.array([(scale, lag)], [("sensor_scale", float), ("sensor_lag", float)])
+
+
+def test_a_plain_sensor_reads_the_angle_to_the_bit():
+    angle = np.random.default_rng(0).normal(size=(50, 1))
+    assert reading(angle, sensors(1.0, 0.0), 0.01) is angle
+
+
+def test_a_lagging_sensor_follows_a_ramp_late():
+    angle = 0.3 + 0.2 * TIME[:, None]
+    seen = reading(angle, sensors(1.0, 0.15), 0.01)[:, 0]
+    np.testing.assert_allclose(seen, 0.3 + 0.2 * (TIME - 0.15 * (1 - np.exp(-TIME / 0.15))), atol=1e-12)
+
+
+def test_a_scale_acts_on_the_turn_since_the_start():
+    angle = 0.3 + 0.2 * np.sin(TIME)[:, None]
+    np.testing.assert_allclose(reading(angle, sensors(1.1, 0.0), 0.01), 0.3 + 1.1 * (angle - 0.3))
+
+
+def test_lags_far_below_the_period_vanish():
+    angle = np.sin(TIME)[:, None]
+    assert abs(reading(angle, sensors(1.0, 1e-6), 0.01) - angle).max() < 1e-5
+
+
+def test_scale_and_lag_are_recovered():
+    truth = {"scale": 1.04, "lag": 0.08}
+    parameters = {
+        "scale": {"quantity": "sensor_scale", "joints": [2], "bounds": [0.8, 1.2]},
+        "lag": {"quantity": "sensor_lag", "joints": [2], "bounds": [0.0, 0.5]},
+    }
+    settings = settings_of(parameters)
+    log = duties(settings.arm.pose("study"), {2: [60, -40, 80, -70, 30]})
+    found = recover(settings, [log], truth, {"scale": 1.0, "lag": 0.03})
+    assert_recovered(found, settings, truth)
+    assert found.standard_deviation[2:] == pytest.approx(0, abs=0.01)

@@ -4,7 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ from hydroid.problem.objectives import overall_objective, segment_bounds, segmen
 from hydroid.problem.priors import Priors
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.problem import SegmentSettings
+from hydroid.settings.problem import ParameterSettings, SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
 from hydroid.simulation.scenario import Scenario
 
@@ -94,6 +94,13 @@ class Problem:
     def freed(self) -> "Problem":
         """Return the same problem with every parameter free that can be, those held fixed included."""
         return Problem(self.settings.freed(), self.logs, self._spread)
+
+    def extended(self, parameters: Mapping[str, ParameterSettings]) -> "Problem":
+        """Return the same problem with further parameters behind its own."""
+        settings = self.settings.model_copy(
+            update={"parameters": self.settings.parameters | dict(parameters)}
+        )
+        return Problem(settings, self.logs, self._spread)
 
     def first(self, seconds: float) -> "Problem":
         """Return the problem of the first seconds after each log's first command, one segment per channel."""

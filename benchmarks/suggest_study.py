@@ -1,0 +1,127 @@
+"""Does `hydroid suggest` name what a model lacks, and is it silent where it lacks nothing? (`make suggest-study`)
+
+    python benchmarks/suggest_study.py [--logs 20] [--seconds 30]
+
+The model is that of fit-hyd-machine without its optional terms: areas and openings of both sides, the damping
+and the third link's mass are free. Each log is simulated with one term present (or none), with commands and a
+start pose of its own, a second of rest, and 0.1 deg of white noise; the model without the term is fitted to it
+and tested. The refinement starts within 5 % of the truth: this is a study of the test, not of the search. The
+sizes of the terms are ours. A term counts as named where the verdict is to free it, as first where nothing
+ranks before it.
+"""
+
+import argparse
+import time
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+from pseudo_random import pseudo_random_log
+
+from hydroid import load_settings
+from hydroid.fitting.refinement import refine
+from hydroid.log import Log
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.settings.fit import FitSettings
+from hydroid.suggestion.missing import Verdict, missing_terms
+from hydroid.uncertainty.covariance import uncertainty
+
+NOISE = np.deg2rad(0.1)
+REST = 100
+"""samples without a command at the start"""
+TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
+HELD = {"S": 0.0, "M1": 4.6, "M2": 5.1, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+TERMS = {
+    "delay": {"delay": 0.03},
+    "overlap": {"overlap_a": 0.05, "overlap_b": 0.05},
+    "opening_exponent": {"opening_exponent": 1.1},
+    "dry_friction": {"dry_friction": 1000.0},
+    "flow_limit": {"flow_limit": 1.2},
+    "leakage": {"leakage": 0.002},
+    "none": {},
+}
+"""what is present in the truth: quantities of the hydraulics, in their units"""
+LEFT_OUT = ("overlap_A", "overlap_B", "exponent", "delay", "flow_limit", "friction", "supply")
+
+
+def make_settings(present: dict[str, float]) -> FitSettings:
+    """The model without the terms, or the truth with those present."""
+    settings = load_settings(
+        "fit-hyd-machine",
+        {
+            "joint_refinement": False,
+            "refinement.gain_tolerance": 1e-6,
+            **{f"parameters.{name}.fixed": value for name, value in HELD.items()},
+            **{f"parameters.{n}.bounds": [0.2 * v, 5 * v] for n, v in TRUTH.items()},
+            **{f"hydraulics.{name}": value for name, value in present.items()},
+        },
+    )
+    kept = {name: p for name, p in settings.parameters.items() if name not in LEFT_OUT}
+    return settings.model_copy(update={"parameters": kept})
+
+
+def make_log(truth: FitSettings, seconds: float, seed: int) -> Log:
+    """A log of its own: start pose, commands and noise."""
+    rng = np.random.default_rng([seed, 17])
+    pose = truth.arm.pose("study").copy()
+    pose[1:3] = np.radians([rng.uniform(0, 40), rng.uniform(-100, -40)])
+    values = TRUTH | HELD
+
+    def off_the_stops(log: Log) -> bool:
+        angle = simulate_log(truth, log, values, "truth").angle[:, 1]
+        return bool(angle.min() > np.deg2rad(-25) and angle.max() < np.deg2rad(85))
+
+    log = pseudo_random_log(pose, [2], duration=seconds, seed=seed, allowed=off_the_stops)
+    log.command[REST:] = log.command[:-REST].copy()
+    log.command[:REST] = 0.0
+    clean = simulate_log(truth, log, values, "truth")
+    noise = np.zeros_like(clean.angle)
+    noise[:, 1] = rng.normal(0.0, NOISE, len(noise))
+    return replace(clean, angle=clean.angle + noise)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--logs", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--only", nargs="*", default=list(TERMS))
+    arguments = parser.parse_args()
+    model = make_settings({})
+    assert model.refinement is not None
+    print(
+        "| present | named | first | anything named | also named | rms without it [deg] | predicted with it |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for case in arguments.only:
+        truth = make_settings(TERMS[case])
+        named, first, alarms = 0, 0, 0
+        others, rms = Counter[str](), []
+        began = time.perf_counter()
+        for k in range(arguments.logs):
+            log = make_log(truth, arguments.seconds, 1000 * list(TERMS).index(case) + k)
+            problem = Problem(model, [log])
+            start = problem.parameters.vector(TRUTH | HELD, "truth")
+            free = problem.parameters.free
+            start[free] *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, int(free.sum()))
+            found = refine(problem, start, model.refinement, lambda n, rms: None)
+            theta = problem.parameters.from_unit(found.point[None])[0]
+            result = missing_terms(problem, uncertainty(problem, theta))
+            quantities = [t.term.settings.quantity for t in result.tests if t.verdict is Verdict.FREE]
+            mine = [q in TERMS[case] for q in quantities]
+            named, first = named + any(mine), first + bool(mine and mine[0])
+            alarms += bool(quantities)
+            others.update(q for q in quantities if q not in TERMS[case])
+            least = min(
+                (t.rms for t in result.tests if t.term.settings.quantity in TERMS[case]), default=np.nan
+            )
+            rms.append(np.degrees([result.rms, least]))
+        before, after = np.median(rms, axis=0)
+        also = ", ".join(f"{q} {n}" for q, n in others.most_common()) or "–"
+        n = arguments.logs
+        row = f"| {case} | {named}/{n} | {first}/{n} | {alarms}/{n} | {also} | {before:.3f} | {after:.3f} |"
+        print(f"{row} <!-- {time.perf_counter() - began:.0f} s -->", flush=True)
+
+
+if __name__ == "__main__":
+    main()

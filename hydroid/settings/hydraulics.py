@@ -28,11 +28,9 @@ SI_FACTORS = {
 """what one of a unit is in SI; units that are SI already are not listed"""
 
 SPANS = {
-    "opening_a": (0.01, 1000.0),
-    "opening_b": (0.01, 1000.0),
+    "opening": (0.01, 1000.0),
     "plunger_damping": (1.0, 5000.0),
-    "overlap_a": (0.0, 2.0),
-    "overlap_b": (0.0, 2.0),
+    "overlap": (0.0, 2.0),
     "opening_exponent": (0.3, 4.0),
     "leakage": (0.0, 10.0),
     "flow_limit": (0.1, 1000.0),
@@ -40,7 +38,8 @@ SPANS = {
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),
 }
-"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where not free."""
+"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where not free, of both
+sides and of each."""
 
 
 @dataclass(frozen=True)

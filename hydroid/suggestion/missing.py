@@ -7,7 +7,9 @@ import numpy as np
 
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.problem import Problem
+from hydroid.search.least_squares import least_squares
 from hydroid.search.linear_model import LinearModel
+from hydroid.settings.search import RefinementSettings
 from hydroid.suggestion.score import Explained, Score, holm
 from hydroid.suggestion.terms import ExtendedModel, Term
 from hydroid.uncertainty.covariance import Uncertainty
@@ -28,15 +30,13 @@ MIN_RESIDUAL at least: large enough for terms that act beyond a threshold, small
 MIN_RESIDUAL = float(np.deg2rad(0.05))
 """[rad]"""
 VISIBLE = 3.0
-"""statistic of the largest change, without noise, below which a term cannot be told from the free parameters"""
+"""statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
 PARTS = (0.25, 0.5, 1.0, 2.0)
 """of the projected step that are simulated"""
 DAMPING = (1e-1, 1e-3, 1e-6)
 """of the projected step: less damping follows weak directions further"""
-ROUNDS = 3
-"""steps at most"""
-WORTHWHILE = 0.02
-"""part of the cost that a step must save for another one to be tried"""
+QUICK = RefinementSettings(iterations=20, gain_tolerance=1e-2)
+"""of the refinement from the best of them"""
 
 
 _NO_SCORE = Score(0.0, 0.0, 0.0, 1.0)
@@ -123,7 +123,7 @@ def _directions(model: ExtendedModel, explained: Explained) -> dict[int, _Direct
     """Find a small change of each term, and its score; terms that cannot be told are left out."""
     unit = max(float(np.sqrt(np.mean(model.residual**2))), MIN_RESIDUAL)
     found: dict[int, _Direction] = {}
-    search = {i: (0.0, np.inf, FIRST) for i in range(len(model.terms))}  # too small, too large, next
+    search = dict.fromkeys(range(len(model.terms)), (0.0, np.inf, FIRST))  # too small, too large, next
     for _ in range(TRIES):
         tried, search = search, {}
         if not tried:
@@ -178,16 +178,12 @@ def _freed(
         return np.hstack([rows, at.prior_weight * problem.priors.scores(theta)])
 
     row = residuals(point[None])[0]
-    for _ in range(ROUNDS):
-        linear = LinearModel(point, row, columns.T)
-        points = np.array([linear.reach(p * linear.step(d)) for d in DAMPING for p in PARTS])
-        rows = residuals(points)
-        cost = np.where(np.isfinite(rows).all(axis=1), np.sum(rows**2, axis=1), np.inf)
-        best, before = int(np.argmin(cost)), float(row @ row)
-        if cost[best] < before:
-            point, row = points[best], rows[best]
-        if not cost[best] < (1 - WORTHWHILE) * before:
-            break
+    linear = LinearModel(point, row, columns.T)
+    points = np.array([point, *(linear.reach(p * linear.step(d)) for d in DAMPING for p in PARTS)])
+    rows = np.vstack([row, residuals(points[1:])])
+    cost = np.where(np.isfinite(rows).all(axis=1), np.sum(rows**2, axis=1), np.inf)
+    best = least_squares(points[int(np.argmin(cost))], residuals, QUICK)
+    point, row = best.point, best.residual
     rms = float(problem.rms(row[None, : at.residual.size])[0])
     return rms, model.terms[terms[0]].at(lowest + (1.0 - lowest) * float(point[-1])) if terms else np.nan
 

@@ -9,9 +9,9 @@ score of C. R. Rao (1948), robust to autocorrelated noise of covariance S (H. Wh
 
 The change of the quantity that would explain most is a = -d' r / |d'|². S is that of the noise which the
 residual shows without what d' explains, r + a d': a term that explains nearly everything is no noise. z then
-follows about Student's t. The effect of d' on slow noise has few degrees of freedom: the variance d' S d' is
-a sum over frequencies, each of which is known from two numbers of the record. As many degrees count as the sum
-has terms of equal size (F. E. Satterthwaite, 1946), less the one that a took.
+follows about Student's t. Where d' and the noise are slow it has few degrees of freedom: the variance d' S d'
+is a sum over frequencies, each of which is known from two numbers of the record. As many degrees count as the
+sum has terms of equal size (F. E. Satterthwaite, 1946), less the one that a took.
 """
 
 from collections.abc import Callable, Sequence
@@ -71,7 +71,7 @@ class Explained:
 
     @staticmethod
     def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
-        """Return it for an estimate; a parameter at a bound cannot make up for a change and counts as held."""
+        """Return it for an estimate. A parameter at a bound counts as held."""
         at, channels = uncertainty.jacobian, problem.channels
         inside = np.array([status.at_bound is None for status in uncertainty.status])
         _, values, effects = decompose(uncertainty.free & inside, at)

@@ -1,7 +1,7 @@
 """Terms: quantities of the model that a fit holds or has switched off, each as one more parameter."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.hydraulics.records import nominal_parameters
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.settings.hydraulics import QUANTITIES, SPANS
+from hydroid.settings.hydraulics import QUANTITIES, SPANS, TARGETS
 from hydroid.settings.problem import MECHANICAL_SPANS, ParameterSettings
 
 HELD_SPAN = 4.0
@@ -68,36 +68,47 @@ def terms(problem: Problem) -> tuple[Term, ...]:
         if p.fixed is not None and (span := _span(p))
     ]
     everyone = range(1, len(settings.arm.joints) + 1)
-    taken = {(p.quantity, j) for p in settings.parameters.values() for j in p.joints or everyone}
+    taken = {
+        (target, joint)
+        for p in settings.parameters.values()
+        for target in TARGETS.get(p.quantity, (p.quantity,))
+        for joint in p.joints or everyone
+    }
+    off: list[Term] = []
     joints = problem.active_joints
-    spans = MECHANICAL_SPANS | (SPANS if settings.stage == "hyd" else {})
-    off = [
-        Term(
-            _name(quantity, joint, [*joints], settings.parameters),
-            ParameterSettings(quantity=quantity, joints=(joint,), bounds=span),
-            _nominal(problem, quantity, joint),
-            named=False,
-        )
-        for joint in joints
-        for quantity, span in spans.items()
-        if (quantity, joint) not in taken
-    ]
+    for joint in joints:
+        for quantity, (targets, span) in _spans(settings.stage).items():
+            values = {_nominal(problem, target, joint) for target in targets}
+            if len(values) == 1 and not any((target, joint) in taken for target in targets):
+                name = quantity if len(joints) == 1 else f"{quantity}_{joint}"
+                free = ParameterSettings(quantity=quantity, joints=(joint,), bounds=span)
+                off.append(Term(unused(name, settings.parameters), free, values.pop(), named=False))
     return (*held, *off)
 
 
+def _spans(stage: str) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
+    """Targets and span of each quantity to test, by name: both sides of an actuator, then each."""
+    spans: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {
+        name: ((name,), span) for name, span in MECHANICAL_SPANS.items()
+    }
+    if stage == "hyd":
+        for name, span in SPANS.items():
+            spans[name] = (TARGETS[name], span)
+            spans |= {side: ((side,), span) for side in TARGETS[name] if side != name}
+    return spans
+
+
 def _span(parameter: ParameterSettings) -> tuple[float, float] | None:
-    value = parameter.fixed or 0.0
-    spans = SPANS | MECHANICAL_SPANS
-    span = parameter.bounds or spans.get(parameter.quantity) or (value / HELD_SPAN, HELD_SPAN * value)
+    """Span of a parameter that is held; None where it is held at 0 without bounds."""
+    value, known = parameter.fixed or 0.0, {name: span for name, (_, span) in _spans("hyd").items()}
+    span = parameter.bounds or known.get(parameter.quantity) or (value / HELD_SPAN, HELD_SPAN * value)
     low, high = min(span[0], value), max(span[1], value)
     return (low, high) if low < high else None
 
 
-def _name(quantity: str, joint: int, joints: Sequence[int], taken: object) -> str:
-    name = quantity if len(joints) == 1 else f"{quantity}_{joint}"
-    while name in taken:  # pyright: ignore[reportOperatorIssue]
-        name += "_"
-    return name
+def unused(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken."""
+    return name if name not in taken else unused(f"{name}_", taken)
 
 
 def _nominal(problem: Problem, quantity: str, joint: int) -> float:
@@ -118,11 +129,19 @@ class ExtendedModel:
 
     def __init__(self, problem: Problem, theta: Array) -> None:
         self.terms, self.theta = terms(problem), theta
-        self._problem = problem.extended({t.name: t.settings for t in self.terms if not t.named})
-        values = {t.name: t.value for t in self.terms}
+        sides: dict[str, tuple[ParameterSettings, float]] = {}
+        parts: list[list[str]] = []
+        for term in self.terms:
+            joint = (term.settings.joints or (0,))[0]
+            targets = TARGETS.get(term.settings.quantity, (term.settings.quantity,))
+            parts.append([term.name] if term.named else [f"{target}_of_{joint}" for target in targets])
+            for part, target in zip(parts[-1], targets, strict=False):
+                if not term.named:
+                    sides[part] = term.settings.model_copy(update={"quantity": target}), term.value
+        self._problem = problem.extended({name: settings for name, (settings, _) in sides.items()})
         names = self._problem.parameters.names
-        self._base = np.array([*theta, *(values[n] for n in names[len(theta) :])])
-        self._columns = [names.index(t.name) for t in self.terms]
+        self._base = np.array([*theta, *(value for _, value in sides.values())])
+        self._columns = [[names.index(name) for name in part] for part in parts]
         self.residual = self.residuals(theta[None])[0]
 
     def residuals(self, theta: Array, terms: Sequence[int] = (), changes: Sequence[float] = ()) -> Array:

@@ -1,15 +1,14 @@
 """What the model lacks: each term that a fit holds is tested, and what freeing it would really gain."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import least_squares
-from hydroid.search.linear_model import LinearModel
-from hydroid.settings.search import RefinementSettings
+from hydroid.progress import Progress, no_progress
+from hydroid.suggestion.freeing import Freed, Freeing
 from hydroid.suggestion.score import Explained, Score, holm
 from hydroid.suggestion.terms import ExtendedModel, Term
 from hydroid.uncertainty.covariance import Uncertainty
@@ -18,10 +17,14 @@ LEVEL = 0.05
 """probability that any term is called missing where none is"""
 MIN_GAIN = 0.05
 """part of the rms error that freeing a term must save"""
+PROMISING = 0.5 * MIN_GAIN
+"""part that the linear model must promise for it to be tried"""
+MOST_TRIED = {True: 8, False: 3}
+"""terms that are tried, the most promising first, with and without refinement"""
 FIRST = 1e-3
-"""change of a term that is tried first, as a part of its span"""
+"""change of a term that is simulated first, as a part of its span"""
 TRIES = 12
-"""changes of a term that are tried"""
+"""changes of a term that are simulated"""
 FASTEST = 64.0
 """largest ratio of one change to the next"""
 EFFECT = (0.1, 0.5)
@@ -31,24 +34,17 @@ MIN_RESIDUAL = float(np.deg2rad(0.05))
 """[rad]"""
 VISIBLE = 3.0
 """statistic of the largest change, without noise; a term below it cannot be told from the free parameters"""
-PARTS = (0.25, 0.5, 1.0, 2.0)
-"""of the projected step that are simulated"""
-DAMPING = (1e-1, 1e-3, 1e-6)
-"""of the projected step: less damping follows weak directions further"""
-QUICK = RefinementSettings(iterations=20, gain_tolerance=1e-2)
-"""of the refinement from the best of them"""
-
-
-_NO_SCORE = Score(0.0, 0.0, 0.0, 1.0)
 
 
 class Verdict(StrEnum):
     """What a test says about a term."""
 
-    FREE = "free it"
-    LEAVE = "no gain"
-    INVISIBLE = "cannot be told from the free parameters"
-    """no change of it has an effect above the noise that the free parameters could not have too"""
+    FREE = "free"
+    """it is significant, and freeing it lowers the error by MIN_GAIN at least"""
+    LEAVE = "leave"
+    """no gain, or none beyond the noise"""
+    INVISIBLE = "invisible"
+    """the logs cannot tell any change of it from changes of the free parameters"""
 
 
 @dataclass(frozen=True)
@@ -60,9 +56,8 @@ class TermTest:
         verdict: what it says.
         statistic: score in units of its standard deviation; positive: the change lowers the error.
         chance: of such a score if the model lacks nothing.
-        rms: of the angles with the term freed [rad]; without a simulation as the linear model has it.
+        rms: of the angles with the term freed [rad], simulated; that of the fit where it was not tried.
         value: of the term there, in its unit.
-        like: name of a term with nearly the same effect that gains more.
     """
 
     term: Term
@@ -71,18 +66,22 @@ class TermTest:
     chance: float
     rms: float
     value: float
-    like: str | None = None
 
 
 @dataclass(frozen=True)
 class MissingTerms:
     """All tests, those to free first, by their gain.
 
-    rms: of the angles at the estimate [rad], or where a few further steps of the free parameters lead.
+    rms: of the angles at the estimate [rad], or where refining the free parameters once more leads.
     """
 
     tests: tuple[TermTest, ...]
     rms: float
+
+    @property
+    def free(self) -> tuple[TermTest, ...]:
+        """Those to free."""
+        return tuple(t for t in self.tests if t.verdict is Verdict.FREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,53 +93,67 @@ class _Direction:
     score: Score
 
 
-def missing_terms(problem: Problem, uncertainty: Uncertainty) -> MissingTerms:
-    """Test every term that a problem holds at its estimate."""
-    explained = Explained.by(problem, uncertainty)
+def missing_terms(
+    problem: Problem, uncertainty: Uncertainty, *, refine: bool = True, progress: Progress = no_progress
+) -> MissingTerms:
+    """Test every term that a problem holds at its estimate.
+
+    A term must be significant among all that are tested (S. Holm, 1979), and freeing it must gain. What it
+    gains is simulated: parts of projected steps, from the best of which least squares goes on where `refine`.
+    """
     model = ExtendedModel(problem, uncertainty.theta)
+    progress("terms", 0, len(model.terms))
+    explained = Explained.by(problem, uncertainty)
     directions = _directions(model, explained)
     chances = {
         i: d.score.chance(one_sided=model.terms[i].lowest_change == 0.0) for i, d in directions.items()
     }
     significant = dict(zip(chances, holm(list(chances.values()), LEVEL), strict=True))
-    rms = _freed(problem, uncertainty, model, None)[0]
+    promise = {i: d.score.part for i, d in directions.items() if significant[i] and d.score.part >= PROMISING}
+    tried = sorted(promise, key=lambda i: -promise[i])[: MOST_TRIED[refine]]
+    freeing = Freeing(problem, uncertainty, model)
+    rms = freeing.without().rms if refine else float(problem.rms(model.residual[None])[0])
+    freed: dict[int, Freed] = {}
+    for i in tried:
+        progress(f"freeing {model.terms[i].name}", len(freed), len(tried))
+        freed[i] = freeing.freed(i, directions[i].change, directions[i].effect, refine=refine)
     tests: list[TermTest] = []
     for i, term in enumerate(model.terms):
         if i not in directions:
             tests.append(TermTest(term, Verdict.INVISIBLE, 0.0, 1.0, rms, term.value))
             continue
-        least, value = rms, term.value
-        if significant[i]:
-            least, value = _freed(problem, uncertainty, model, (i, directions[i]))
-        verdict = Verdict.FREE if least < (1 - MIN_GAIN) * rms else Verdict.LEAVE
-        z = directions[i].score.statistic
-        tests.append(TermTest(term, verdict, z, chances[i], min(least, rms), value))
+        one = freed.get(i, Freed(rms, term.value))
+        one = one if one.rms < rms else Freed(rms, term.value)
+        verdict = Verdict.FREE if one.rms < (1 - MIN_GAIN) * rms else Verdict.LEAVE
+        statistic = directions[i].score.statistic
+        tests.append(TermTest(term, verdict, statistic, chances[i], one.rms, one.value))
     tests.sort(key=lambda t: (list(Verdict).index(t.verdict), t.rms, t.chance))
     return MissingTerms(tuple(tests), rms)
 
 
 def _directions(model: ExtendedModel, explained: Explained) -> dict[int, _Direction]:
-    """Find a small change of each term, and its score; terms that cannot be told are left out."""
+    """Find a small change of each term, and its score; terms that cannot be told apart are left out."""
     unit = max(float(np.sqrt(np.mean(model.residual**2))), MIN_RESIDUAL)
-    found: dict[int, _Direction] = {}
+    effects: dict[int, tuple[float, Array]] = {}
     search = dict.fromkeys(range(len(model.terms)), (0.0, np.inf, FIRST))  # too small, too large, next
     for _ in range(TRIES):
         tried, search = search, {}
         if not tried:
             break
-        rows = model.residuals(
-            np.tile(model.theta, (len(tried), 1)), list(tried), [c for *_, c in tried.values()]
-        )
+        changes = [change for *_, change in tried.values()]
+        rows = model.residuals(np.tile(model.theta, (len(tried), 1)), list(tried), changes)
         for (i, (small, large, change)), row in zip(tried.items(), rows, strict=True):
             effect = row - model.residual
             size = float(np.sqrt(np.mean(effect**2))) / unit if np.isfinite(row).all() else np.inf
             if 0 < size < np.inf:
-                found[i] = _Direction(change, effect, _NO_SCORE)
+                effects[i] = change, effect
             small, large = (change, large) if size < EFFECT[0] else (small, change)
             if not EFFECT[0] <= size <= EFFECT[1] and small < 1.0:
                 search[i] = (small, large, _next(small, large, change, size))
-    scored = {i: replace(d, score=explained.score(d.effect)) for i, d in found.items()}
-    return {i: d for i, d in scored.items() if d.score.strength >= VISIBLE * d.change}
+    found = {
+        i: _Direction(change, effect, explained.score(effect)) for i, (change, effect) in effects.items()
+    }
+    return {i: d for i, d in found.items() if d.score.strength >= VISIBLE * d.change}
 
 
 def _next(small: float, large: float, change: float, size: float) -> float:
@@ -149,47 +162,3 @@ def _next(small: float, large: float, change: float, size: float) -> float:
         return float(np.sqrt(small * large))
     ratio = np.sqrt(EFFECT[0] * EFFECT[1]) / max(size, 1e-9)
     return min(change * float(np.clip(ratio, 1 / FASTEST, FASTEST)), 1.0)
-
-
-def _freed(
-    problem: Problem, uncertainty: Uncertainty, model: ExtendedModel, freed: tuple[int, _Direction] | None
-) -> tuple[float, float]:
-    """Take projected steps with one more term free, or none; return the rms error [rad] and the term's value.
-
-    Each step is a Gauss-Newton step with the derivatives of the estimate, kept within the bounds, of which
-    several parts are simulated.
-    """
-    at, parameters, free = uncertainty.jacobian, problem.parameters, problem.parameters.free
-    point = parameters.to_unit(uncertainty.theta[None])[0]
-    slopes = np.nan_to_num(np.hstack([at.slopes, at.prior_weight * at.prior_slopes])[free])
-    columns = slopes * (_widths(parameters, point) / at.scale[free])[:, None]
-    terms, lowest = [], 0.0
-    if freed is not None:
-        i, direction = freed
-        terms, lowest = [i], model.terms[i].lowest_change
-        width = (1.0 - lowest) / direction.change
-        effect = np.concatenate([direction.effect, np.zeros(len(problem.priors))])
-        columns, point = np.vstack([columns, width * effect]), np.append(point, -lowest / (1.0 - lowest))
-
-    def residuals(points: Array) -> Array:
-        theta = parameters.from_unit(points[:, : len(slopes)])
-        changes = lowest + (1.0 - lowest) * points[:, len(slopes) :].ravel()
-        rows = model.residuals(theta, terms * len(points), changes.tolist())
-        return np.hstack([rows, at.prior_weight * problem.priors.scores(theta)])
-
-    row = residuals(point[None])[0]
-    linear = LinearModel(point, row, columns.T)
-    points = np.array([point, *(linear.reach(p * linear.step(d)) for d in DAMPING for p in PARTS)])
-    rows = np.vstack([row, residuals(points[1:])])
-    cost = np.where(np.isfinite(rows).all(axis=1), np.sum(rows**2, axis=1), np.inf)
-    best = least_squares(points[int(np.argmin(cost))], residuals, QUICK)
-    point, row = best.point, best.residual
-    rms = float(problem.rms(row[None, : at.residual.size])[0])
-    return rms, model.terms[terms[0]].at(lowest + (1.0 - lowest) * float(point[-1])) if terms else np.nan
-
-
-def _widths(parameters: ParameterSet, unit: Array) -> Array:
-    """Change of each free parameter per change of its place in the unit box, shape (p,)."""
-    step = np.where(unit > 0.5, -1e-6, 1e-6)
-    moved = parameters.from_unit(np.vstack([unit, unit + np.diag(step)]))[:, parameters.free]
-    return np.diag(moved[1:] - moved[0]) / step

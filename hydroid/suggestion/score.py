@@ -35,12 +35,14 @@ class Score:
     Attributes:
         statistic: z; positive where the change lowers the error.
         amount: of the change that lowers it most, by the linear approximation.
+        part: of the rms residual that this saves, by the same approximation.
         strength: the statistic that the whole change would have without noise: what can be seen at all.
         freedom: degrees of freedom of the statistic.
     """
 
     statistic: float
     amount: float
+    part: float
     strength: float
     freedom: float
 
@@ -90,12 +92,13 @@ class Explained:
         row -= self.effects.T @ (self.effects @ row)
         length = float(row @ row)
         if not length > 0:
-            return Score(0.0, 0.0, 0.0, 1.0)
+            return Score(0.0, 0.0, 0.0, 0.0, 1.0)
         gain = -float(row @ self.residual)
         left = (self.residual + gain / length * row)[: change.size]
         variance, freedom = self._variance(row, self.noise_of(left))
         deviation = float(np.sqrt(variance))
-        return Score(gain / deviation, gain / length, length / deviation, freedom)
+        saved = 1.0 - float(np.linalg.norm(left) / np.linalg.norm(self.residual[: change.size]))
+        return Score(gain / deviation, gain / length, saved, length / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M,), with the residuals, and its degrees of freedom."""

@@ -1,12 +1,12 @@
 """Does `hydroid suggest` name what a model lacks, and is it silent where it lacks nothing?
 
-    python benchmarks/suggest_study.py [--logs 20] [--seconds 30] [--only delay none]      (make suggest-study)
+    python benchmarks/suggest_study.py [--logs 20] [--seconds 20] [--only delay none]
 
-The model is that of fit-hyd-machine without its optional terms: areas and openings of both sides, the damping
-and the third link's mass are free. Each log is simulated with one term present (or none), with commands and a
+Stage 2 of the shoulder: areas and openings of both sides, the damping and the third link's mass are free, and
+all else is held at the truth. Each log is simulated with one term present (or none), with commands and a
 start pose of its own, a second of rest, and 0.1 deg of white noise. The model without the term is fitted to
 it and tested. The refinement starts within 5 % of the truth: this is a study of the test, not of the search.
-The sizes of the terms are ours. A term is named where the verdict is to free it on either or both sides. It is
+The sizes of the terms are ours. A term is named where the verdict is to free it, on one side or both. It is
 first where nothing ranks before it.
 """
 
@@ -24,6 +24,7 @@ from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.problem import ParameterSettings
 from hydroid.suggestion.missing import Verdict, missing_terms
 from hydroid.uncertainty.covariance import uncertainty
 
@@ -31,7 +32,7 @@ NOISE = np.deg2rad(0.1)
 REST = 100
 """samples without a command at the start"""
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
-HELD = {"S": 0.0, "M1": 4.6, "M2": 5.1, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+QUANTITIES = {"A_A": "area_a", "A_B": "area_b", "open_A": "opening_a", "open_B": "opening_b", "D": "damping"}
 TERMS = {
     "delay": {"delay": 0.03},
     "overlap": {"overlap": 0.05},
@@ -42,23 +43,18 @@ TERMS = {
     "none": {},
 }
 """what is present in the truth: quantities of the hydraulics, in their units"""
-KEPT = (*TRUTH, *HELD)
 
 
 def make_settings(present: dict[str, float]) -> FitSettings:
     """The model without the terms, or the truth with those present."""
-    settings = load_settings(
-        "fit-hyd-machine",
-        {
-            "joint_refinement": False,
-            "refinement.gain_tolerance": 1e-6,
-            **{f"parameters.{name}.fixed": value for name, value in HELD.items()},
-            **{f"parameters.{n}.bounds": [0.2 * v, 5 * v] for n, v in TRUTH.items()},
-            **{f"hydraulics.{name}": value for name, value in present.items()},
-        },
-    )
-    kept = {name: p for name, p in settings.parameters.items() if name in KEPT}
-    return settings.model_copy(update={"parameters": kept})
+    changes = {"joint_refinement": False, "refinement.gain_tolerance": 1e-6}
+    settings = load_settings("fit-hyd", changes | {f"hydraulics.{n}": v for n, v in present.items()})
+    free = {
+        name: ParameterSettings(quantity=quantity, joints=(2,), bounds=(0.2 * TRUTH[name], 5 * TRUTH[name]))
+        for name, quantity in QUANTITIES.items()
+    }
+    free["M3"] = ParameterSettings(quantity="mass", link="link3", bounds=(0.2 * TRUTH["M3"], 5 * TRUTH["M3"]))
+    return settings.model_copy(update={"parameters": free})
 
 
 def make_log(truth: FitSettings, seconds: float, seed: int) -> Log:
@@ -66,16 +62,15 @@ def make_log(truth: FitSettings, seconds: float, seed: int) -> Log:
     rng = np.random.default_rng([seed, 17])
     pose = truth.arm.pose("study").copy()
     pose[1:3] = np.radians([rng.uniform(0, 40), rng.uniform(-100, -40)])
-    values = TRUTH | HELD
 
     def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(truth, log, values, "truth").angle[:, 1]
+        angle = simulate_log(truth, log, TRUTH, "truth").angle[:, 1]
         return bool(angle.min() > np.deg2rad(-25) and angle.max() < np.deg2rad(85))
 
     log = pseudo_random_log(pose, [2], duration=seconds, seed=seed, allowed=off_the_stops)
     log.command[REST:] = log.command[:-REST].copy()
     log.command[:REST] = 0.0
-    clean = simulate_log(truth, log, values, "truth")
+    clean = simulate_log(truth, log, TRUTH, "truth")
     noise = np.zeros_like(clean.angle)
     noise[:, 1] = rng.normal(0.0, NOISE, len(noise))
     return replace(clean, angle=clean.angle + noise)
@@ -84,7 +79,7 @@ def make_log(truth: FitSettings, seconds: float, seed: int) -> Log:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--logs", type=int, default=20)
-    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--only", nargs="*", default=list(TERMS))
     arguments = parser.parse_args()
     model = make_settings({})
@@ -101,9 +96,8 @@ def main() -> None:
         for k in range(arguments.logs):
             log = make_log(truth, arguments.seconds, 1000 * list(TERMS).index(case) + k)
             problem = Problem(model, [log])
-            start = problem.parameters.vector(TRUTH | HELD, "truth")
-            free = problem.parameters.free
-            start[free] *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, int(free.sum()))
+            start = problem.parameters.vector(TRUTH, "truth")
+            start *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, start.size)
             found = refine(problem, start, model.refinement, lambda n, rms: None)
             theta = problem.parameters.from_unit(found.point[None])[0]
             result = missing_terms(problem, uncertainty(problem, theta))
@@ -111,11 +105,9 @@ def main() -> None:
             mine = [q.removesuffix("_a").removesuffix("_b") == case for q in quantities]
             named, first = named + any(mine), first + bool(mine and mine[0])
             alarms += bool(quantities)
-            others.update(q for q in quantities if q not in TERMS[case])
-            least = min(
-                (t.rms for t in result.tests if t.term.settings.quantity in TERMS[case]), default=np.nan
-            )
-            rms.append(np.degrees([result.rms, least]))
+            others.update(q for q, own in zip(quantities, mine, strict=True) if not own)
+            least = [t.rms for t in result.tests if t.term.settings.quantity == case]
+            rms.append(np.degrees([result.rms, *(least or [np.nan])]))
         before, after = np.median(rms, axis=0)
         also = ", ".join(f"{q} {n}" for q, n in others.most_common()) or "–"
         n = arguments.logs

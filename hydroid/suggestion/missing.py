@@ -19,7 +19,7 @@ MIN_GAIN = 0.05
 """part of the rms error that freeing a term must save"""
 PROMISING = 0.5 * MIN_GAIN
 """part that the linear model must promise for it to be tried"""
-MOST_TRIED = {True: 8, False: 3}
+MOST_TRIED = {True: 5, False: 3}
 """terms that are tried, the most promising first, with and without refinement"""
 FIRST = 1e-3
 """change of a term that is simulated first, as a part of its span"""

@@ -1,0 +1,242 @@
+"""What to do next: what each of several actions would add to what is known, by the Fisher information.
+
+The fit knows C^-1 = G' G about relative changes of its free parameters. An action adds the information of one
+more statement or of further measurements. These are simulated at the estimate, with the noise that the fit's
+angles show: the model's own error is part of it, so the forecast is no better than the fit. As in a design,
+every parameter has a prior of ±100 % (`PRIOR_SD`), so that all deviations are finite.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from hydroid.experiment.commands import Experiment, Input, RandomExperiments
+from hydroid.experiment.information import ExperimentSimulator, Precision
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.problem.problem import Problem, compared_pressures
+from hydroid.progress import Progress, no_progress
+from hydroid.settings.fit import FitSettings
+from hydroid.uncertainty.covariance import Uncertainty
+from hydroid.uncertainty.flags import WEAK_ABOVE
+from hydroid.uncertainty.jacobian import STEP, relative_scale
+from hydroid.uncertainty.noise import Noise
+
+WEIGHED_SD = 0.02
+"""relative standard deviation of a mass that was weighed (ours)"""
+STATED_SD = 0.05
+"""of a value from a data sheet or a measurement (ours)"""
+PRESSURE_SD = 1e5
+"""noise of a pressure gauge [Pa] (ours), with the correlation of the angles' residuals"""
+PAYLOAD_PART = 0.1
+"""mass in the gripper, as a part of the arm's"""
+BANDS = ((10, 40), (40, 70), (70, 100))
+"""constant commands to compare, lowest and highest [%]"""
+LEVELS = 3
+"""constant commands in a band, each in both directions"""
+HOLD_S = 3.0
+"""time that each is held, and the time of rest before it [s]"""
+DRAWS = 6
+"""random experiments, the best of which stands for the designed one, which is at least as good"""
+FEWEST_TIMES = 1.5
+"""factor by which an action must improve a parameter to be listed"""
+MOST = 3
+"""actions of one kind that are listed"""
+
+
+class ActionKind(StrEnum):
+    """What can be done."""
+
+    WEIGH = "weigh"
+    """weigh a link; the subject is its parameter"""
+    STATE = "state"
+    """state a parameter's value from a data sheet"""
+    MEASURE_JOINT = "measure joint"
+    """compare the angle of another joint that the logs drive; the subject is its number"""
+    MEASURE_PRESSURES = "measure pressures"
+    """add the chamber pressures of the driven joints"""
+    CONSTANT_COMMANDS = "constant commands"
+    """add a log of constant commands; the subject is their range [%]"""
+    PAYLOAD = "payload"
+    """repeat the logs with a known mass in the gripper; the subject is the mass [kg]"""
+    EXPERIMENT = "experiment"
+    """run the designed experiment; the subject is its duration [s]"""
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action with its predicted effect.
+
+    Attributes:
+        kind: of action.
+        subject: what it is about, as its kind says.
+        known: number of free parameters known to WEAK_ABOVE before and after.
+        parameter: the one that improves most.
+        deviations: its relative standard deviation before and after.
+        improvement: factor by which all deviations shrink on geometric average.
+    """
+
+    kind: ActionKind
+    subject: str
+    known: tuple[int, int]
+    parameter: str
+    deviations: tuple[float, float]
+    improvement: float
+
+
+def next_actions(
+    problem: Problem, uncertainty: Uncertainty, *, simulate: bool = True, progress: Progress = no_progress
+) -> tuple[Action, ...]:
+    """Return the actions that would help, the best first; without `simulate` only statements of values."""
+    names = [n for n, free in zip(problem.parameters.names, uncertainty.free, strict=True) if free]
+    precision = Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(names)))
+    before = precision.deviations()
+    sources = [_statements(problem, names)]
+    if simulate:
+        sources += [
+            _further_channels(problem, uncertainty),
+            _payload(problem, uncertainty),
+            _experiments(problem, uncertainty),
+        ]
+    found: list[Action] = []
+    for source in sources:
+        for kind, subject, information in source:
+            progress(f"actions: {kind}", len(found), 0)
+            found.append(_action(kind, subject, names, before, precision.deviations(information)))
+    useful = [a for a in found if a.known[1] > a.known[0] or a.deviations[0] > FEWEST_TIMES * a.deviations[1]]
+    useful.sort(key=lambda a: (-a.known[1], -a.improvement))
+    kept = [a for i, a in enumerate(useful) if sum(b.kind is a.kind for b in useful[:i]) < _most(a.kind)]
+    return tuple(kept)
+
+
+def _most(kind: ActionKind) -> int:
+    """Of alternatives, such as bands of commands, only the best is listed."""
+    return 1 if kind is ActionKind.CONSTANT_COMMANDS else MOST
+
+
+def _action(kind: ActionKind, subject: str, names: Sequence[str], before: Array, after: Array) -> Action:
+    known = int(np.sum(before <= WEAK_ABOVE)), int(np.sum(after <= WEAK_ABOVE))
+    best = int(np.argmax(before / after))
+    shrunk = float(np.exp(np.mean(np.log(before / after))))
+    return Action(kind, subject, known, names[best], (float(before[best]), float(after[best])), shrunk)
+
+
+Forecast = tuple[ActionKind, str, Array]
+"""an action, its subject, and the information that it adds, shape (p, p)"""
+
+
+def _statements(problem: Problem, names: Sequence[str]) -> Iterator[Forecast]:
+    """A weighed link, or a value of a data sheet."""
+    for i, name in enumerate(names):
+        mass = problem.settings.parameters[name].quantity == "mass"
+        added = np.zeros((len(names), len(names)))
+        added[i, i] = (WEIGHED_SD if mass else STATED_SD) ** -2
+        yield ActionKind.WEIGH if mass else ActionKind.STATE, name, added
+
+
+def _further_channels(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecast]:
+    """Further signals of the same logs: angles of other driven joints, chamber pressures."""
+    settings = problem.settings
+    for joint in problem.active_joints:
+        if joint not in settings.outputs:
+            more = settings.model_copy(update={"outputs": (*settings.outputs, joint)})
+            yield (
+                ActionKind.MEASURE_JOINT,
+                str(joint),
+                _information(
+                    Problem(more, problem.logs), uncertainty, lambda channel, j=joint: channel.joint == j
+                ),
+            )
+    if settings.stage == "hyd" and not any(compared_pressures(log, settings) for log in problem.logs):
+        objective = settings.objective.model_copy(update={"pressure_weight": 1.0})
+        logs = [replace(log, pressure=np.zeros((*log.angle.shape, 2))) for log in problem.logs]
+        more = Problem(settings.model_copy(update={"objective": objective}), logs)
+        added = _information(more, uncertainty, lambda channel: channel.quantity != "angle")
+        yield ActionKind.MEASURE_PRESSURES, "", added
+
+
+def _payload(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecast]:
+    """The same commands with a known mass in the gripper."""
+    settings = problem.settings
+    if settings.arm.payload is None or settings.payloads:
+        return
+    mass = round(PAYLOAD_PART * float(settings.arm.masses.sum()), 1)
+    payloads = {Path(log.source).name: mass for log in problem.logs}
+    more = Problem(settings.model_copy(update={"payloads": payloads}), problem.logs)
+    yield ActionKind.PAYLOAD, f"{mass:g}", _information(more, uncertainty, lambda channel: True)
+
+
+def _experiments(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecast]:
+    """Constant commands, and the best of a few random experiments."""
+    settings = _designing(problem, uncertainty)
+    simulator = ExperimentSimulator(settings, uncertainty.theta)
+    joint = settings.outputs[0] - 1
+    for low, high in BANDS:
+        experiment = _constant(problem.logs[0], joint, np.linspace(low, high, LEVELS), settings)
+        trial = simulator.trial(experiment)
+        if trial is not None:
+            yield ActionKind.CONSTANT_COMMANDS, f"{low} to {high}", trial.information
+    draws = RandomExperiments(settings, np.random.default_rng(1))
+    trials = [t for _ in range(DRAWS) if (t := simulator.trial(draws.draw())) is not None]
+    if trials:
+        precision = Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(uncertainty.root)))
+        best = max(trials, key=lambda t: precision.score(t.information, "D"))
+        yield ActionKind.EXPERIMENT, f"{settings.design.duration_s:g}", best.information
+
+
+def _designing(problem: Problem, uncertainty: Uncertainty) -> FitSettings:
+    """Settings for experiments with the noise of the fit's worst angle."""
+    angles = [
+        (noise.level / channel.weight, noise.correlation_time * problem.logs[channel.log].period)
+        for channel, noise in zip(problem.channels, uncertainty.noise, strict=True)
+        if channel.quantity == "angle"
+    ]
+    level, time = max(angles)
+    settings = problem.settings
+    design = settings.design.model_copy(
+        update={"noise_deg": float(np.degrees(level)), "noise_correlation_s": time}
+    )
+    return settings.model_copy(update={"design": design})
+
+
+def _constant(log: Log, joint: int, levels: Array, settings: FitSettings) -> Experiment:
+    """Each level in both directions after a rest, from a log's start pose."""
+    hold = round(HOLD_S / settings.log.period_s)
+    steps = [value for level in levels for value in (0.0, level, 0.0, -level)]
+    samples = round(settings.design.duration_s / settings.log.period_s) + 1
+    starts = hold * np.arange(len(steps) + 1)
+    inside = starts < samples
+    return Experiment(log.start, {joint: Input(starts[inside], np.array([*steps, 0.0])[inside])})
+
+
+def _information(problem: Problem, uncertainty: Uncertainty, chosen: Callable[..., bool]) -> Array:
+    """Information of some channels of a problem at the estimate, (p, p), in plain least squares."""
+    theta, free = uncertainty.theta, uncertainty.free
+    moved = theta + STEP * np.diag(relative_scale(problem.parameters, theta))[free]
+    rows = problem.residuals(np.vstack([theta, moved]))
+    slopes = np.nan_to_num((rows[1:] - rows[0]) / STEP)
+    worst = max(uncertainty.noise, key=lambda noise: noise.level)
+    total = np.zeros((int(free.sum()), int(free.sum())))
+    for channel in problem.channels:
+        if chosen(channel):
+            level = worst.level if channel.quantity == "angle" else PRESSURE_SD * channel.weight
+            part = slopes[:, channel.rows]
+            total += least_squares_information(part, Noise(part.shape[1], level, worst.reflection))
+    return total
+
+
+def least_squares_information(slopes: Array, noise: Noise) -> Array:
+    """Inverse covariance of a least-squares estimate from derivatives, (p, T), with correlated noise.
+
+    (J J') (J S J')^-1 (J J'), which is less than the Fisher information unless the noise is white.
+    """
+    directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
+    measured = values > 1e-9 * values.max(initial=0.0)
+    directions, values, effects = directions[:, measured], values[measured], effects[measured]
+    if not measured.any():
+        return np.zeros((len(slopes), len(slopes)))
+    root = directions * values
+    return np.asarray(root @ np.linalg.pinv(noise.covariance_of(effects)) @ root.T, dtype=np.float64)

@@ -1,0 +1,36 @@
+"""All suggestions about a fit: what its model lacks, what its residual shows, what to do next."""
+
+from dataclasses import dataclass
+
+from hydroid.problem.problem import Problem
+from hydroid.progress import Progress, no_progress
+from hydroid.suggestion.actions import Action, next_actions
+from hydroid.suggestion.missing import MissingTerms, missing_terms
+from hydroid.suggestion.residuals import ResidualCheck, residual_checks
+from hydroid.uncertainty.covariance import Uncertainty
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestions:
+    """What to change next.
+
+    Attributes:
+        missing: tests of what the fit holds.
+        residuals: one check for each compared angle.
+        actions: the best first.
+        thorough: whether all was simulated, as `hydroid suggest` does, or what a fit's report can afford.
+    """
+
+    missing: MissingTerms
+    residuals: tuple[ResidualCheck, ...]
+    actions: tuple[Action, ...]
+    thorough: bool
+
+
+def suggestions(
+    problem: Problem, uncertainty: Uncertainty, *, thorough: bool = True, progress: Progress = no_progress
+) -> Suggestions:
+    """Return the suggestions about an estimate; `thorough` ones take several times the simulations."""
+    missing = missing_terms(problem, uncertainty, refine=thorough, progress=progress)
+    actions = next_actions(problem, uncertainty, simulate=thorough, progress=progress)
+    return Suggestions(missing, residual_checks(problem, uncertainty), actions, thorough)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hydroid.api.model import build_model as build_model
     from hydroid.api.model import simulate as simulate
     from hydroid.api.plan import design as design
+    from hydroid.api.plan import suggest as suggest
     from hydroid.api.quantity import QuantityResult as QuantityResult
     from hydroid.api.quantity import quantity as quantity
     from hydroid.api.stages import FitOptions as FitOptions
@@ -58,7 +59,7 @@ _NAMES = {
     "hydroid.api.judge": "identifiability sensitivity surface validate",
     "hydroid.api.look": "LogCheck check load_settings plot_actuator read_commands read_logs view",
     "hydroid.api.model": "build_model simulate",
-    "hydroid.api.plan": "design",
+    "hydroid.api.plan": "design suggest",
     "hydroid.api.quantity": "QuantityResult quantity",
     "hydroid.api.study": "Study",
     "hydroid.errors": "HydroidError",

@@ -1,16 +1,75 @@
-"""Plan the next experiment: `design`."""
+"""Plan what is next: `suggest` and `design`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
+from hydroid.errors import RunError, SettingsError
+from hydroid.files import is_file
+from hydroid.identified import IdentifiedModel
 from hydroid.log import write_log
 from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from hydroid.api.look import LogSources
     from hydroid.experiment.design import Design
+    from hydroid.suggestion.suggest import Suggestions
+
+
+def suggest(
+    model: ModelSource,
+    logs: "LogSources" = (),
+    out: str | Path | None = "runs/suggestions",
+    *,
+    progress: Progress = no_progress,
+) -> "Study[Suggestions]":
+    """Find what the model lacks, what the residual shows, and what would determine more.
+
+        study = hydroid.suggest("runs/a")
+        for test in study.result.missing.free:
+            print(test.term.name, test.rms)
+
+    Args:
+        model: as of `design`.
+        logs: CSV files or logs, one or several; none: those of the run folder `model`.
+        out: folder for the page, tables and figure; None: nothing is written.
+        progress: called with what is done, how much of it, and how much there is.
+
+    Raises:
+        LogError: a log cannot be used.
+        SettingsError: no log is given, and `model` is no run folder.
+        RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
+    """
+    from hydroid.problem.problem import Problem
+    from hydroid.report.suggestion_report import suggestion_page
+    from hydroid.suggestion.suggest import suggestions
+    from hydroid.uncertainty.covariance import uncertainty
+
+    opened = open_model(model)
+    sources = [logs] if isinstance(logs, str | Path) or not isinstance(logs, Sequence) else list(logs)
+    problem = Problem(opened.settings, read_logs(sources or _run_logs(model), opened.settings))
+    if not np.isfinite(problem.residuals(opened.theta[None])).all():
+        raise RunError("the simulation diverged with these parameters", where=opened.source)
+    result = suggestions(problem, uncertainty(problem, opened.theta), progress=progress)
+    return Study(result, suggestion_page(problem, result, opened.name)).write(out)
+
+
+def _run_logs(model: ModelSource) -> list[Path]:
+    """Logs that a run folder was fitted to."""
+    source = Path(model.source).parent if isinstance(model, IdentifiedModel) else Path(model)
+    if not is_file(source / "run.json"):
+        raise SettingsError("no log is given", hint="name at least one, or the run folder of a fit")
+    from hydroid.run.folder import RunFolder
+
+    logs = [Path(name) for name in RunFolder(source).identity().get("logs", {})]
+    missing = [str(log) for log in logs if not log.is_file()]
+    if missing:
+        raise RunError(f"its log {', '.join(missing)} is not there", where=str(source), hint="name the log")
+    return logs
 
 
 def design(

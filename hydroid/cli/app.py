@@ -17,7 +17,7 @@ GROUPS = {
     "look": "Look at logs, at the arm and at its actuators",
     "fit": "Fit parameters to logs",
     "judge": "Judge a fit",
-    "plan": "Plan the next experiment",
+    "plan": "Plan what to do next",
     "model": "Use and build models",
 }
 
@@ -58,6 +58,7 @@ COMMANDS = (
     ("judge", judge.identifiability, "find what the logs determine", "LOG.csv --fit runs/hyd --profile F1"),
     ("judge", judge.sensitivity, "draw the effect of each parameter", "LOG.csv --fit runs/mech"),
     ("judge", judge.surface, "draw the error over two parameters", "LOG.csv --fit runs/mech --over K,D"),
+    ("plan", plan.suggest, "find what the model lacks, and what to do next", "--fit runs/hyd"),
     ("plan", plan.design, "design the next experiment", "LOG.csv --fit runs/mech --duration 30"),
     ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),
     ("model", model.build_model, "make an arm's MJCF model from its meshes", "--arm my-arm.yaml"),

@@ -1,4 +1,4 @@
-"""`hydroid design`."""
+"""`hydroid suggest` and `design`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +11,35 @@ from hydroid.cli.progress import Progress
 
 PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
 """keys of the table of predicted relative standard deviations"""
+
+
+def suggest(
+    estimate: Estimate,
+    output: Output,
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="LOG.csv...", help="Logs [default: those of the run]."),
+    ] = None,
+    out: Folder = Path("runs/suggestions"),
+) -> None:
+    """Find what the model lacks, and what to do next.
+
+    Tests every quantity that the fit holds or that its model has switched off, such as a delay or dry
+    friction: would freeing it lower the error? Shows what the residual depends on. Predicts for each of
+    several actions, from weighing a link to a new experiment, how much more would then be known.
+    """
+    from hydroid.api.plan import suggest
+    from hydroid.identified import load_identified
+    from hydroid.report.suggestion_report import suggestion_content
+
+    model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
+    with Progress(quiet=output.silent) as progress:
+        study = suggest(model, logs or (), out, progress=progress)
+    lines = [study.page.tables["missing_terms"]]
+    for section in study.page.sections:
+        lines += [f"{section.title}", *([section.text] if section.text else [])]
+        lines += [f"- {point}" for point in section.points]
+    show(output, lambda: suggestion_content(study.result), [*lines, str(out / "suggestions.html")])
 
 
 def design(

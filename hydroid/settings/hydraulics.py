@@ -38,8 +38,8 @@ SPANS = {
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),
 }
-"""Values that real actuators have, of the quantities that `hydroid suggest` asks about where not free, of both
-sides and of each."""
+"""values that real actuators have, of the quantities that `hydroid suggest` asks about where they are not
+free; of those with two sides it asks about both together and about each"""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ MECHANICAL_UNITS = {
 }
 
 MECHANICAL_SPANS = {"damping": (0.0, 1e5), "stiffness": (0.0, 1e4), "friction": (0.0, 1e4)}
-"""Values that real joints have, of the quantities that `hydroid suggest` asks about where not free."""
+"""values that real joints have, of the quantities that `hydroid suggest` asks about where not free"""
 
 UNITS = MECHANICAL_UNITS | {name: QUANTITIES[sets[0]].unit for name, sets in TARGETS.items()}
 """Quantities that a parameter can be, with their units."""

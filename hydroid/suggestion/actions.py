@@ -74,7 +74,7 @@ class Action:
         kind: of action.
         subject: what it is about, as its kind says.
         known: number of free parameters known to WEAK_ABOVE before and after.
-        parameter: the one that improves most.
+        parameter: the one that improves most, but for the one that is stated.
         deviations: its relative standard deviation before and after.
         improvement: factor by which all deviations shrink on geometric average.
     """
@@ -102,10 +102,9 @@ def next_actions(
             _experiments(problem, uncertainty),
         ]
     found: list[Action] = []
-    for source in sources:
-        for kind, subject, information in source:
-            progress(f"actions: {kind}", len(found), 0)
-            found.append(_action(kind, subject, names, before, precision.deviations(information)))
+    for done, source in enumerate(sources):
+        progress("actions", done, len(sources))
+        found += [_action(k, subject, names, before, precision.deviations(i)) for k, subject, i in source]
     useful = [a for a in found if a.known[1] > a.known[0] or a.deviations[0] > FEWEST_TIMES * a.deviations[1]]
     useful.sort(key=lambda a: (-a.known[1], -a.improvement))
     kept = [a for i, a in enumerate(useful) if sum(b.kind is a.kind for b in useful[:i]) < _most(a.kind)]
@@ -119,7 +118,7 @@ def _most(kind: ActionKind) -> int:
 
 def _action(kind: ActionKind, subject: str, names: Sequence[str], before: Array, after: Array) -> Action:
     known = int(np.sum(before <= WEAK_ABOVE)), int(np.sum(after <= WEAK_ABOVE))
-    best = int(np.argmax(before / after))
+    best = int(np.argmax(np.where([name == subject for name in names], 0.0, before / after)))
     shrunk = float(np.exp(np.mean(np.log(before / after))))
     return Action(kind, subject, known, names[best], (float(before[best]), float(after[best])), shrunk)
 

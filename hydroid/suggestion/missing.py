@@ -1,5 +1,6 @@
 """What the model lacks: each term that a fit holds is tested, and what freeing it would really gain."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -19,8 +20,9 @@ MIN_GAIN = 0.05
 """part of the rms error that freeing a term must save"""
 PROMISING = 0.5 * MIN_GAIN
 """part that the linear model must promise for it to be tried"""
-MOST_TRIED = {True: 5, False: 3}
-"""terms that are tried, the most promising first, with and without refinement"""
+MOST_TRIED = {True: 6, False: 3}
+"""terms that are tried, the most promising first, with and without refinement; of one quantity only one: a
+side, or both"""
 FIRST = 1e-3
 """change of a term that is simulated first, as a part of its span"""
 TRIES = 12
@@ -41,6 +43,8 @@ class Verdict(StrEnum):
 
     FREE = "free"
     """it is significant, and freeing it lowers the error by MIN_GAIN at least"""
+    UNTRIED = "untried"
+    """it is significant, but others promise more"""
     LEAVE = "leave"
     """no gain, or none beyond the noise"""
     INVISIBLE = "invisible"
@@ -110,25 +114,34 @@ def missing_terms(
     }
     significant = dict(zip(chances, holm(list(chances.values()), LEVEL), strict=True))
     promise = {i: d.score.part for i, d in directions.items() if significant[i] and d.score.part >= PROMISING}
-    tried = sorted(promise, key=lambda i: -promise[i])[: MOST_TRIED[refine]]
     freeing = Freeing(problem, uncertainty, model)
     rms = freeing.without().rms if refine else float(problem.rms(model.residual[None])[0])
     freed: dict[int, Freed] = {}
-    for i in tried:
-        progress(f"freeing {model.terms[i].name}", len(freed), len(tried))
+    for i in _to_try(model.terms, promise)[: MOST_TRIED[refine]]:
+        progress(f"freeing {model.terms[i].name}", len(freed), MOST_TRIED[refine])
         freed[i] = freeing.freed(i, directions[i].change, directions[i].effect, refine=refine)
     tests: list[TermTest] = []
     for i, term in enumerate(model.terms):
+        found = freed.get(i, Freed(rms, term.value))
         if i not in directions:
-            tests.append(TermTest(term, Verdict.INVISIBLE, 0.0, 1.0, rms, term.value))
-            continue
-        one = freed.get(i, Freed(rms, term.value))
-        one = one if one.rms < rms else Freed(rms, term.value)
-        verdict = Verdict.FREE if one.rms < (1 - MIN_GAIN) * rms else Verdict.LEAVE
-        statistic = directions[i].score.statistic
-        tests.append(TermTest(term, verdict, statistic, chances[i], one.rms, one.value))
+            verdict = Verdict.INVISIBLE
+        elif found.rms < (1 - MIN_GAIN) * rms:
+            verdict = Verdict.FREE
+        else:
+            verdict = Verdict.UNTRIED if i in promise and i not in freed else Verdict.LEAVE
+        gains = found if found.rms < rms else Freed(rms, term.value)
+        statistic = directions[i].score.statistic if i in directions else 0.0
+        tests.append(TermTest(term, verdict, statistic, chances.get(i, 1.0), gains.rms, gains.value))
     tests.sort(key=lambda t: (list(Verdict).index(t.verdict), t.rms, t.chance))
     return MissingTerms(tuple(tests), rms)
+
+
+def _to_try(terms: Sequence[Term], promise: Mapping[int, float]) -> list[int]:
+    """Return the most promising term of each quantity of each joint, the best first."""
+    best: dict[object, int] = {}
+    for i in sorted(promise, key=lambda i: -promise[i]):
+        best.setdefault(terms[i].kind, i)
+    return list(best.values())
 
 
 def _directions(model: ExtendedModel, explained: Explained) -> dict[int, _Direction]:

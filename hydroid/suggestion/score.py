@@ -11,7 +11,8 @@ The change of the quantity that would explain most is a = -d' r / |d'|². S is t
 residual shows without what d' explains, r + a d': a term that explains nearly everything is no noise. z then
 follows about Student's t. Where d' and the noise are slow it has few degrees of freedom: the variance d' S d'
 is a sum over frequencies, each of which is known from two numbers of the record. As many degrees count as the
-sum has terms of equal size (F. E. Satterthwaite, 1946), less the one that a took.
+sum has terms of equal size (F. E. Satterthwaite, 1946), or as the level of an autoregressive noise has, half
+its effective samples; less the one that a took.
 """
 
 from collections.abc import Callable, Sequence
@@ -102,16 +103,19 @@ class Explained:
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M,), with the residuals, and its degrees of freedom."""
-        spectra: list[Array] = []
+        samples = sum(part.stop - part.start for part in self.rows)
+        variance, spectra = self.prior_weight**2 * float(np.sum(row[samples:] ** 2)), list[Array]()
         for process, part in zip(noise, self.rows, strict=True):
             own = row[part]
             weighed = matmul_toeplitz(process.autocovariance, own)
-            spectrum = np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed))
-            spectra.append(np.maximum(spectrum, 0.0) * 2 / own.size)
-        spectrum, samples = np.concatenate(spectra), sum(part.stop - part.start for part in self.rows)
-        variance = float(np.sum(spectrum) + self.prior_weight**2 * np.sum(row[samples:] ** 2))
+            variance += float(own @ weighed)
+            spectra.append(
+                np.maximum(np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed)), 0.0) / own.size
+            )
+        spectrum = np.concatenate(spectra)
         terms = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
-        return variance, max(2 * terms - 1, 1.0)
+        level = 0.5 * sum(process.effective_sample_size for process in noise)
+        return variance, max(max(2 * terms, level) - 1, 1.0)
 
 
 def holm(chances: Sequence[float], level: float) -> NDArray[np.bool_]:

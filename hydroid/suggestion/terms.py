@@ -39,6 +39,12 @@ class Term:
         return self.settings.bounds
 
     @property
+    def kind(self) -> tuple[str, tuple[int, ...] | None, str | None]:
+        """What it is, with both sides of an actuator alike: the same for `delay` and `delay_a` of a joint."""
+        p = self.settings
+        return (p.quantity.removesuffix("_a").removesuffix("_b"), p.joints, p.link)
+
+    @property
     def lowest_change(self) -> float:
         """Change that leads to the nearer end of the span, from -1; 0 where the value lies there."""
         low, high = self.span

@@ -20,6 +20,7 @@ LAYERS = [
     {"uncertainty"},
     {"quantities"},
     {"fitting", "experiment"},
+    {"suggestion"},
     {"run"},
     {"report"},
     {"viewer"},

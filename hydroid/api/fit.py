@@ -129,12 +129,15 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.report.fit_report import fit_page
     from hydroid.report.page import write_page
+    from hydroid.suggestion.suggest import suggestions
 
     checkpoint = folder.begin_or_continue(problem.settings, problem.logs)
     result = run_fit(problem, folder.save, progress, checkpoint, folder.refinements())
     folder.write_estimate(problem, result)
     began = time.monotonic()
-    write_page(fit_page(folder.identity(), problem, result), folder.path)
+    last = problem.freed() if result.final == "joint" else problem
+    suggested = suggestions(last, result.uncertainty, thorough=False) if result.best.usable else None
+    write_page(fit_page(folder.identity(), problem, result, suggested), folder.path)
     folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
     return result
 

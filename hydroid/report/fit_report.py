@@ -31,8 +31,10 @@ from hydroid.report.phrases import (
 )
 from hydroid.report.quantities_report import curves_csv, quantity_section
 from hydroid.report.responses import joint_responses, response_plots
+from hydroid.report.suggestion_report import suggestion_sections
 from hydroid.report.table import Cell, Given, Table, number, numbers_csv, unless_nan
 from hydroid.report.uncertainty_report import determined_section
+from hydroid.suggestion.suggest import Suggestions
 
 INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
 INDICES_NOTE = (
@@ -49,7 +51,9 @@ _SINGLE = (
 _SEVERAL = "Among these candidates, a better fit of one segment goes with a worse fit of another."
 
 
-def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
+def fit_page(
+    identity: Mapping[str, Any], problem: Problem, fit: Fit, suggested: Suggestions | None = None
+) -> Page:
     """Return the page of a fit; `identity` holds the run's versions and log hashes."""
     objective = problem.settings.objective
     responses = joint_responses(problem, fit)
@@ -77,6 +81,7 @@ def fit_page(identity: Mapping[str, Any], problem: Problem, fit: Fit) -> Page:
             plots=(Plot("estimates", _ESTIMATES, partial(draw_estimates, problem, fit)),),
         ),
         determined_section(problem, fit.uncertainty, fit.identifiability),
+        *(suggestion_sections(problem, suggested) if suggested is not None else ()),
         Section(
             "How the search went",
             facts=_effort(problem, fit),

@@ -227,7 +227,7 @@ def residual_table(problem: Problem, checks: Sequence[ResidualCheck]) -> Table:
 
 def action_phrases(problem: Problem, actions: Sequence[Action]) -> tuple[str, ...]:
     """Say what each action is and what it would do."""
-    return tuple(f"{action_name(problem, action)}: {_effect(problem, action)}." for action in actions)
+    return tuple(f"{action_name(problem, action)}: {_effect(action)}." for action in actions)
 
 
 def action_name(problem: Problem, action: Action) -> str:
@@ -250,9 +250,9 @@ def action_name(problem: Problem, action: Action) -> str:
             return f"Run the designed experiment of {action.subject} s (hydroid design)"
 
 
-def _effect(problem: Problem, action: Action) -> str:
-    total, (before, after) = int(problem.parameters.free.sum()), action.known
-    share = f"{after} of {total} parameters are then known to {100 * WEAK_ABOVE:.0f} %"
+def _effect(action: Action) -> str:
+    before, after = action.known
+    share = f"{after} of {action.total} parameters are then known to {100 * WEAK_ABOVE:.0f} %"
     change = f"{share}, as before" if before == after else f"{share}, {before} before"
     low, high = (f"{100 * d:.2g} %" for d in action.deviations)
     return f"{change}; {action.parameter} improves most, from ±{low} to ±{high}"

@@ -34,6 +34,8 @@ SPANS = {
     "opening_exponent": (0.3, 4.0),
     "leakage": (0.0, 10.0),
     "flow_limit": (0.1, 1000.0),
+    "pump_flow": (0.1, 1000.0),
+    "pump_droop": (0.0, 200.0),
     "bulk_modulus": (500.0, 20000.0),
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),

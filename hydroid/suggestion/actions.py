@@ -73,7 +73,8 @@ class Action:
     Attributes:
         kind: of action.
         subject: what it is about, as its kind says.
-        known: number of free parameters known to WEAK_ABOVE before and after.
+        total: number of free parameters.
+        known: number of those known to WEAK_ABOVE, before and after.
         parameter: the one that improves most, but for the one that is stated.
         deviations: its relative standard deviation before and after.
         improvement: factor by which all deviations shrink on geometric average.
@@ -81,6 +82,7 @@ class Action:
 
     kind: ActionKind
     subject: str
+    total: int
     known: tuple[int, int]
     parameter: str
     deviations: tuple[float, float]
@@ -120,7 +122,9 @@ def _action(kind: ActionKind, subject: str, names: Sequence[str], before: Array,
     known = int(np.sum(before <= WEAK_ABOVE)), int(np.sum(after <= WEAK_ABOVE))
     best = int(np.argmax(np.where([name == subject for name in names], 0.0, before / after)))
     shrunk = float(np.exp(np.mean(np.log(before / after))))
-    return Action(kind, subject, known, names[best], (float(before[best]), float(after[best])), shrunk)
+    return Action(
+        kind, subject, len(names), known, names[best], (float(before[best]), float(after[best])), shrunk
+    )
 
 
 Forecast = tuple[ActionKind, str, Array]

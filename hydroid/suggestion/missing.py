@@ -21,8 +21,8 @@ MIN_GAIN = 0.05
 PROMISING = 0.5 * MIN_GAIN
 """part that the linear model must promise for it to be tried"""
 MOST_TRIED = {True: 6, False: 3}
-"""terms that are tried, the most promising first, with and without refinement; of one quantity only one: a
-side, or both"""
+"""terms that are tried, the most promising first, where thorough or not; of one quantity only one: a side,
+or both"""
 FIRST = 1e-3
 """change of a term that is simulated first, as a part of its span"""
 TRIES = 12
@@ -98,14 +98,15 @@ class _Direction:
 
 
 def missing_terms(
-    problem: Problem, uncertainty: Uncertainty, *, refine: bool = True, progress: Progress = no_progress
+    problem: Problem, uncertainty: Uncertainty, *, thorough: bool = True, progress: Progress = no_progress
 ) -> MissingTerms:
     """Test every term that a problem holds at its estimate.
 
     A term must be significant among all that are tested (S. Holm, 1979), and freeing it must gain. What it
-    gains is simulated: parts of projected steps, from the best of which least squares goes on where `refine`.
+    gains is simulated: parts of projected steps. Where `thorough`, least squares goes on from the best of
+    them, more terms are tried, and each side of an actuator is tested beside both together.
     """
-    model = ExtendedModel(problem, uncertainty.theta)
+    model = ExtendedModel(problem, uncertainty.theta, sides=thorough)
     progress("terms", 0, len(model.terms))
     explained = Explained.by(problem, uncertainty)
     directions = _directions(model, explained)
@@ -115,11 +116,11 @@ def missing_terms(
     significant = dict(zip(chances, holm(list(chances.values()), LEVEL), strict=True))
     promise = {i: d.score.part for i, d in directions.items() if significant[i] and d.score.part >= PROMISING}
     freeing = Freeing(problem, uncertainty, model)
-    rms = freeing.without().rms if refine else float(problem.rms(model.residual[None])[0])
+    rms = freeing.without().rms if thorough else float(problem.rms(model.residual[None])[0])
     freed: dict[int, Freed] = {}
-    for i in _to_try(model.terms, promise)[: MOST_TRIED[refine]]:
-        progress(f"freeing {model.terms[i].name}", len(freed), MOST_TRIED[refine])
-        freed[i] = freeing.freed(i, directions[i].change, directions[i].effect, refine=refine)
+    for i in _to_try(model.terms, promise)[: MOST_TRIED[thorough]]:
+        progress(f"freeing {model.terms[i].name}", len(freed), MOST_TRIED[thorough])
+        freed[i] = freeing.freed(i, directions[i].change, directions[i].effect, refine=thorough)
     tests: list[TermTest] = []
     for i, term in enumerate(model.terms):
         found = freed.get(i, Freed(rms, term.value))

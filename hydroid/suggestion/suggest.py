@@ -31,6 +31,6 @@ def suggestions(
     problem: Problem, uncertainty: Uncertainty, *, thorough: bool = True, progress: Progress = no_progress
 ) -> Suggestions:
     """Return the suggestions about an estimate; `thorough` ones take several times the simulations."""
-    missing = missing_terms(problem, uncertainty, refine=thorough, progress=progress)
+    missing = missing_terms(problem, uncertainty, thorough=thorough, progress=progress)
     actions = next_actions(problem, uncertainty, simulate=thorough, progress=progress)
     return Suggestions(missing, residual_checks(problem, uncertainty), actions, thorough)

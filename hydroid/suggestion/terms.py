@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.hydraulics.records import nominal_parameters
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.settings.hydraulics import QUANTITIES, SPANS, TARGETS
+from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, SPANS, TARGETS, actuator_values
 from hydroid.settings.problem import MECHANICAL_SPANS, ParameterSettings
 
 HELD_SPAN = 4.0
@@ -65,8 +64,11 @@ class Term:
         return min(max(self.value + change * (end - self.value), low), high)
 
 
-def terms(problem: Problem) -> tuple[Term, ...]:
-    """List the terms of a problem: its fixed parameters, then what it does not name, joint by joint."""
+def terms(problem: Problem, *, sides: bool = True) -> tuple[Term, ...]:
+    """List the terms of a problem: its fixed parameters, then what it does not name.
+
+    Of a quantity with two sides they are both together and, where `sides`, each.
+    """
     settings = problem.settings
     held = [
         Term(name, p.model_copy(update={"fixed": None, "bounds": span}), p.fixed, named=True)
@@ -82,17 +84,21 @@ def terms(problem: Problem) -> tuple[Term, ...]:
     }
     off: list[Term] = []
     joints = problem.active_joints
-    for joint in joints:
-        for quantity, (targets, span) in _spans(settings.stage).items():
-            values = {_nominal(problem, target, joint) for target in targets}
-            if len(values) == 1 and not any((target, joint) in taken for target in targets):
-                name = quantity if len(joints) == 1 else f"{quantity}_{joint}"
-                free = ParameterSettings(quantity=quantity, joints=(joint,), bounds=span)
+    for quantity, (targets, span) in _spans(settings.stage, sides=sides).items():
+        pump = quantity in OF_THE_PUMP
+        if pump and len(joints) == 1:
+            continue  # the pump of one actuator is no more than its flow limit
+        for joint in (None,) if pump else joints:
+            values = {_nominal(problem, target, joint or 1) for target in targets}
+            if len(values) == 1 and not any((target, joint or 1) in taken for target in targets):
+                name = quantity if pump or len(joints) == 1 else f"{quantity}_{joint}"
+                where = None if joint is None else (joint,)
+                free = ParameterSettings(quantity=quantity, joints=where, bounds=span)
                 off.append(Term(unused(name, settings.parameters), free, values.pop(), named=False))
     return (*held, *off)
 
 
-def _spans(stage: str) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
+def _spans(stage: str, *, sides: bool) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
     """Targets and span of each quantity to test, by name: both sides of an actuator, then each."""
     spans: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {
         name: ((name,), span) for name, span in MECHANICAL_SPANS.items()
@@ -100,13 +106,16 @@ def _spans(stage: str) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]
     if stage == "hyd":
         for name, span in SPANS.items():
             spans[name] = (TARGETS[name], span)
-            spans |= {side: ((side,), span) for side in TARGETS[name] if side != name}
+            spans |= {side: ((side,), span) for side in TARGETS[name] if side != name and sides}
     return spans
 
 
 def _span(parameter: ParameterSettings) -> tuple[float, float] | None:
     """Span of a parameter that is held; None where it is held at 0 without bounds."""
-    value, known = parameter.fixed or 0.0, {name: span for name, (_, span) in _spans("hyd").items()}
+    value, known = (
+        parameter.fixed or 0.0,
+        {name: span for name, (_, span) in _spans("hyd", sides=True).items()},
+    )
     span = parameter.bounds or known.get(parameter.quantity) or (value / HELD_SPAN, HELD_SPAN * value)
     low, high = min(span[0], value), max(span[1], value)
     return (low, high) if low < high else None
@@ -120,8 +129,9 @@ def unused(name: str, taken: Collection[str]) -> str:
 def _nominal(problem: Problem, quantity: str, joint: int) -> float:
     if quantity not in QUANTITIES:
         return 0.0
-    row = nominal_parameters(problem.settings.arm, problem.settings.hydraulics, [joint - 1])[0, 0]
-    return float(row[quantity] / QUANTITIES[quantity].factor)
+    settings = problem.settings
+    value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
+    return math.inf if value is None else value
 
 
 class ExtendedModel:
@@ -133,9 +143,9 @@ class ExtendedModel:
         residual: there [rad], shape (R,).
     """
 
-    def __init__(self, problem: Problem, theta: Array) -> None:
-        self.terms, self.theta = terms(problem), theta
-        sides: dict[str, tuple[ParameterSettings, float]] = {}
+    def __init__(self, problem: Problem, theta: Array, *, sides: bool = True) -> None:
+        self.terms, self.theta = terms(problem, sides=sides), theta
+        added: dict[str, tuple[ParameterSettings, float]] = {}
         parts: list[list[str]] = []
         for term in self.terms:
             joint = (term.settings.joints or (0,))[0]
@@ -143,10 +153,10 @@ class ExtendedModel:
             parts.append([term.name] if term.named else [f"{target}_of_{joint}" for target in targets])
             for part, target in zip(parts[-1], targets, strict=False):
                 if not term.named:
-                    sides[part] = term.settings.model_copy(update={"quantity": target}), term.value
-        self._problem = problem.extended({name: settings for name, (settings, _) in sides.items()})
+                    added[part] = term.settings.model_copy(update={"quantity": target}), term.value
+        self._problem = problem.extended({name: settings for name, (settings, _) in added.items()})
         names = self._problem.parameters.names
-        self._base = np.array([*theta, *(value for _, value in sides.values())])
+        self._base = np.array([*theta, *(value for _, value in added.values())])
         self._columns = [[names.index(name) for name in part] for part in parts]
         self.residual = self.residuals(theta[None])[0]
 

@@ -106,12 +106,9 @@ def _check(problem: Problem, channel: Channel, residual: Array) -> ResidualCheck
     correlation = _autocorrelation(residual, lags)
     below = np.flatnonzero(correlation < 1 / np.e)
     time = float(below[0] if len(below) else lags) * log.period
-    # samples per independent one: the sum of the autocorrelation up to where it first vanishes
-    ends = np.flatnonzero(correlation <= 0)
-    per_sample = 2 * float(correlation[: ends[0] if len(ends) else None].sum()) - 1
     regressors = (angle, velocity, log.command[:, joint])
     binned = {
-        what: _binned(values, residual, per_sample)
+        what: _binned(values, residual, lags)
         for what, values in zip(Regressor, regressors, strict=True)
         if np.ptp(values) > 0
     }
@@ -121,16 +118,21 @@ def _check(problem: Problem, channel: Channel, residual: Array) -> ResidualCheck
     )
 
 
-def _binned(values: Array, residual: Array, per_sample: float) -> Binned:
-    """Bin a residual; `per_sample` of its samples count as one."""
+def _binned(values: Array, residual: Array, lags: int) -> Binned:
     edges = np.linspace(values.min(), values.max(), BINS + 1)
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, BINS - 1)
-    parts = [residual[place == b] for b in range(BINS)]
-    full = [len(part) >= FEWEST for part in parts]
-    mean = np.array([part.mean() if f else np.nan for part, f in zip(parts, full, strict=True)])
-    deviation = np.array([part.std() if f else np.nan for part, f in zip(parts, full, strict=True)])
-    effective = np.array([max(len(part) / per_sample, 1.0) for part in parts])
-    return Binned(edges, mean, deviation, residual.std() / np.sqrt(effective))
+    count = np.bincount(place, minlength=BINS)
+    least = np.maximum(count, 1)
+    mean = np.bincount(place, residual, BINS) / least
+    rest = residual - mean[place]  # the noise is what the means leave
+    deviation = np.sqrt(np.bincount(place, rest**2, BINS) / least)
+    # samples per independent one: the sum of the autocorrelation up to where it first vanishes
+    correlation = _autocorrelation(rest, lags)
+    ends = np.flatnonzero(correlation <= 0)
+    alike = 2 * float(correlation[: ends[0] if len(ends) else None].sum()) - 1
+    error = rest.std() / np.sqrt(np.maximum(count / alike, 1.0))
+    few = count < FEWEST
+    return Binned(edges, np.where(few, np.nan, mean), np.where(few, np.nan, deviation), error)
 
 
 def _autocorrelation(residual: Array, lags: int) -> Array:

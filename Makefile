@@ -76,6 +76,10 @@ virtual-boom: setup  ## duties that a fit has not seen, on a boom simulated by o
 design-study: setup  ## a designed experiment against random ones of the same length; about ten minutes
 	$(BIN)/python benchmarks/designed_experiment.py
 
+.PHONY: suggest-study
+suggest-study: setup  ## terms that are left out of the model, and whether suggest names them; 20 minutes
+	$(BIN)/python benchmarks/suggest_study.py
+
 coverage: setup  ## whether the intervals hold the truth as often as they say (docs/uncertainty.md)
 	$(BIN)/python benchmarks/interval_coverage.py
 

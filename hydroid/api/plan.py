@@ -25,6 +25,7 @@ def suggest(
     logs: "LogSources" = (),
     out: str | Path | None = "runs/suggestions",
     *,
+    repair: bool = False,
     progress: Progress = no_progress,
 ) -> "Study[Suggestions]":
     """Find what the model lacks, what the residual shows, and what would determine more.
@@ -37,6 +38,7 @@ def suggest(
         model: as of `design`.
         logs: CSV files or logs, one or several; none: those of the run folder `model`.
         out: folder for the page, tables and figure; None: nothing is written.
+        repair: fill holes of the logs up to `log.repair_s`.
         progress: called with what is done, how much of it, and how much there is.
 
     Raises:
@@ -50,8 +52,8 @@ def suggest(
     from hydroid.uncertainty.covariance import uncertainty
 
     opened = open_model(model)
-    sources = [logs] if isinstance(logs, str | Path) or not isinstance(logs, Sequence) else list(logs)
-    problem = Problem(opened.settings, read_logs(sources or _run_logs(model), opened.settings))
+    given = logs if not isinstance(logs, Sequence) or len(logs) else _run_logs(model)
+    problem = Problem(opened.settings, read_logs(given, opened.settings, repair=repair))
     if not np.isfinite(problem.residuals(opened.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=opened.source)
     result = suggestions(problem, uncertainty(problem, opened.theta), progress=progress)

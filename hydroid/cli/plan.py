@@ -21,6 +21,7 @@ def suggest(
         typer.Argument(metavar="LOG.csv...", help="Logs [default: those of the run]."),
     ] = None,
     out: Folder = Path("runs/suggestions"),
+    repair: Repair = False,
 ) -> None:
     """Find what the model lacks, and what to do next.
 
@@ -34,7 +35,7 @@ def suggest(
 
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
     with Progress(quiet=output.silent) as progress:
-        study = suggest(model, logs or (), out, progress=progress)
+        study = suggest(model, logs or (), out, repair=repair, progress=progress)
     lines = [study.page.tables["missing_terms"]]
     for section in study.page.sections:
         lines += [f"{section.title}", *([section.text] if section.text else [])]

@@ -306,6 +306,7 @@ def suggestion_content(result: Suggestions) -> dict[str, Any]:
             "of": action.subject,
             "known_before": action.known[0],
             "known_after": action.known[1],
+            "total": action.total,
             "parameter": action.parameter,
             "before_percent": 100 * action.deviations[0],
             "after_percent": 100 * action.deviations[1],

@@ -32,6 +32,8 @@ SPANS = {
     "plunger_damping": (1.0, 5000.0),
     "overlap": (0.0, 2.0),
     "opening_exponent": (0.3, 4.0),
+    "return": (0.2, 10.0),
+    "anticavitation": (0.0, 10.0),
     "leakage": (0.0, 10.0),
     "flow_limit": (0.1, 1000.0),
     "pump_flow": (0.1, 1000.0),

@@ -1,6 +1,6 @@
 """Does `hydroid suggest` name what a model lacks, and is it silent where it lacks nothing?
 
-    python benchmarks/suggest_study.py [--logs 20] [--seconds 20] [--only delay none]
+    python benchmarks/suggest_study.py [--logs 20] [--seconds 15] [--only delay none]
 
 Stage 2 of the shoulder: areas and openings of both sides, the damping and the third link's mass are free, and
 all else is held at the truth. Each log is simulated with one term present (or none), with commands and a
@@ -13,7 +13,7 @@ first where nothing ranks before it.
 import argparse
 import time
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pseudo_random import pseudo_random_log
@@ -25,12 +25,14 @@ from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
-from hydroid.suggestion.missing import Verdict, missing_terms
+from hydroid.suggestion.missing import MissingTerms, missing_terms
 from hydroid.uncertainty.covariance import uncertainty
 
 NOISE = np.deg2rad(0.1)
 REST = 100
 """samples without a command at the start"""
+EVERY = 5
+"""logs of each case after which the table is printed"""
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
 QUANTITIES = {"A_A": "area_a", "A_B": "area_b", "open_A": "opening_a", "open_B": "opening_b", "D": "damping"}
 TERMS = {
@@ -76,43 +78,68 @@ def make_log(truth: FitSettings, seconds: float, seed: int) -> Log:
     return replace(clean, angle=clean.angle + noise)
 
 
+@dataclass
+class Tally:
+    """Counts over the logs of one case."""
+
+    logs: int = 0
+    named: int = 0
+    first: int = 0
+    anything: int = 0
+    others: Counter[str] = field(default_factory=Counter[str])
+    rms: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+
+    def add(self, case: str, result: MissingTerms) -> None:
+        """Count the result of one log."""
+        quantities = [test.term.settings.quantity for test in result.free]
+        mine = [q.removesuffix("_a").removesuffix("_b") == case for q in quantities]
+        least = [t.rms for t in result.tests if t.term.settings.quantity == case] or [np.nan]
+        self.logs += 1
+        self.named += any(mine)
+        self.first += bool(mine and mine[0])
+        self.anything += bool(quantities)
+        self.others.update(q for q, own in zip(quantities, mine, strict=True) if not own)
+        self.rms.append((float(np.degrees(result.rms)), float(np.degrees(least[0]))))
+
+    def row(self, case: str) -> str:
+        """One row of the table."""
+        before, after = np.median(self.rms, axis=0)
+        also = ", ".join(f"{q} {n}" for q, n in self.others.most_common()) or "–"
+        counts = (f"{n} of {self.logs}" for n in (self.named, self.first, self.anything))
+        return f"| {case} | {' | '.join(counts)} | {also} | {before:.3f} | {after:.3f} |"
+
+
+def one(case: str, k: int, seconds: float) -> MissingTerms:
+    """Simulate a log, fit the model without the term, and test it."""
+    model = make_settings({})
+    log = make_log(make_settings(TERMS[case]), seconds, 1000 * list(TERMS).index(case) + k)
+    problem = Problem(model, [log])
+    start = problem.parameters.vector(TRUTH, "truth")
+    start *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, start.size)
+    assert model.refinement is not None
+    found = refine(problem, start, model.refinement, lambda n, rms: None)
+    theta = problem.parameters.from_unit(found.point[None])[0]
+    return missing_terms(problem, uncertainty(problem, theta))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--logs", type=int, default=20)
-    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--only", nargs="*", default=list(TERMS))
     arguments = parser.parse_args()
-    model = make_settings({})
-    assert model.refinement is not None
-    print(
-        "| present | named | first | anything named | also named | rms without it [deg] | predicted with it |"
-    )
-    print("| --- | --- | --- | --- | --- | --- | --- |")
-    for case in arguments.only:
-        truth = make_settings(TERMS[case])
-        named, first, alarms = 0, 0, 0
-        others, rms = Counter[str](), []
-        began = time.perf_counter()
-        for k in range(arguments.logs):
-            log = make_log(truth, arguments.seconds, 1000 * list(TERMS).index(case) + k)
-            problem = Problem(model, [log])
-            start = problem.parameters.vector(TRUTH, "truth")
-            start *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, start.size)
-            found = refine(problem, start, model.refinement, lambda n, rms: None)
-            theta = problem.parameters.from_unit(found.point[None])[0]
-            result = missing_terms(problem, uncertainty(problem, theta))
-            quantities = [t.term.settings.quantity for t in result.tests if t.verdict is Verdict.FREE]
-            mine = [q.removesuffix("_a").removesuffix("_b") == case for q in quantities]
-            named, first = named + any(mine), first + bool(mine and mine[0])
-            alarms += bool(quantities)
-            others.update(q for q, own in zip(quantities, mine, strict=True) if not own)
-            least = [t.rms for t in result.tests if t.term.settings.quantity == case]
-            rms.append(np.degrees([result.rms, *(least or [np.nan])]))
-        before, after = np.median(rms, axis=0)
-        also = ", ".join(f"{q} {n}" for q, n in others.most_common()) or "–"
-        n = arguments.logs
-        row = f"| {case} | {named}/{n} | {first}/{n} | {alarms}/{n} | {also} | {before:.3f} | {after:.3f} |"
-        print(f"{row} <!-- {time.perf_counter() - began:.0f} s -->", flush=True)
+    tallies = {case: Tally() for case in arguments.only}
+    began = time.process_time()
+    for k in range(arguments.logs):
+        for case, tally in tallies.items():
+            tally.add(case, one(case, k, arguments.seconds))
+        if (k + 1) % EVERY == 0 or k + 1 == arguments.logs:
+            print(f"\n{k + 1} logs of each, {time.process_time() - began:.0f} s of CPU\n")
+            print(
+                "| present | named | first | anything named | also named | rms without it [deg] | with it |"
+            )
+            print("| --- | --- | --- | --- | --- | --- | --- |")
+            print("\n".join(tally.row(case) for case, tally in tallies.items()), flush=True)
 
 
 if __name__ == "__main__":

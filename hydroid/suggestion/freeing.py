@@ -16,7 +16,7 @@ PARTS = (0.25, 0.5, 1.0, 2.0)
 """of the projected step that are simulated"""
 DAMPING = (1e-1, 1e-3, 1e-6)
 """of the projected step: less damping follows weak directions further"""
-SHORT = RefinementSettings(iterations=20, gain_tolerance=1e-2)
+SHORT = RefinementSettings(iterations=10, gain_tolerance=1e-2)
 """of the refinement from the best of these"""
 
 

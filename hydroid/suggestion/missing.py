@@ -20,7 +20,7 @@ MIN_GAIN = 0.05
 """part of the rms error that freeing a term must save"""
 PROMISING = 0.5 * MIN_GAIN
 """part that the linear model must promise for it to be tried"""
-MOST_TRIED = {True: 6, False: 3}
+MOST_TRIED = {True: 4, False: 3}
 """terms that are tried, the most promising first, where thorough or not; of one quantity only one: a side,
 or both"""
 FIRST = 1e-3

@@ -84,7 +84,7 @@ def missing_phrase(missing: MissingTerms) -> str:
     if not missing.tests:
         return "Every quantity that could be tested is free already."
     if not missing.free:
-        return f"None of {len(missing.tests)} quantities that the fit holds would lower the error much."
+        return f"Tested: {len(missing.tests)} quantities that the fit holds. None would lower the error much."
     first = missing.free[0]
     return f"Freeing {first.term.name} would lower the rms error {_fall(missing, first)}: free it."
 
@@ -269,7 +269,7 @@ def action_table(actions: Sequence[Action]) -> Table:
         f"known: number of parameters whose relative standard deviation is at most {100 * WEAK_ABOVE:.0f} %. "
         "Predicted at the estimate, with the noise that the residuals show, from ±100 % without any log."
     )
-    return Table("What to do next", header, rows, note)
+    return Table("Predicted effect of each action", header, rows, note)
 
 
 def suggestion_content(result: Suggestions) -> dict[str, Any]:
@@ -285,7 +285,9 @@ def suggestion_content(result: Suggestions) -> dict[str, Any]:
             "score": test.statistic,
             "chance": test.chance,
             "parameter": test.term.settings.model_dump(mode="json", exclude_defaults=True)
-            | {"bounds": proposed_bounds(test)},
+            | {"bounds": proposed_bounds(test)}
+            if test.verdict is Verdict.FREE
+            else None,
         }
         for test in result.missing.tests
     ]

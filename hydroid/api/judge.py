@@ -26,7 +26,7 @@ def validate(
     *,
     repair: bool = False,
 ) -> "Study[list[Validation]]":
-    """Compare fits with logs they were not fitted to: error indices (article, table 9) and overlay plots.
+    """Compare fits with logs they were not fitted to: error indices (article, table 9), bands, plots.
 
         study = hydroid.validate("runs/a", "b.csv")
         print(study.result[0].indices[2].rms)  # of joint 2 [rad]
@@ -50,6 +50,7 @@ def validate(
     read = [read_logs(logs, model.settings, repair=repair) for model in opened]
     from hydroid.fitting.validation import error_indices
     from hydroid.prediction import predict
+    from hydroid.quantities.band import prediction_bands
     from hydroid.report.validation_report import Validation, validation_page
 
     results: list[Validation] = []
@@ -61,7 +62,8 @@ def validate(
                 joint: error_indices(log.angle[:, joint - 1], response[:, column])
                 for column, joint in enumerate(outputs)
             }
-            results.append(Validation(model.name, log, response, indices))
+            bands = prediction_bands(model, log, response)
+            results.append(Validation(model.name, log, response, indices, bands))
     return Study(results, validation_page(results)).write(out)
 
 

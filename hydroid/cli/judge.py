@@ -13,6 +13,7 @@ from hydroid.cli.progress import Progress
 
 if TYPE_CHECKING:
     from hydroid.identified import IdentifiedModel
+    from hydroid.quantities.band import Band
     from hydroid.report.uncertainty_report import UncertaintyStudy
     from hydroid.report.validation_report import Validation
 
@@ -48,7 +49,8 @@ def validate(
     models = [load_identified(path, overrides=overrides(setting)) for path in fit]
     study = validate(models, logs, out, repair=repair)
     found = [row for result in study.result for row in _indices(result)]
-    show(output, lambda: {"results": found}, [study.table, str(out / "validation.html")])
+    verdicts = [f"- {point}" for section in study.page.sections for point in section.points]
+    show(output, lambda: {"results": found}, [study.table, *verdicts, str(out / "validation.html")])
 
 
 def identifiability(
@@ -205,9 +207,24 @@ def _indices(result: "Validation") -> list[dict[str, Any]]:
             "rms_deg": finite(degrees(indices.rms)),
             "max_deg": finite(degrees(indices.largest)),
             "fit_percent": finite(indices.fit),
+            **_band(result.bands.get(joint)),
         }
         for joint, indices in result.indices.items()
     ]
+
+
+def _band(band: "Band | None") -> dict[str, Any]:
+    from hydroid.estimate import finite
+
+    if band is None:
+        return {}
+    return {
+        "noise_deg": degrees(band.noise),
+        "expected_deg": finite(degrees(band.expected)),
+        "model_error_deg": degrees(band.model_error),
+        "inside_percent": 100 * band.inside,
+        "model_limits": band.model_limits,
+    }
 
 
 def _uncertainty(study: "UncertaintyStudy", phrases: tuple[str, ...]) -> dict[str, Any]:

@@ -20,8 +20,12 @@ from hydroid.report.table import number
 MOST_RESPONSES = 12
 """responses drawn at most on a page, those with the largest errors"""
 _COLORS = (style.REFINED, style.SEARCH, *style.OTHERS)
-_CAPTION = "Top: measured and simulated angle. Middle: measured minus simulated angle. Bottom: command."
+_CAPTION = (
+    "Top: measured and simulated angle. Middle: measured minus simulated angle; shaded, where it is known, the "
+    "95 % prediction band. Bottom: command."
+)
 _NUMBER_ROOM = 0.035  # of the width, for a segment's number
+_WIDEST_BAND = np.pi  # [rad]: infinite where the parameters leave the angle open
 _RUNAWAY = 3.0  # ranges of the measured angle: a response farther off has run away
 _LEAST_RANGE = 1.0  # [deg] of the measured angle for _RUNAWAY: a joint may be at rest
 _LEAST_ANGLE, _LEAST_RESIDUAL = 0.1, 1e-6  # [deg] height of a panel at least: rounding is not drawn
@@ -39,6 +43,7 @@ class JointResponse:
         measured: angle [rad], shape (T,).
         simulated: angle [rad] by the model's name, shape (T,).
         segments: number of each segment, from 1, and its samples [first, end).
+        bands: half the prediction band [rad] by the model's name, shape (T,).
     """
 
     log: str
@@ -48,6 +53,7 @@ class JointResponse:
     measured: Array
     simulated: Mapping[str, Array] = field(default_factory=dict[str, Array])
     segments: tuple[tuple[int, int, int], ...] = ()
+    bands: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
     def mean_squares(self) -> list[float]:
         """Return each model's mean squared error [rad²], infinite where it diverged."""
@@ -105,6 +111,12 @@ def draw(response: JointResponse, colors: Sequence[str] = _COLORS) -> Figure:
         remark = f"{number(rms)} deg rms" if np.isfinite(rms) else "diverged"
         upper.plot(*style.decimated(time, angle), label=f"{name} ({remark})", **look)
         middle.plot(*style.decimated(time, residual), **look)
+        if name in response.bands:
+            half = np.degrees(np.minimum(response.bands[name], _WIDEST_BAND))
+            label = f"95 % band of {name}"
+            middle.fill_between(
+                time, -half, half, color=look["color"], alpha=0.15, lw=0, zorder=1, label=label
+            )
     reach = _RUNAWAY * max(float(np.ptp(measured)), _LEAST_RANGE)
     upper.set_ylim(_limits(list(angles.values()), measured, reach, _LEAST_ANGLE))
     near = [r for r in residuals if np.nanmax(np.abs(r), initial=0.0) <= reach]

@@ -1,26 +1,52 @@
 """The report of a validation: how well several fits predict several logs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import degrees
 from pathlib import Path
 
 from hydroid.fitting.validation import ErrorIndices
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.quantities.band import Band
 from hydroid.report.fit_report import INDICES, INDICES_NOTE, index_cells
 from hydroid.report.page import Page, Section, file_name, log_names, short_name, unique
 from hydroid.report.responses import JointResponse, response_plots
-from hydroid.report.table import Cell, Table
+from hydroid.report.table import Cell, Table, number
+
+_BANDS = "Prediction bands"
+_BAND_HEADER = (
+    "noise [deg]",
+    "expected error [deg]",
+    "error [deg]",
+    "error of the model [deg]",
+    "inside [%]",
+)
+_BAND_NOTE = (
+    "noise: standard deviation that the fit saw in its own residuals. expected error: rms, of this noise and "
+    "of the parameters' uncertainty together. error: rms. error of the model: the part of the error that the "
+    "expected one does not explain. inside: samples within the 95 % band; 95 % are expected if the model is "
+    "right, and slow noise may leave it for a while."
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """One fit's response to one log: outputs [rad], shape (T, K), and error indices by joint (1-based)."""
+    """One fit's response to one log.
+
+    Attributes:
+        fit: its name.
+        log: what it is compared with.
+        response: outputs [rad], shape (T, K).
+        indices: of the error by joint, numbered from 1.
+        bands: prediction bands by joint; empty of a model that is no fit.
+    """
 
     fit: str
     log: Log
     response: Array
     indices: Mapping[int, ErrorIndices]
+    bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
 
 
 def validation_page(results: Sequence[Validation]) -> Page:
@@ -28,19 +54,27 @@ def validation_page(results: Sequence[Validation]) -> Page:
     logs = {result.log.source: result.log for result in results}
     names = dict(zip(logs, log_names(list(logs.values())), strict=True))
     rows: list[tuple[Cell, ...]] = []
-    records: dict[object, tuple[JointResponse, dict[str, Array]]] = {}
+    band_rows: list[tuple[Cell, ...]] = []
+    verdicts: list[str] = []
+    records: dict[object, tuple[JointResponse, dict[str, Array], dict[str, Array]]] = {}
     for result in results:
         log, name = result.log, names[result.log.source]
         for column, (joint, indices) in enumerate(result.indices.items()):
             command, measured = log.command[:, joint - 1], log.angle[:, joint - 1]
             simulated: dict[str, Array] = {}
-            response = JointResponse(name, joint, log.time, command, measured, simulated)
+            halves: dict[str, Array] = {}
+            record = log.time, command, measured
+            response = JointResponse(name, joint, *record, simulated, bands=halves)
             # fits that read the log with another delay or period were not compared with the same record
             key = name, joint, measured.tobytes(), command.tobytes()
-            _, simulated = records.setdefault(key, (response, simulated))
+            _, simulated, halves = records.setdefault(key, (response, simulated, halves))
             fit = unique(short_name(result.fit), simulated)
             simulated[fit] = result.response[:, column]
             rows.append((fit, name, joint, *index_cells(indices)))
+            if band := result.bands.get(joint):
+                halves[fit] = band.half
+                band_rows.append((fit, name, joint, *_band_cells(band)))
+                verdicts.append(f"{fit} on {name}, joint {joint}: {_verdict(band)}")
     table = Table(
         "Output error on given logs",
         ("fit", "log", "joint", *INDICES),
@@ -51,10 +85,27 @@ def validation_page(results: Sequence[Validation]) -> Page:
     taken: set[str] = set()
     responses = {
         file_name(f"validation_{Path(each.log).stem}_joint_{each.joint}", taken): each
-        for each, _ in records.values()
+        for each, *_ in records.values()
     }
     plots, more = response_plots(responses, [max(each.mean_squares()) for each in responses.values()])
     fits, count = len({row[0] for row in rows}), len(names)
     lead = f"{fits} fit{'s' * (fits != 1)} on {count} log{'s' * (count != 1)}.{more}"
     section = Section("Output error", tables={"validation": table}, plots=plots)
-    return Page("validation", "Validation", lead, (section,))
+    bands = Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)
+    limits = Section("What limits the prediction", points=tuple(verdicts), tables={"bands": bands})
+    return Page("validation", "Validation", lead, (section, limits) if band_rows else (section,))
+
+
+def _band_cells(band: Band) -> tuple[Cell, ...]:
+    """Return the cells of _BAND_HEADER."""
+    errors = (degrees(x) for x in (band.noise, band.expected, band.error, band.model_error))
+    return (*errors, 100 * band.inside)
+
+
+def _verdict(band: Band) -> str:
+    """Say what limits the prediction."""
+    inside = f"{100 * band.inside:.0f} % of the samples lie inside the band."
+    if not band.model_limits:
+        return f"{inside} The noise and the uncertainty of the parameters explain the error."
+    ratio = number(band.model_error / band.noise)
+    return f"{inside} The model limits the prediction, not the noise: its error is {ratio} times the noise."

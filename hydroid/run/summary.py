@@ -34,7 +34,17 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         quantities=fit.quantities.scalars,
         curves=fit.quantities.curves,
         covariance=fit.quantities.precision.covariance(),
+        noise_deg=_noise(problem, fit.uncertainty),
     )
+
+
+def _noise(problem: Problem, uncertainty: Uncertainty) -> dict[int, float]:
+    """Standard deviation of each joint's noise over all logs [deg]."""
+    squares: dict[int, list[float]] = {}
+    for channel, noise in zip(problem.channels, uncertainty.noise, strict=True):
+        if channel.quantity == "angle":
+            squares.setdefault(channel.joint, []).append((noise.level / channel.weight) ** 2)
+    return {joint: float(np.degrees(np.sqrt(np.mean(each)))) for joint, each in squares.items()}
 
 
 def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str, ParameterEstimate]:

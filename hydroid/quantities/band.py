@@ -1,0 +1,72 @@
+"""Prediction band: where the samples of a log lie if the model is right.
+
+A predicted angle errs by the uncertainty of the parameters, by the delta method, and by the noise of the
+measurement as the fit saw it. What an unseen log shows beyond both is an error of the model.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydroid.identified import IdentifiedModel
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
+from hydroid.quantities.delta import stored_precision
+
+MOST_OUTSIDE = 0.1
+"""part of the samples outside the band, above which the model is at fault; 5 % are expected"""
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The 95 % prediction band of one joint's angle in one log, and the error that was found.
+
+    Attributes:
+        noise: standard deviation of the fit's noise [rad].
+        half: of the band's width [rad], shape (T,); infinite where the parameters leave the angle open.
+        inside: part of the samples whose error lies within it.
+        error: rms error [rad].
+        expected: rms error that noise and parameters explain [rad].
+    """
+
+    noise: float
+    half: Array
+    inside: float
+    error: float
+    expected: float
+
+    @property
+    def model_error(self) -> float:
+        """Rms error that neither noise nor parameters explain [rad]."""
+        return float(np.sqrt(max(self.error**2 - self.expected**2, 0.0)))
+
+    @property
+    def model_limits(self) -> bool:
+        """Whether the model, not the noise, limits the prediction."""
+        return self.inside < 1 - MOST_OUTSIDE
+
+
+def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:
+    """Return the band of each compared joint, numbered from 1, around a response [rad], shape (T, K).
+
+    Empty where the model's values are not those of a fit, which alone knows its covariance and noise.
+    """
+    precision, outputs = stored_precision(model), model.settings.outputs
+    levels = {} if model.summary is None else model.summary.noise_deg
+    if precision is None or not set(outputs) <= set(levels):
+        return {}
+    problem = Problem(model.settings, [log])
+    angles = precision.propagate(
+        lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1), positive=False
+    )
+    bands: dict[int, Band] = {}
+    for column, (joint, deviation) in enumerate(
+        zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
+    ):
+        noise, error = float(np.radians(levels[joint])), log.angle[:, joint - 1] - response[:, column]
+        variance = deviation**2 + noise**2
+        half = precision.quantile * np.sqrt(variance)
+        inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
+        bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(variance.mean())))
+    return bands

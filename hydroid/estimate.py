@@ -116,8 +116,8 @@ class FitSummary(Settings):
     """the same against a command or an angle"""
     covariance: Covariance | None = None
     """of the final estimate"""
-    noise_deg: dict[int, float] = Field(default_factory=dict[int, float])
-    """standard deviation of the noise of each compared joint's angle, from the residuals [deg]"""
+    noise_deg: dict[str, float] = Field(default_factory=dict[str, float])
+    """standard deviation of the noise of each compared angle, `q2` of joint 2, from the residuals [deg]"""
 
     @property
     def values(self) -> dict[str, float]:

@@ -54,7 +54,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     """
     precision, outputs = stored_precision(model), model.settings.outputs
     levels = {} if model.summary is None else model.summary.noise_deg
-    if precision is None or not set(outputs) <= set(levels):
+    if precision is None or any(f"q{joint}" not in levels for joint in outputs):
         return {}
     problem = Problem(model.settings, [log])
     angles = precision.propagate(
@@ -64,7 +64,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     for column, (joint, deviation) in enumerate(
         zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
     ):
-        noise, error = float(np.radians(levels[joint])), log.angle[:, joint - 1] - response[:, column]
+        noise, error = float(np.radians(levels[f"q{joint}"])), log.angle[:, joint - 1] - response[:, column]
         variance = deviation**2 + noise**2
         half = precision.quantile * np.sqrt(variance)
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))

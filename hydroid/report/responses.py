@@ -21,8 +21,8 @@ MOST_RESPONSES = 12
 """responses drawn at most on a page, those with the largest errors"""
 _COLORS = (style.REFINED, style.SEARCH, *style.OTHERS)
 _CAPTION = (
-    "Top: measured and simulated angle. Middle: measured minus simulated angle; shaded, where it is known, the "
-    "95 % prediction band. Bottom: command."
+    "Top: measured and simulated angle. Middle: measured minus simulated angle; shaded: 95 % "
+    "prediction band, where it is known. Bottom: command."
 )
 _NUMBER_ROOM = 0.035  # of the width, for a segment's number
 _WIDEST_BAND = np.pi  # [rad]: infinite where the parameters leave the angle open

@@ -38,13 +38,13 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     )
 
 
-def _noise(problem: Problem, uncertainty: Uncertainty) -> dict[int, float]:
-    """Standard deviation of each joint's noise over all logs [deg]."""
-    squares: dict[int, list[float]] = {}
+def _noise(problem: Problem, uncertainty: Uncertainty) -> dict[str, float]:
+    """Standard deviation of each angle's noise over all logs [deg]."""
+    squares: dict[str, list[float]] = {}
     for channel, noise in zip(problem.channels, uncertainty.noise, strict=True):
         if channel.quantity == "angle":
-            squares.setdefault(channel.joint, []).append((noise.level / channel.weight) ** 2)
-    return {joint: float(np.degrees(np.sqrt(np.mean(each)))) for joint, each in squares.items()}
+            squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
+    return {angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()}
 
 
 def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str, ParameterEstimate]:

@@ -21,6 +21,7 @@ the estimate by more than an interval says. At a bound the covariance is compute
 the parameter gets no interval.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +34,8 @@ from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
-from hydroid.uncertainty.noise import Noise, covariances
-from hydroid.uncertainty.restricted import STEP, neighbours, restricted_noise
+from hydroid.uncertainty.noise import Noise, channel_noise, covariances, unbiased
+from hydroid.uncertainty.noise_error import STEP, neighbours
 
 COVERAGE = 0.95
 """probability with which an interval covers the true value"""
@@ -98,7 +99,7 @@ def uncertainty_from(
 ) -> Uncertainty:
     """Return the uncertainty from the derivatives, without simulations; None: for the residual's noise."""
     free, parameters = problem.parameters.free, problem.parameters.parameters
-    root, noise, changes = _root(problem, theta, derivatives, noise)
+    root, noise, changes = _root(problem, derivatives, noise)
     covariance, unmeasured = covariance_of(root)
     relative, widths = np.full((2, len(theta)), np.nan)
     relative[free] = np.where(unmeasured, np.inf, np.sqrt(np.diag(covariance)))
@@ -188,22 +189,20 @@ def _log_spread(root: Array, changes: Array) -> Array:
 
 
 def _root(
-    problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...] | None
+    problem: Problem, derivatives: Jacobian, noise: tuple[Noise, ...] | None
 ) -> tuple[Array, tuple[Noise, ...], Array]:
     """Return G, shape (p, p), the noise with what the fit absorbed, and the changes for `_log_spread`."""
     directions, values, effects = decompose(problem.parameters.free, derivatives)
     fitted = values > 0
     samples, weight = len(derivatives.residual), derivatives.prior_weight
+    priors = weight**2 * effects[:, samples:] @ effects[:, samples:].T
+    parts = [effects[:, channel.rows] for channel in problem.channels]
     if noise is None:
-        scores = problem.priors.scores(theta[None])[0]
-        unit = np.append(np.ones(samples), np.full(len(scores), 1 / weight if weight else 0.0))
-        residual = np.append(derivatives.residual, scores)
-        objective, seen = problem.settings.objective, effects[fitted] * unit
-        noise = restricted_noise(problem.channels, residual, seen, objective)
-    scatter = weight**2 * effects[:, samples:] @ effects[:, samples:].T
+        noise = _unabsorbed(problem, derivatives, [part[fitted] for part in parts], priors[fitted][:, fitted])
+    scatter = priors
     moved: list[Array] = []
-    for channel, process in zip(problem.channels, noise, strict=True):
-        each = covariances([process, *neighbours(process)], effects[:, channel.rows])
+    for part, process in zip(parts, noise, strict=True):
+        each = covariances([process, *neighbours(process)], part)
         scatter += each[0]
         moved += [(other - each[0]) / STEP for other in each[1:]]
     variance, axes = np.linalg.eigh(scatter[np.ix_(fitted, fitted)])
@@ -211,3 +210,21 @@ def _root(
     inverse[np.ix_(fitted, fitted)] = (axes / np.sqrt(np.maximum(variance, TINY))) @ axes.T
     changes = np.array([inverse @ m @ inverse for m in moved]).reshape(-1, *inverse.shape)
     return inverse @ (values[:, None] * directions.T), noise, changes
+
+
+def _unabsorbed(
+    problem: Problem, derivatives: Jacobian, effects: Sequence[Array], priors: Array
+) -> tuple[Noise, ...]:
+    """Return each channel's noise before the fit absorbed a part of it.
+
+    `effects`, (k, T) of each channel, are orthonormal together; `priors`, (k, k), is their scatter.
+    """
+    residual, objective = derivatives.residual, problem.settings.objective
+    noise = tuple(channel_noise(c, residual[c.rows], objective) for c in problem.channels)
+    spread = priors + np.sum(
+        [process.covariance_of(part) for process, part in zip(noise, effects, strict=True)], axis=0
+    )
+    return tuple(
+        process if process.source == "settings" else unbiased(process, part, spread)
+        for process, part in zip(noise, effects, strict=True)
+    )

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter, lfiltic
 
 from hydroid.parameters import Array
@@ -18,6 +19,10 @@ from hydroid.settings.problem import ObjectiveSettings
 
 MAX_AR_ORDER = 30
 """the highest order of the AR process"""
+ABSORBED_ROUNDS = 4
+"""rounds in which the noise that a fit has absorbed is estimated"""
+MAX_ABSORBED = 0.5
+"""part of the noise; a fit that has absorbed more leaves too little to correct the level with"""
 MIN_LEVEL = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest noise level that a residual can show [rad, Pa]: no potentiometer or gauge is better (ours)"""
 
@@ -104,7 +109,7 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
 
 
 def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
-    """Return a channel's noise: white as the settings give it, else from its residual (`fit_noise`).
+    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,).
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
@@ -114,16 +119,15 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
         level = None if given is None else float(np.deg2rad(given))
     else:
         level = None if objective.noise_bar is None else objective.noise_bar * 1e5
-    rows = np.atleast_2d(residual)
-    samples = rows.shape[1]
+    samples = len(residual)
     if level is not None:
         return Noise(samples, level * channel.weight, np.empty(0), "settings")
-    lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(np.sum(rows**2))
+    lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
     if lacking <= 0:
-        return fit_noise(rows)
+        return fit_noise(residual)
     impulse = np.zeros(samples)  # its products are those expected of white noise
     impulse[samples // 2] = np.sqrt(lacking)
-    return replace(fit_noise(np.vstack([rows, impulse])), source="smallest")
+    return replace(fit_noise(np.vstack([residual, impulse])), source="smallest")
 
 
 def covariances(processes: Sequence[Noise], rows: Array) -> Array:
@@ -148,7 +152,7 @@ def covariances(processes: Sequence[Noise], rows: Array) -> Array:
 def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
     """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,).
 
-    More rows, (n, T), are parts of the noise that the residual lacks: their products are added to its own.
+    Of several rows, (n, T), the products are added.
     """
     forward = backward = rows = np.atleast_2d(rows)
     samples = rows.shape[1]
@@ -165,6 +169,45 @@ def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
         reflection.append(k)
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
     return Noise(samples, level, np.array(reflection[: int(np.argmin(criterion))]))
+
+
+def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
+    """Return the noise before a least-squares fit absorbed a part of it.
+
+    A fit absorbs the part of the noise that resembles its derivatives, slow noise above all. Let U be the
+    orthonormal rows that span them, `effects`, (p, T), the channel's part of U, and `spread`, (p, p), U S U'
+    of all channels. The covariance of the residual is (1 - U'U) S (1 - U'U). The autocovariances of `noise`
+    are raised by the difference to S, in a few rounds because S is not known beforehand.
+    """
+    samples, order = noise.samples, len(noise.reflection)
+    left, whole = noise.autocovariance[: order + 1], noise
+    for _ in range(ABSORBED_ROUNDS):
+        smooth = np.asarray(matmul_toeplitz(whole.autocovariance, effects.T), dtype=np.float64).T
+        absorbed = np.array(
+            [
+                np.sum(effects[:, : samples - k] * smooth[:, k:])
+                + np.sum(smooth[:, : samples - k] * effects[:, k:])
+                - np.sum((spread @ effects[:, : samples - k]) * effects[:, k:])
+                for k in range(order + 1)
+            ]
+        )
+        reflection = _levinson(left + absorbed / (samples - np.arange(order + 1)))
+        if reflection is None or absorbed[0] > MAX_ABSORBED * samples * left[0]:
+            break
+        whole = replace(noise, level=float(np.sqrt(left[0] + absorbed[0] / samples)), reflection=reflection)
+    return whole
+
+
+def _levinson(autocovariance: Array) -> Array | None:
+    """Reflection coefficients from lags 0 to p; None where no AR process has these autocovariances."""
+    polynomial, variance, reflection = np.ones(1), float(autocovariance[0]), np.empty(0)
+    for m in range(1, len(autocovariance)):
+        k = float(-(polynomial @ autocovariance[m:0:-1]) / variance)
+        if not abs(k) < 1:
+            return None
+        polynomial, variance = _next_predictor(polynomial, variance, k)
+        reflection = np.append(reflection, k)
+    return reflection
 
 
 def _next_predictor(polynomial: Array, variance: float, k: float) -> tuple[Array, float]:

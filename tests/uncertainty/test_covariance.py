@@ -16,8 +16,8 @@ from hydroid.uncertainty.covariance import quantile, uncertainty, uncertainty_fr
 from hydroid.uncertainty.flags import Flag, ParameterStatus
 from hydroid.uncertainty.intervals import THRESHOLD, bootstrap, profile
 from hydroid.uncertainty.jacobian import jacobian
-from hydroid.uncertainty.noise import MIN_LEVEL, Noise, channel_noise, fit_noise
-from hydroid.uncertainty.restricted import STEP, neighbours, restricted_noise
+from hydroid.uncertainty.noise import MIN_LEVEL, Noise, channel_noise, fit_noise, unbiased
+from hydroid.uncertainty.noise_error import STEP, neighbours
 
 DEG = np.deg2rad(1.0)
 AR1 = np.exp(-0.01 / 0.15)  # correlation time 0.15 s at 100 Hz
@@ -247,21 +247,19 @@ def test_noise_is_taken_from_settings_residual_or_floor():
 
 
 def test_what_a_fit_absorbs_comes_back():
-    """Ten slow effects take a third of slow noise out of a residual; the restricted estimate knows of it."""
-    samples, phi = 2000, np.exp(-0.01 / 2.0)
-    effects = np.linalg.svd(slow(10, samples, seed=3), full_matrices=False)[2]
-    channel = Channel(0, 2, "angle", 0, np.empty(samples), 1.0, slice(0, samples))
-    objective = white_problem()[0].settings.objective
+    """Three slow effects take a part of slow noise out of a residual; the corrected process has it again."""
+    samples, phi = 4000, np.exp(-0.01 / 0.5)  # eighty correlation times
+    effects = np.linalg.svd(slow(3, samples, seed=3), full_matrices=False)[2]
     rng, raw, restored = np.random.default_rng(4), [], []
     for _ in range(100):
         noise = ar1(rng, samples, phi, 0.1 * DEG)
-        residual = noise - effects.T @ (effects @ noise)
-        raw.append(fit_noise(residual).covariance_of(effects).trace())
-        (process,) = restricted_noise((channel,), residual, effects, objective)
+        process = fit_noise(noise - effects.T @ (effects @ noise))
+        raw.append(process.covariance_of(effects).trace())
+        process = unbiased(process, effects, process.covariance_of(effects))
         restored.append(process.covariance_of(effects).trace())
     true = Noise(samples, 0.1 * DEG, np.array([-phi])).covariance_of(effects).trace()
-    assert np.mean(raw) < 0.6 * true
-    assert np.mean(restored) == pytest.approx(true, rel=0.15)
+    assert np.mean(raw) < 0.95 * true
+    assert np.mean(restored) == pytest.approx(true, rel=0.1)
 
 
 def test_the_errors_of_a_process_are_those_of_its_estimates():
@@ -289,10 +287,11 @@ def test_the_quantile_covers_an_estimate_whose_variance_is_log_normal():
 @pytest.mark.parametrize("phi", [0.0, AR1, float(np.exp(-0.01 / 4.0))])
 def test_intervals_cover_the_truth_as_often_as_they_say(phi):
     """400 linear fits, noise estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""
-    columns, hits, rng = slow(3, 1500, seed=7), [], np.random.default_rng(8)
+    samples = 1500 if phi <= AR1 else 7500  # nineteen correlation times of the slowest noise
+    columns, hits, rng = slow(3, samples, seed=7), [], np.random.default_rng(8)
     deviations, estimates = [], []
     for _ in range(400):
-        measured = THETA @ columns + ar1(rng, 1500, phi, 0.1 * DEG)
+        measured = THETA @ columns + ar1(rng, samples, phi, 0.1 * DEG)
         theta = least_squares(columns, measured)
         found = uncertainty(Linear(columns, measured, THETA), theta)
         hits.append((found.interval[:, 0] <= THETA) & (found.interval[:, 1] >= THETA))
@@ -301,9 +300,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(phi):
     cover = np.mean(hits, axis=0)
     assert (cover > 0.92).all(), cover
     assert (cover < 0.985).all(), cover
-    # a record of four correlation times shows a little too little of its noise
-    within = 0.1 if phi <= AR1 else 0.15
-    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=within)
+    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1)
 
 
 def test_the_profile_of_a_linear_problem_is_its_parabola():

@@ -1,0 +1,66 @@
+"""The prediction band: it holds its share of a log where the model is right, and says where it is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hydroid
+from hydroid.fitting.validation import error_indices
+from hydroid.log import Log
+from hydroid.prediction import predict, simulate_log
+from hydroid.quantities.band import prediction_bands
+from hydroid.report.validation_report import Validation, validation_page
+
+TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+CHANGES = {
+    "simulation.other_joints": "locked",
+    **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
+    **{f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name.startswith("M")},
+    "search.algorithm": "ga",
+    "search.ga.generations": 4,
+}
+
+
+def noisy(settings, levels, seed: int, values=TRUTH) -> Log:
+    """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
+    pose, period = settings.arm.pose("study"), 0.01
+    command = np.zeros((100 * len(levels), len(pose)))
+    command[:, 1] = np.repeat(levels, 100)
+    time = period * np.arange(len(command))
+    drive = Log(f"steps{seed}.csv", time, command, np.tile(pose, (len(time), 1)), period)
+    log = simulate_log(settings, drive, values, "test")
+    noise = np.random.default_rng(seed).normal(0, np.deg2rad(0.1), log.angle.shape)
+    noise[0] = 0.0
+    return replace(log, angle=log.angle + noise)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    settings = hydroid.load_settings("article-mech", CHANGES)
+    return settings, hydroid.fit(settings, [noisy(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
+
+
+@pytest.mark.parametrize(("factor", "limits"), [(1.0, False), (1.5, True)])
+def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
+    settings, model = fitted
+    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH | {"S": factor * TRUTH["S"]})
+    response = predict(model, log, settings.outputs)
+    band = prediction_bands(model, log, response)[2]
+    assert band.model_limits is limits
+    assert np.degrees(band.noise) == pytest.approx(0.1, rel=0.15)
+    if not limits:
+        assert 0.9 < band.inside < 0.99
+        assert band.error == pytest.approx(band.expected, rel=0.15)
+    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
+    page = validation_page([Validation("one", log, response, indices, {2: band})])
+    (verdict,) = page.sections[1].points
+    assert ("The model limits the prediction" in verdict) is limits
+
+
+def test_values_that_no_fit_gave_have_no_band(fitted):
+    settings, model = fitted
+    log = noisy(settings, [40.0, -40.0], 3)
+    response = predict(model, log, settings.outputs)
+    assert prediction_bands(replace(model, summary=None), log, response) == {}
+    assert prediction_bands(replace(model, theta=1.1 * model.theta), log, response) == {}

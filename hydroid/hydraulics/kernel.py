@@ -128,6 +128,29 @@ class Exchange(NamedTuple):
 
 
 @compilable
+def couple(pad: Pad, order: Any, idle: int, step: float) -> None:
+    """Add the pump's line to the system of the velocities."""
+    line = pad.line[0]
+    for a in range(idle, order.size):
+        u = pad.joints[order[a]]
+        pad.gain[a] += step * u.weight * u.thrust * line.change
+        for b in range(a, order.size):
+            w = pad.joints[order[b]]
+            pad.matrix[a, b] += step * line.softness * u.weight * u.thrust * w.weight * w.thrust
+
+
+@compilable
+def release(pad: Pad, order: Any, idle: int, step: float) -> None:
+    """Let the line's pressure follow from the velocities, and all actuators take their part of it."""
+    line = pad.line[0]
+    for a in range(idle, order.size):
+        w = pad.joints[order[a]]
+        line.change -= line.softness * w.thrust * w.weight * pad.gain[a]
+    for a in range(idle, order.size):
+        fill(line, pad.joints[order[a]], step)
+
+
+@compilable
 def look_ahead(
     plugin: Plugin, candidate: int, state: Any, commands: Any, exchange: Exchange, pad: Pad
 ) -> None:
@@ -186,20 +209,11 @@ def look_ahead(
                     matrix[a, b] = common[a, b]
         if shared:
             open_line(line, some, step)
-            for a in range(idle, joints):
-                u = work[order[a]]
-                gain[a] += step * u.weight * u.thrust * line.change
-                for b in range(a, joints):
-                    w = work[order[b]]
-                    matrix[a, b] += step * line.softness * u.weight * u.thrust * w.weight * w.thrust
+            couple(pad, order, idle, step)
         eliminate(matrix, idle, joints)
         substitute(matrix, gain)
         if shared:
-            for a in range(idle, joints):
-                w = work[order[a]]
-                line.change -= line.softness * w.thrust * w.weight * gain[a]
-            for a in range(idle, joints):
-                fill(line, work[order[a]], step)
+            release(pad, order, idle, step)
             close_line(line, some)
         for a in range(joints):
             j = order[a]

@@ -13,6 +13,7 @@ load leaves of P, add up to what the pump gives, and no equation has to be solve
 and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
 rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
 runs back to the pump. A joint whose own supply pressure is lower than the line's has a reducing valve.
+Joints without an actuator, such as those that follow a log, take nothing.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
 P changes by

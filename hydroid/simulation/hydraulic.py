@@ -154,8 +154,8 @@ class HydraulicSimulation:
         """Simulate n candidates, whatever n is.
 
         Returns:
-            What the outputs' sensors read, and the pressures asked for, at the log's samples; the first is the
-            start. A candidate without a force-stroke curve, or that diverged, is infeasible.
+            What the outputs' sensors read, and the pressures asked for, at the log's samples; the first is
+            the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
         return self.scenario.in_chunks(self._simulate_chunk, candidates)
 

@@ -40,8 +40,8 @@ TERMS = {
     "overlap": {"overlap": 0.05},
     "opening_exponent": {"opening_exponent": 1.1},
     "dry_friction": {"dry_friction": 1500.0},
-    "flow_limit": {"flow_limit": 1.5},
-    "leakage": {"leakage": 0.005},
+    "flow_limit": {"flow_limit": 1.2},
+    "leakage": {"leakage": 0.02},
     "none": {},
 }
 """what is present in the truth: quantities of the hydraulics, in their units"""

@@ -42,6 +42,7 @@ SPANS = {
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),
     "dead_band": (0.0, 90.0),
+    "sensor_lag": (0.0, 1.0),
 }
 """values that real actuators have, of the quantities that `hydroid suggest` asks about where they are not
 free; of those with two sides it asks about both together and about each"""

@@ -23,6 +23,8 @@ from hydroid.report.table import Cell, Table, number
 
 BEST = 6
 """quantities that a fit prints at most"""
+BEST_WITHIN = 0.3
+"""relative half interval of these at most"""
 DETERMINED_WITHIN = 1.0
 """relative half interval above which a quantity is listed as not determined"""
 _HELD = 0.2
@@ -66,7 +68,7 @@ def quantity_table(quantities: Quantities) -> Table:
 
 def best_known(quantities: Quantities) -> list[str]:
     """Return a line for each of the best-known quantities, the best first, under a heading; or nothing."""
-    known = [q for q in quantities.scalars.values() if _within(q) <= DETERMINED_WITHIN]
+    known = [q for q in quantities.scalars.values() if _within(q) <= BEST_WITHIN]
     best = sorted(known, key=_within)[:BEST]
     lines = [
         f"  {_name(q, quantities)}: {number(q.value)} {q.unit}".rstrip() + f" ({_ends(q)})" for q in best

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, exp, radians, sin, sqrt, tanh
+from typing import Any
 
 import numpy as np
 from scipy.integrate import Radau
@@ -129,7 +130,7 @@ def boom(duty: float, way: str) -> np.ndarray:
     for k, (first, last) in enumerate(pairwise(events)):
         pilot = duty / 100 if k > 0 else 0.0
         drive = Drive(pilot * (sign > 0), pilot * (sign < 0), k == 2)
-        solver = Radau(slope(drive, stop), first, z, last, rtol=1e-7, atol=scale, max_step=0.05)
+        solver = Radau(slope(drive, stop), first, z, last, rtol=1e-7, atol=scale, max_step=0.05)  # pyright: ignore[reportArgumentType]
         while solver.status == "running":
             solver.step()
             dense = solver.dense_output()
@@ -142,14 +143,14 @@ def boom(duty: float, way: str) -> np.ndarray:
 def log_of(duty: float, way: str, pose: np.ndarray, rng: np.random.Generator) -> Log:
     """One log of the boom as joint 2 of our arm, with sensor noise."""
     angle = boom(duty, way)
-    time = PERIOD * np.arange(len(angle))
+    time = PERIOD * np.arange(len(angle), dtype=float)
     command, measured = np.zeros((len(time), len(pose))), np.tile(pose, (len(time), 1))
     command[time >= REST - 1e-9, 1] = STAGES[way][1] * duty
     measured[:, 1] = angle + rng.normal(0, radians(NOISE_DEG), len(angle))
     return Log(f"{way}_{duty:g}", time, command, measured, PERIOD)
 
 
-def row(quantity: str, low: float, high: float, start: float) -> dict[str, object]:
+def row(quantity: str, low: float, high: float, start: float) -> dict[str, Any]:
     """One parameter of the fit; those of the pump have no joints."""
     pump = quantity.startswith("pump_")
     return {"quantity": quantity, "bounds": [low, high], "start": start} | ({} if pump else {"joints": [2]})

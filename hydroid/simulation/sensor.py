@@ -1,13 +1,13 @@
 """What an angle sensor reads: the turn since the start times a scale, with a first-order lag (ours)."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from hydroid.hydraulics.records import Records
 from hydroid.parameters import Array
 
 
-def reading(angle: Array, sensors: Records, period: float) -> Array:
+def reading(angle: Array, sensors: NDArray[np.void], period: float) -> Array:
     """Return what the sensors of K joints read, shape (T, K) like their angles [rad], `period` [s] apart.
 
     Between samples an angle is taken for a straight line. A reading starts at the angle, at rest. With scale

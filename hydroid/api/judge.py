@@ -14,6 +14,7 @@ from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from hydroid.api.look import LogSources
+    from hydroid.log import Log
     from hydroid.report.uncertainty_report import UncertaintyStudy
     from hydroid.report.validation_report import Validation
     from hydroid.uncertainty.sweep import Surface, Sweep
@@ -25,6 +26,7 @@ def validate(
     out: str | Path | None = "runs/validation",
     *,
     repair: bool = False,
+    leave_one_out: bool = False,
 ) -> "Study[list[Validation]]":
     """Compare fits with logs they were not fitted to: error indices (article, table 9), bands, plots.
 
@@ -37,6 +39,7 @@ def validate(
         logs: CSV files or logs, one or several.
         out: folder for the page, the table and the figures; None: nothing is written.
         repair: fill holes of the logs up to `log.repair_s`.
+        leave_one_out: refine the model without one log and test it on that log, for every log.
 
     Returns:
         The study, with one result for each fit and log.
@@ -47,6 +50,8 @@ def validate(
     """
     several = [models] if isinstance(models, str | Path | IdentifiedModel) else models
     opened = [open_model(model) for model in several]
+    if leave_one_out and len(opened) > 1:
+        raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     read = [read_logs(logs, model.settings, repair=repair) for model in opened]
     from hydroid.fitting.validation import error_indices
     from hydroid.prediction import predict
@@ -54,9 +59,13 @@ def validate(
     from hydroid.report.validation_report import Validation, validation_page
 
     results: list[Validation] = []
+    folds: list[IdentifiedModel] = []
     for model, each in zip(opened, read, strict=True):
-        outputs = model.settings.outputs
-        for log in each:
+        outputs, original = model.settings.outputs, model
+        for i, log in enumerate(each):
+            if leave_one_out:
+                model = _refined_without(original, each, i)
+                folds.append(model)
             response = predict(model, log, outputs)
             indices = {
                 joint: error_indices(log.angle[:, joint - 1], response[:, column])
@@ -64,7 +73,35 @@ def validate(
             }
             bands = prediction_bands(model, log, response)
             results.append(Validation(model.name, log, response, indices, bands))
-    return Study(results, validation_page(results)).write(out)
+    return Study(results, validation_page(results, folds)).write(out)
+
+
+def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: int) -> IdentifiedModel:
+    """Return the model refined on all logs but one, with its own uncertainty."""
+    from hydroid.estimate import FitSummary
+    from hydroid.fitting.refinement import refine
+    from hydroid.problem.problem import Problem
+    from hydroid.quantities.delta import precision
+    from hydroid.report.page import log_names
+    from hydroid.run.summary import noise_levels, parameter_estimates
+    from hydroid.settings.search import RefinementSettings
+    from hydroid.uncertainty.covariance import uncertainty
+
+    if len(logs) < 2:
+        raise SettingsError("needs two logs or more", where="--leave-one-out")
+    settings, name = model.settings, log_names(logs)[left_out]
+    problem = Problem(settings, [log for i, log in enumerate(logs) if i != left_out])
+    refinement = settings.refinement or RefinementSettings()
+    unit = refine(problem, model.theta, refinement, lambda simulated, rms: None).point
+    theta = problem.parameters.from_unit(unit[None])[0]
+    known = uncertainty(problem, theta)
+    summary = FitSummary(
+        stage=settings.stage,
+        estimate=parameter_estimates(problem, known),
+        covariance=precision(problem.parameters, known).covariance(),
+        noise_deg=noise_levels(problem, known),
+    )
+    return IdentifiedModel(settings, theta, f"{model.name} without {Path(name).stem}", summary)
 
 
 def identifiability(

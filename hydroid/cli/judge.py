@@ -41,13 +41,17 @@ def validate(
     out: Folder = Path("runs/validation"),
     setting: Set = None,
     repair: Repair = False,
+    leave_one_out: Annotated[
+        bool,
+        typer.Option("--leave-one-out", help="Give the fit's own logs: refine without each, and predict it."),
+    ] = False,
 ) -> None:
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots."""
     from hydroid.api.judge import validate
     from hydroid.identified import load_identified
 
     models = [load_identified(path, overrides=overrides(setting)) for path in fit]
-    study = validate(models, logs, out, repair=repair)
+    study = validate(models, logs, out, repair=repair, leave_one_out=leave_one_out)
     found = [row for result in study.result for row in _indices(result)]
     verdicts = [f"- {point}" for section in study.page.sections for point in section.points]
     show(output, lambda: {"results": found}, [study.table, *verdicts, str(out / "validation.html")])

@@ -5,7 +5,10 @@ from dataclasses import dataclass, field
 from math import degrees
 from pathlib import Path
 
+import numpy as np
+
 from hydroid.fitting.validation import ErrorIndices
+from hydroid.identified import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.quantities.band import Band
@@ -49,7 +52,7 @@ class Validation:
     bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
 
 
-def validation_page(results: Sequence[Validation]) -> Page:
+def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedModel] = ()) -> Page:
     """Return the page of several fits on several logs; its table is `validation` (article, table 9)."""
     logs = {result.log.source: result.log for result in results}
     names = dict(zip(logs, log_names(list(logs.values())), strict=True))
@@ -93,7 +96,25 @@ def validation_page(results: Sequence[Validation]) -> Page:
     section = Section("Output error", tables={"validation": table}, plots=plots)
     bands = Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)
     limits = Section("What limits the prediction", points=tuple(verdicts), tables={"bands": bands})
-    return Page("validation", "Validation", lead, (section, limits) if band_rows else (section,))
+    sections = [section, limits] if band_rows else [section]
+    if folds:
+        sections.append(Section("Without one log", tables={"folds": _fold_table(folds)}))
+    return Page("validation", "Validation", lead, tuple(sections))
+
+
+def _fold_table(folds: Sequence[IdentifiedModel]) -> Table:
+    """Return the parameters of models that were refined without one log each."""
+    values = np.array([fold.theta for fold in folds])
+    rows: list[tuple[Cell, ...]] = []
+    parameters = folds[0].settings.parameter_set().parameters
+    for parameter, column in zip(parameters, values.T, strict=True):
+        if parameter.fixed is None:
+            mean, spread = float(column.mean()), float(column.std(ddof=1))
+            relative = 100 * spread / abs(mean) if mean else np.inf
+            rows.append((parameter.name, parameter.unit, *map(float, column), relative))
+    header = ("name", "unit", *(short_name(fold.source) for fold in folds), "spread [%]")
+    note = "Each column: refined without one log. spread: standard deviation of the columns relative to their mean."
+    return Table("Parameters without one log", header, tuple(rows), note, ("spread [%]",))
 
 
 def _band_cells(band: Band) -> tuple[Cell, ...]:

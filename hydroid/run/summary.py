@@ -34,11 +34,11 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         quantities=fit.quantities.scalars,
         curves=fit.quantities.curves,
         covariance=fit.quantities.precision.covariance(),
-        noise_deg=_noise(problem, fit.uncertainty),
+        noise_deg=noise_levels(problem, fit.uncertainty),
     )
 
 
-def _noise(problem: Problem, uncertainty: Uncertainty) -> dict[str, float]:
+def noise_levels(problem: Problem, uncertainty: Uncertainty) -> dict[str, float]:
     """Standard deviation of each angle's noise over all logs [deg]."""
     squares: dict[str, list[float]] = {}
     for channel, noise in zip(problem.channels, uncertainty.noise, strict=True):

@@ -64,3 +64,20 @@ def test_values_that_no_fit_gave_have_no_band(fitted):
     response = predict(model, log, settings.outputs)
     assert prediction_bands(replace(model, summary=None), log, response) == {}
     assert prediction_bands(replace(model, theta=1.1 * model.theta), log, response) == {}
+
+
+def test_leaving_out_each_log_predicts_it(fitted):
+    settings, model = fitted
+    logs = [
+        noisy(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
+    ]
+    study = hydroid.validate(model, logs, None, leave_one_out=True)
+    assert len(study.result) == 3
+    for result in study.result:
+        band = result.bands[2]
+        assert band.error == pytest.approx(band.expected, rel=0.25)
+    spread = [row[-1] for row in study.page.sections[2].tables["folds"].rows]
+    assert len(spread) == 3
+    assert max(spread) < 5
+    with pytest.raises(hydroid.errors.SettingsError, match="two logs"):
+        hydroid.validate(model, logs[:1], None, leave_one_out=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid.errors import SettingsError
 from hydroid.experiment.commands import Experiment, Input, RandomExperiments
 from hydroid.experiment.information import ExperimentSimulator, Precision
 from hydroid.log import Log
@@ -175,6 +176,10 @@ def _payload(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecast]:
 def _experiments(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecast]:
     """Constant commands, and the best of a few random experiments."""
     settings = _designing(problem, uncertainty)
+    try:
+        draws = RandomExperiments(settings, np.random.default_rng(1))
+    except SettingsError:
+        return  # no pose that an experiment may start from: hydroid design says so
     simulator = ExperimentSimulator(settings, uncertainty.theta)
     joint = settings.outputs[0] - 1
     for low, high in BANDS:
@@ -182,7 +187,6 @@ def _experiments(problem: Problem, uncertainty: Uncertainty) -> Iterator[Forecas
         trial = simulator.trial(experiment)
         if trial is not None:
             yield ActionKind.CONSTANT_COMMANDS, f"{low} to {high}", trial.information
-    draws = RandomExperiments(settings, np.random.default_rng(1))
     trials = [t for _ in range(DRAWS) if (t := simulator.trial(draws.draw())) is not None]
     if trials:
         precision = Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(uncertainty.root)))

@@ -53,8 +53,8 @@ class Binned:
 
     def clearest(self, rms: float) -> int | None:
         """Return the bin whose mean differs most clearly from zero, beside the rms residual; None: none."""
-        ratio = np.abs(self.mean) / self.error
-        clear = (ratio >= CLEAR) & (np.abs(self.mean) >= LARGE * rms)
+        ratio = np.abs(self.mean) / np.maximum(self.error, np.finfo(float).tiny)
+        clear = (ratio >= CLEAR) & (np.abs(self.mean) > LARGE * rms)
         return int(np.nanargmax(np.where(clear, ratio, -1.0))) if clear.any() else None
 
 

@@ -76,8 +76,10 @@ class Explained:
     def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
         """Return it for an estimate. A parameter at a bound counts as held."""
         at, channels = uncertainty.jacobian, problem.channels
-        inside = np.array([status.at_bound is None for status in uncertainty.status])
-        _, values, effects = decompose(uncertainty.free & inside, at)
+        inside = uncertainty.free & [status.at_bound is None for status in uncertainty.status]
+        values, effects = np.empty(0), np.empty((0, at.residual.size + len(problem.priors)))
+        if inside.any():
+            _, values, effects = decompose(inside, at)
         scores = at.prior_weight * problem.priors.scores(uncertainty.theta[None])[0]
 
         def noise_of(residual: Array) -> list[Noise]:
@@ -98,7 +100,8 @@ class Explained:
         left = (self.residual + gain / length * row)[: change.size]
         variance, freedom = self._variance(row, self.noise_of(left))
         deviation = float(np.sqrt(variance))
-        saved = 1.0 - float(np.linalg.norm(left) / np.linalg.norm(self.residual[: change.size]))
+        before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
+        saved = 1.0 - float(np.linalg.norm(left)) / before
         return Score(gain / deviation, gain / length, saved, length / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:

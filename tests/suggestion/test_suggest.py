@@ -147,6 +147,15 @@ def test_the_information_of_white_noise_is_fishers_and_of_slow_noise_what_least_
     np.testing.assert_allclose(np.linalg.inv(least_squares_information(slopes, slow)), covariance, rtol=1e-6)
 
 
+def test_a_perfect_fit_and_one_at_its_bounds_are_tested_too(late: tuple[Problem, Uncertainty]):
+    settings = make_settings()
+    problem = Problem(settings, [make_log(settings, noise_deg=0.0)])
+    known = uncertainty(problem, problem.parameters.vector(TRUTH, "truth"))
+    assert suggestions(problem, known, thorough=False).missing.free == ()
+    held = tuple(replace(status, at_bound="lower") for status in known.status)
+    assert missing_terms(problem, replace(known, status=held), thorough=False).free == ()
+
+
 @pytest.mark.slow
 def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncertainty]):
     problem, known = late

@@ -30,6 +30,10 @@ class ParameterEstimate(Settings):
     """95 % interval"""
     flag: str | None = None
     """how well the logs determine it: a value of `uncertainty.flags.Flag`"""
+    source: str | None = None
+    """from what it is known: a value of `uncertainty.flags.Source`; null: it is not known, or fixed"""
+    data_share: float | None = None
+    """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
     at_bound: Literal["lower", "upper"] | None = None
 
 
@@ -108,6 +112,8 @@ class FitSummary(Settings):
     """of the search"""
     diverged: int | None = None
     """simulations of the search that diverged"""
+    strained_priors: dict[str, float] = Field(default_factory=dict[str, float])
+    """priors that the final estimate is far from: the distance in standard deviations, by name"""
     estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
     """by name; the first is the search's own"""
     quantities: dict[str, QuantityEstimate] = Field(default_factory=dict[str, QuantityEstimate])

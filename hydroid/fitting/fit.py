@@ -21,6 +21,7 @@ from hydroid.search import compromise
 from hydroid.search.pareto import non_dominated
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.directions import Identifiability, identifiability
+from hydroid.uncertainty.sources import Strain, strains
 
 _log = logging.getLogger(__name__)
 
@@ -52,8 +53,9 @@ class Fit:
 
     estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
     objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty,
-    identifiability, quantities: what the logs say about the final estimate. seconds: wall-clock time of
-    "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
+    identifiability, quantities: what the logs say about the final estimate. strains: priors far from it.
+    seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was
+    resumed.
     """
 
     estimates: dict[str, Estimate]
@@ -64,6 +66,7 @@ class Fit:
     uncertainty: Uncertainty
     identifiability: Identifiability
     quantities: Quantities
+    strains: tuple[Strain, ...]
     seconds: Mapping[str, float]
 
     @property
@@ -178,6 +181,7 @@ def fit(
         told,
         directions,
         determined,
+        strains(last, told.theta, told.jacobian),
         seconds,
     )
 

@@ -101,26 +101,36 @@ def fit_page(
 
 
 def parameter_table(problem: Problem, fit: Fit) -> Table:
-    """Return one row per parameter: bounds, every estimate, interval, effect, flag."""
+    """Return one row per parameter: bounds, every estimate, interval, share of the data, effect, flag."""
     names = list(fit.estimates)
     labels = [estimate_label(fit, name) for name in names]
-    half = np.diff(fit.uncertainty.interval, axis=1)[:, 0] / 2
     rows: list[tuple[Cell, ...]] = []
     for i, parameter in enumerate(problem.parameters.parameters):
         bounded = parameter.lower < parameter.upper
         bounds = (Given(parameter.lower), Given(parameter.upper)) if bounded else (None, None)
         values = (float(fit.estimates[name].theta[i]) for name in names)
-        judged = unless_nan(half[i]), unless_nan(degrees(fit.effects[i]))
-        phrase = status_phrase(fit.uncertainty.status[i])
+        status = fit.uncertainty.status[i]
+        ends = (unless_nan(end) for end in fit.uncertainty.interval[i])
+        share = 100 * status.share if fit.uncertainty.free[i] else None
+        judged = *ends, share, unless_nan(degrees(fit.effects[i]))
+        phrase = status_phrase(status)
         rows.append((parameter.name, parameter.unit, *bounds, *values, *judged, phrase))
-    header = ("name", "unit", "lower", "upper", *labels, "±", "effect [deg]", "flag")
+    header = ("name", "unit", "lower", "upper", *labels, "from", "to", "data [%]", "effect [deg]", "flag")
     final = estimate_label(fit, fit.final)
     others = [label for label in labels[1:] if label != final]
-    optional = (*others, "effect [deg]", *(labels[:1] if labels[0] != final else ()), "lower", "upper")
+    optional = (
+        *others,
+        "effect [deg]",
+        "data [%]",
+        *(labels[:1] if labels[0] != final else ()),
+        "lower",
+        "upper",
+    )
     note = (
-        f"{estimate_meanings(fit)} ±: half the 95 % confidence interval of {final}. The noise is taken from "
-        "the residuals. The interval is only right if the model is right. A dash (–): the interval has no "
-        "limit, or the parameter is at a bound or fixed. effect: rms change of the output when the "
+        f"{estimate_meanings(fit)} from, to: 95 % interval of {final}. "
+        "The noise is taken from the residuals. The interval is only right if the model is right. A dash (–): "
+        "it has no limit, or the parameter is at a bound or fixed. data: part of the information on the "
+        "parameter that the logs gave; its prior gave the rest. effect: rms change of the output when the "
         "parameter changes by 1 %."
     )
     return Table("Parameters", header, tuple(rows), note, optional)

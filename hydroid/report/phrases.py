@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +13,10 @@ from hydroid.report.table import number, plain
 from hydroid.settings.problem import ObjectiveSettings, PriorSettings
 from hydroid.uncertainty.covariance import at_bounds
 from hydroid.uncertainty.directions import Direction, Identifiability
-from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, ParameterStatus
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, ParameterStatus, Source
 from hydroid.uncertainty.intervals import Profile
 from hydroid.uncertainty.patterns import CURRENTS, DirectionKind
+from hydroid.uncertainty.sources import Strain
 
 ALGORITHMS = {
     "ga": "simple genetic algorithm",
@@ -73,8 +75,12 @@ def status_phrase(status: ParameterStatus) -> str:
     parts: list[str] = []
     if status.diverges and status.flag is not Flag.FIXED:
         parts.append("effect unknown, the changed arm diverges")
-    elif status.flag is not Flag.IDENTIFIABLE:
+    elif status.flag is not Flag.IDENTIFIABLE and (
+        status.source is not Source.PRIOR or status.flag is Flag.NO_EFFECT
+    ):
         parts.append(status.flag.value)
+    if status.source is Source.BOTH or status.source is Source.PRIOR:
+        parts.append(status.source.value)
     if status.derivative_doubt is not None:
         parts.append(f"derivative only to {100 * status.derivative_doubt:.0f} %")
     if status.at_bound is not None:
@@ -199,6 +205,7 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
                 "Widen it if such values are possible; otherwise the model lacks something. Such an estimate "
                 "has no interval."
             )
+    said += [strain_phrase(problem, strain) for strain in fit.strains]
     said += [
         f"The estimate '{name}' diverged when it was simulated and was not used."
         for name, estimate in fit.estimates.items()
@@ -210,6 +217,18 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
             f"The refinement lowered the rms error but raised the {norm}, which the search minimised."
         )
     return tuple(said)
+
+
+def strain_phrase(problem: Problem, strain: Strain) -> str:
+    """Say how far the estimate is from a prior, and which channel pulls it there."""
+    what = f"the {strain.quantity.replace('_', ' ')} of joint {strain.joint}"
+    log = f" in {Path(problem.logs[strain.log].source).name}" if len(problem.logs) > 1 else ""
+    side = "above" if strain.score > 0 else "below"
+    return (
+        f"The estimate lies {abs(strain.score):.1f} standard deviations {side} the prior of {strain.prior}; "
+        f"{what}{log} pulls it there. Either the prior is wrong, or the model lacks something and this "
+        "parameter makes up for it."
+    )
 
 
 def profile_warnings(profiles: Sequence[Profile]) -> tuple[str, ...]:
@@ -234,19 +253,18 @@ def rank_phrase(result: Identifiability) -> str:
 
 def parameter_advice(problem: Problem, fit: Fit) -> tuple[str, ...]:
     """Say which parameters have no effect or are not identifiable, and what to do about it."""
-    by_flag = {
-        flag: [
-            name
-            for name, status in zip(problem.parameters.names, fit.uncertainty.status, strict=True)
-            if status.flag is flag
-        ]
-        for flag in (Flag.NO_EFFECT, Flag.UNIDENTIFIABLE, Flag.WEAK)
+    statuses = dict(zip(problem.parameters.names, fit.uncertainty.status, strict=True))
+    shown = {
+        name: Source.PRIOR if status.source is Source.PRIOR else status.flag
+        for name, status in statuses.items()
     }
-    advice = {
+    advice: dict[Flag | Source, str] = {
         Flag.NO_EFFECT: "Any value within the bounds gives the same response. Fix it, or compare a joint "
         "that it moves.",
         Flag.UNIDENTIFIABLE: "A small output error does not confirm such a value. Fix what is known from "
         "elsewhere or give it as a prior, compare more joints, or add logs in other poses.",
+        Source.PRIOR: "The logs add next to nothing: value and interval are the prior's.",
         Flag.WEAK: "A prior, more joints or logs in other poses help.",
     }
-    return tuple(f"{listed(by_flag[f])}: {f.value}. {advice[f]}" for f in by_flag if by_flag[f])
+    by_flag = {flag: [name for name, its in shown.items() if its is flag] for flag in advice}
+    return tuple(f"{listed(names)}: {flag.value}. {advice[flag]}" for flag, names in by_flag.items() if names)

@@ -16,6 +16,7 @@ from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
+from hydroid.uncertainty.flags import Flag
 
 _log = logging.getLogger(__name__)
 
@@ -142,7 +143,7 @@ def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
             raise RunError("is the estimate of a simulation that diverged", where=str(file))
         return RunEstimate(seed, parameters.vector(found.values, str(file)), math.radians(found.rms_deg))
 
-    without = frozenset(name for name, p in summary.estimate.items() if p.flag == "no effect")
+    without = frozenset(name for name, p in summary.estimate.items() if p.flag == Flag.NO_EFFECT)
     first, last = (estimate(summary.estimates[name]) for name in (names[0], summary.final))
     return RunResult(path, first, last, summary.final != names[0], without)
 

@@ -23,6 +23,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         seed=problem.settings.search.seed,
         simulations=int(fit.history[-1, 2]),
         diverged=int(fit.history[-1, 3]),
+        strained_priors={strain.prior: strain.score for strain in fit.strains},
         estimates={
             e.name: NamedEstimate(
                 values=problem.parameters.mapping(e.theta),
@@ -56,6 +57,8 @@ def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str,
             sd=finite(uncertainty.standard_deviation[i]),
             interval=(finite(uncertainty.interval[i, 0]), finite(uncertainty.interval[i, 1])),
             flag=status.flag.value,
+            source=None if status.source is None else status.source.value,
+            data_share=status.share if uncertainty.free[i] else None,
             at_bound=status.at_bound,
         )
         for i, (parameter, status) in enumerate(

@@ -36,6 +36,7 @@ from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatu
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
 from hydroid.uncertainty.noise import Noise, channel_noise, covariances, unbiased
 from hydroid.uncertainty.noise_error import STEP, neighbours
+from hydroid.uncertainty.sources import data_shares
 
 COVERAGE = 0.95
 """probability with which an interval covers the true value"""
@@ -107,6 +108,8 @@ def uncertainty_from(
     # where the noise is not well known the intervals are wider, and the flags are set accordingly
     widened = relative * widths / float(normal.ppf(0.5 + COVERAGE / 2))
     unidentifiable = widened > UNIDENTIFIABLE_ABOVE
+    shares = np.ones(len(theta))
+    shares[free] = data_shares(derivatives.prior_slopes[free], relative[free] ** 2)
     relative[unidentifiable] = np.inf
     half, log = widths * relative, problem.parameters.log
     with np.errstate(over="ignore"):  # inf without an interval
@@ -122,8 +125,10 @@ def uncertainty_from(
         if bound is not None and not unidentifiable[i]:
             interval[i] = np.nan
         doubt, diverges = float(derivatives.doubt[i]), not np.isfinite(derivatives.slopes[i]).all()
-        flag = Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(float(widened[i]))
-        status.append(ParameterStatus(flag, bound, doubt if doubt > DOUBT_ABOVE else None, diverges))
+        flag = flag_of(float(widened[i]), shares[i])
+        flag = Flag.NO_EFFECT if derivatives.without_effect[i] else flag
+        doubtful = doubt if doubt > DOUBT_ABOVE else None
+        status.append(ParameterStatus(flag, bound, doubtful, diverges, float(shares[i])))
     deviation = np.where(unidentifiable[free], np.nan, relative[free])
     correlation = covariance / np.outer(deviation, deviation)
     return Uncertainty(

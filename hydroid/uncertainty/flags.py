@@ -1,5 +1,6 @@
-"""How well one parameter is known, as data; the report puts it into words."""
+"""How well one parameter is known, and from what, as data; the report puts it into words."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
@@ -8,18 +9,28 @@ WEAK_ABOVE = 0.3
 """relative standard deviation above which a parameter or direction is weakly identifiable"""
 UNIDENTIFIABLE_ABOVE = 1.0
 """relative standard deviation above which it is not identifiable: a linear interval then means nothing"""
+MOSTLY = 0.9
+"""share of the information above which the logs, or the priors, are the only source that is named"""
 
 Side = Literal["lower", "upper"]
 
 
 class Flag(StrEnum):
-    """How well the logs and the priors determine a parameter."""
+    """How well the logs determine a parameter, whatever a prior adds."""
 
     IDENTIFIABLE = "identifiable"
     WEAK = "weakly identifiable"
     UNIDENTIFIABLE = "not identifiable"
     NO_EFFECT = "no effect"
     FIXED = "fixed"
+
+
+class Source(StrEnum):
+    """Where what is known of a parameter comes from."""
+
+    DATA = "data"
+    BOTH = "data and prior"
+    PRIOR = "prior only"
 
 
 @dataclass(frozen=True)
@@ -32,10 +43,25 @@ class ParameterStatus:
     """relative difference between the derivatives of two step sizes, where it is large"""
     diverges: bool = False
     """whether its effect is unknown because simulations diverge where it is changed"""
+    share: float = 1.0
+    """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
+
+    @property
+    def source(self) -> Source | None:
+        """Where the information comes from; None where there is none, or the parameter is fixed."""
+        if self.flag is Flag.FIXED:
+            return None
+        if self.share > MOSTLY:
+            return None if self.flag in (Flag.UNIDENTIFIABLE, Flag.NO_EFFECT) else Source.DATA
+        return Source.BOTH if self.share >= 1 - MOSTLY else Source.PRIOR
 
 
-def flag_of(relative_sd: float) -> Flag:
-    """Return the flag of a relative standard deviation; NaN counts as infinite."""
-    if not relative_sd <= UNIDENTIFIABLE_ABOVE:
+def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
+    """Return the flag of a relative standard deviation, of which the logs gave a share of the information.
+
+    NaN counts as infinite. The logs alone leave a variance of the posterior's divided by their share.
+    """
+    alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
+    if not alone <= UNIDENTIFIABLE_ABOVE:
         return Flag.UNIDENTIFIABLE
-    return Flag.WEAK if relative_sd > WEAK_ABOVE else Flag.IDENTIFIABLE
+    return Flag.WEAK if alone > WEAK_ABOVE else Flag.IDENTIFIABLE

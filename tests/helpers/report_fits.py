@@ -120,6 +120,7 @@ def make_fit(
         uncertain,
         identifiability(problem, uncertain),
         make_quantities(problem, uncertain),
+        (),
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
 

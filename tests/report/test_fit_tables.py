@@ -39,7 +39,8 @@ def test_every_estimate_of_every_parameter_is_in_the_table():
     for name, header in {"average": "search (average)", "best": "best", "refined": "refined"}.items():
         assert column(table, header) == list(fit.estimates[name].theta)
     assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.effects))
-    assert column(table, "±") == pytest.approx(np.diff(fit.uncertainty.interval)[:, 0] / 2)
+    assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
+    assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
     assert set(table.optional) < set(table.header)
 
 

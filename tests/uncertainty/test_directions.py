@@ -12,7 +12,7 @@ from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.directions import Identifiability, identifiability
-from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, Source
 from hydroid.uncertainty.patterns import DirectionKind
 
 MECH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -102,9 +102,10 @@ def test_pins_close_directions_one_by_one(mech):
     }
     problem, told, found = look("article-mech", MECH, priors=priors)
     assert found.rank == 9 > free.rank
-    flags = flags_of(problem, told)
-    assert flags.pop("M1") is Flag.NO_EFFECT
-    assert set(flags.values()) == {Flag.IDENTIFIABLE}
+    sources = {n: s.source for n, s in zip(problem.parameters.names, told.status, strict=True)}
+    assert flags_of(problem, told)["M1"] is Flag.NO_EFFECT
+    assert sources["M1"] is sources["M4"] is Source.PRIOR
+    assert sources["K"] is Source.DATA  # it has no prior of its own
     deviation = dict(zip(problem.parameters.names, told.relative, strict=True))
     assert deviation["M1"] == pytest.approx(0.05, rel=0.02)  # its prior, and nothing else
     assert deviation["K"] < 0.05
@@ -145,7 +146,8 @@ def test_the_three_null_directions_of_the_hydraulics_are_named_with_their_values
 )
 def test_pins_close_the_hydraulic_directions(pins, open_):
     problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **pins)
-    assert {n for n, f in flags_of(problem, told).items() if f is Flag.UNIDENTIFIABLE} == open_
+    known = zip(problem.parameters.names, told.status, strict=True)
+    assert {n for n, s in known if s.flag is Flag.UNIDENTIFIABLE and s.source is not Source.PRIOR} == open_
     assert bool(open_) == any(direction.flag is Flag.UNIDENTIFIABLE for direction in found.unidentifiable)
 
 

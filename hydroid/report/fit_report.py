@@ -128,8 +128,8 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     )
     note = (
         f"{estimate_meanings(fit)} from, to: 95 % interval of {final}. "
-        "The noise is taken from the residuals. The interval is only right if the model is right. A dash (–): "
-        "it has no limit, or the parameter is at a bound or fixed. data: part of the information on the "
+        "The noise is taken from the residuals. The interval is only right if the model is right. A dash "
+        "(–): it has no limit, or the parameter is at a bound or fixed. data: part of the information on the "
         "parameter that the logs gave; its prior gave the rest. effect: rms change of the output when the "
         "parameter changes by 1 %."
     )

@@ -23,7 +23,8 @@ def with_mechanics(
     mechanical parameters where the arm is not the config's.
 
     Args:
-        mech: a run folder of stage 1, or a YAML file of values by name; None: `config` fixes them, or says
+        mech: a run folder of stage 1, or a YAML file of values by name. Its masses hold, and its damping and
+            stiffness where `config` states no start or nominal value of its own. None: `config` fixes them, or says
             what is known of them (a prior or a start), and they are estimated with the others.
         config: settings of stage 2.
         overrides: settings to replace; they have the last word.
@@ -50,7 +51,12 @@ def with_mechanics(
     missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
     if missing:
         raise SettingsError(f"has no value for {', '.join(missing)}", where=str(mech))
-    given = [name for name in wanted if name in values and f"parameters.{name}.fixed" not in changes]
+    own = {name for name, p in settings.parameters.items() if p.states_start and p.quantity != "mass"}
+    given = [
+        name
+        for name in wanted
+        if name in values and name not in own and f"parameters.{name}.fixed" not in changes
+    ]
     return changes | {f"parameters.{name}.fixed": values[name] for name in given}
 
 

@@ -19,6 +19,8 @@ from hydroid.uncertainty.noise import prior_weight
 
 ROUNDS = 4
 """times at most that the noise is estimated, to weigh the logs against the priors"""
+COARSE = 1e-2
+"""`gain_tolerance` of the first of several rounds: its noise is the start's, which weighs priors too heavily"""
 SETTLED = 0.02
 """relative change of the noise below which another round would change nothing"""
 
@@ -147,16 +149,19 @@ def _begin(problem: Problem, theta: Array) -> _Descent:
 def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> _Descent | None:
     """The refinement one step on; None where it has ended."""
     state, weight = descent.state, descent.weight
+    first = descent.rounds == 1 and len(problem.priors) > 0
     if state.ending is None:
 
         def residuals(unit: Array) -> Array:
             rows = problem.residuals(problem.parameters.from_unit(unit))
             return _with_priors(problem, rows, unit, weight)
 
+        if first and settings.gain_tolerance < COARSE:
+            settings = settings.model_copy(update={"gain_tolerance": COARSE})
         return replace(descent, state=step(state, residuals, settings))
     row = state.residual[: problem.measured.size]
     again = _weight(problem, row)
-    if descent.rounds == ROUNDS or not abs(again - weight) > SETTLED * weight:
+    if descent.rounds == ROUNDS or not (first or abs(again - weight) > SETTLED * weight):
         return None
     # the next round starts from a row that is known, at no simulation
     state = start(state.point, _with_priors(problem, row[None], state.point[None], again)[0])

@@ -27,7 +27,15 @@ def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
     values = {name: value for name, value in MECHANICAL.items() if name in settings.parameters}
     if stage == "hyd":
         true = {"A_A": 900, "A_B": 800, "I_max": 0.85, "I_min": 0.3, "A": 1.4, "C": 1.1}
-        values |= true | {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
+        values |= true | {
+            "F1": 8.0,
+            "F2": 0.7,
+            "x1": 0.8,
+            "x2": 12.0,
+            "open_A": 0.4,
+            "open_B": 0.4,
+            "delay": 0.0,
+        }
     return identified(settings, values, "test")
 
 

@@ -20,13 +20,14 @@ HYDRAULIC = MECHANICAL | {
     "F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0,
 }  # fmt: skip
 FIXED = {f"parameters.{name}.fixed": value for name, value in MECHANICAL.items()}
+FIXED |= {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
 PRESSURE = {"log.pressure": {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"}}
 
 
 @pytest.fixture(scope="module")
 def hydraulic():
     changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": {"equal": 3}}
-    settings = load_settings("fit-hyd", changes)
+    settings = load_settings("article-hyd", changes)
     log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
     return settings, simulate_log(settings, log, HYDRAULIC, "truth")
 
@@ -78,7 +79,7 @@ def test_pressures_do_not_change_the_angles(hydraulic):
 def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
     settings, log = hydraulic
     columns = {"log.joints": {j: {"pressure": None} for j in (1, 3, 4, 5, 6, 7)}}
-    settings = load_settings("fit-hyd", FIXED | PRESSURE | columns)
+    settings = load_settings("article-hyd", FIXED | PRESSURE | columns)
     write_log(tmp_path / "log.csv", log, settings.log)
     assert "pA2,pB2" in (tmp_path / "log.csv").read_text().splitlines()[0]
     ranges = np.stack([arm.lower, arm.upper], axis=1)

@@ -24,8 +24,8 @@ def with_mechanics(
 
     Args:
         mech: a run folder of stage 1, or a YAML file of values by name. Its masses hold, and its damping and
-            stiffness where `config` states no start or nominal value of its own. None: `config` fixes them, or
-            says what is known of them (a prior or a start), and they are estimated with the others.
+            stiffness where `config` states no start or nominal value of its own. None: `config` fixes them,
+            or says what is known of them (a prior or a start), and they are estimated with the others.
         config: settings of stage 2.
         overrides: settings to replace; they have the last word.
         logs: names of the logs' files.

@@ -20,7 +20,7 @@ from hydroid.uncertainty.noise import prior_weight
 ROUNDS = 4
 """times at most that the noise is estimated, to weigh the logs against the priors"""
 COARSE = 1e-2
-"""`gain_tolerance` of the first of several rounds: its noise is the start's, which weighs priors too heavily"""
+"""`gain_tolerance` of the first of several rounds: the noise at the start weighs priors too heavily"""
 SETTLED = 0.02
 """relative change of the noise below which another round would change nothing"""
 

@@ -27,7 +27,7 @@ def run_folder(folder: Path, final: str) -> Path:
     write_settings(folder, settings)
     estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in VALUES.items() if n != "K"}
     write_estimate(folder, FitSummary(stage="hyd", estimate=estimate, final=final))
-    assert model.settings.parameters.keys() == estimate.keys()
+    assert model.settings.parameters.keys() >= estimate.keys()
     return folder
 
 
@@ -78,7 +78,8 @@ def test_a_joint_refinement_frees_what_was_fixed(tmp_path: Path, final: str, fre
     folder = run_folder(tmp_path / "run", final)
     for source in (folder, folder / "estimate.yaml"):
         model = load_identified(source)
-        assert model.settings.parameter_set().free.all() == free
+        parameters = model.settings.parameter_set()
+        assert parameters.free[parameters.names.index("M3")] == free
         assert model.values["M3"] == 22.5
         assert model.name == "run"
 

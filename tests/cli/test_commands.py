@@ -78,7 +78,8 @@ def test_identifiability_tells_what_a_log_determines(short: Path, tmp_path: Path
     rows = found["estimate"]
     assert set(rows) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
     assert rows["M1"]["flag"] == "no effect"
-    assert rows["M1"]["sd"] is None  # JSON has no infinity
+    assert rows["M1"]["source"] == "prior only"
+    assert rows["M1"]["data_share"] == 0
     assert rows["S"]["profile_interval"] is not None
     for name in ("identifiability.html", "tables/intervals.csv", "figures/profiles.png"):
         assert (tmp_path / "told" / name).stat().st_size > 0

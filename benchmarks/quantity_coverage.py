@@ -7,7 +7,8 @@ numbers, and a common scale of I_max and I_min trades with them. So three direct
 unidentifiable, and the parameters in them have no interval. The noise of 0.1 deg is white; each fit estimates
 it from its residual. The refinement starts at the truth times random factors within 5 %: this is a study of
 the intervals, not of the search. A quantity is covered where its 95 % interval holds its value at the true
-parameters, which the same test movements give. The log starts with a second of rest.
+parameters, which the same test movements give. The first sample is the start pose and has no noise, as in
+interval_coverage.py.
 """
 
 import argparse
@@ -28,7 +29,6 @@ from hydroid.quantities.quantities import joint_measure
 from hydroid.uncertainty.covariance import uncertainty
 
 LEVEL = np.deg2rad(0.1)
-REST = 1.0  # [s]
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
 TRUTH |= {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
 FREED = {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
@@ -38,7 +38,7 @@ CONVERGED = {"refinement.gain_tolerance": 1e-6}
 
 
 def true_log(settings, seconds: float) -> Log:
-    """A pseudo-random log of the shoulder that begins with REST and keeps off the stops."""
+    """A pseudo-random log of the shoulder that keeps off the stops."""
 
     def off_the_stops(log: Log) -> bool:
         angle = simulate_log(settings, log, TRUTH, "truth").angle
@@ -47,11 +47,7 @@ def true_log(settings, seconds: float) -> Log:
     drive = pseudo_random_log(
         settings.arm.pose("study"), [2], duration=seconds, seed=3, allowed=off_the_stops
     )
-    rest = round(REST / drive.period)
-    command = np.concatenate([np.zeros((rest, drive.joints)), drive.command])
-    angle = np.tile(drive.angle[0], (len(command), 1))
-    moved = replace(drive, time=np.arange(len(command)) * drive.period, command=command, angle=angle)
-    return simulate_log(settings, moved, TRUTH, "truth")
+    return simulate_log(settings, drive, TRUTH, "truth")
 
 
 def main() -> None:
@@ -78,7 +74,9 @@ def main() -> None:
     assert settings.refinement is not None
     for seed in range(options.logs):
         rng = np.random.default_rng(seed)
-        log = replace(clean, angle=clean.angle + rng.normal(0.0, LEVEL, clean.angle.shape))
+        noise = rng.normal(0.0, LEVEL, clean.angle.shape)
+        noise[0] = 0.0
+        log = replace(clean, angle=clean.angle + noise)
         one = Problem(settings, [log])
         first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
         found = refine(one, first, settings.refinement, lambda n, rms: None)

@@ -1,6 +1,7 @@
 """Judge a fit: `validate` on other logs; `identifiability`, `sensitivity`, `surface` at its estimate."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,8 @@ from hydroid.progress import Progress, no_progress
 if TYPE_CHECKING:
     from hydroid.api.look import LogSources
     from hydroid.log import Log
+    from hydroid.parameters import Array
+    from hydroid.problem.problem import Problem
     from hydroid.report.uncertainty_report import UncertaintyStudy
     from hydroid.report.validation_report import Validation
     from hydroid.uncertainty.sweep import Surface, Sweep
@@ -130,24 +133,50 @@ def identifiability(
         SettingsError: a name that is no free parameter.
         RunError: the simulation diverged, or the folder cannot be written.
     """
+    from hydroid.fitting.refinement import refine
     from hydroid.problem.problem import Problem
-    from hydroid.report.uncertainty_report import UncertaintyStudy, uncertainty_page
-    from hydroid.uncertainty import covariance, directions, intervals
+    from hydroid.report.uncertainty_report import uncertainty_page
+    from hydroid.settings.search import RefinementSettings
+    from hydroid.uncertainty import intervals
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))
     if not np.isfinite(problem.residuals(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=model.source)
-    uncertainty = covariance.uncertainty(problem, model.theta)
+    study = _analysed(problem, model.theta, model.source, (profile, bootstrap, progress))
+    better = intervals.better_optimum(problem, study.uncertainty, study.profiles, study.refits)
+    if better is not None:
+        refinement = model.settings.refinement or RefinementSettings()
+        unit = refine(problem, better, refinement, lambda simulated, rms: None).point
+        theta = problem.parameters.from_unit(unit[None])[0]
+        source = f"a better optimum than that of {model.source}"
+        values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
+        moved = (
+            f"A profile or refit found a better optimum. It was refined, and all results are of it: {values}."
+        )
+        study = replace(_analysed(problem, theta, source, (profile, bootstrap, progress)), moved=moved)
+    return Study(study, uncertainty_page(study)).write(out)
+
+
+def _analysed(
+    problem: "Problem",
+    theta: "Array",
+    source: str,
+    asked: tuple[Sequence[str], tuple[int, int], Progress],
+) -> "UncertaintyStudy":
+    """Return the study of an estimate: `asked` are profiles, refits with their seed, and the progress."""
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.uncertainty import covariance, directions, intervals
+
+    profile, (refits, seed), progress = asked
+    uncertainty = covariance.uncertainty(problem, theta)
     profiles: list[intervals.Profile] = []
     for done, name in enumerate(profile):
         progress("profiles", done, len(profile))
         profiles.append(intervals.profile(problem, uncertainty, name))
-    refits, seed = bootstrap
     drawn = intervals.bootstrap(problem, uncertainty, refits, seed, progress) if refits else None
     found = directions.identifiability(problem, uncertainty)
-    study = UncertaintyStudy(problem, model.source, uncertainty, found, tuple(profiles), drawn)
-    return Study(study, uncertainty_page(study)).write(out)
+    return UncertaintyStudy(problem, source, uncertainty, found, tuple(profiles), drawn)
 
 
 def sensitivity(

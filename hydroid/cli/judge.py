@@ -98,7 +98,7 @@ def identifiability(
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
     from hydroid.identified import load_identified, start_values
-    from hydroid.report.phrases import direction_phrases, profile_warnings
+    from hydroid.report.phrases import direction_phrases
 
     default, changes = f"fit-{stage.value}", overrides(setting)
     if fit is None:
@@ -116,7 +116,7 @@ def identifiability(
         )
     phrases = direction_phrases(study.result.problem, study.result.identifiability)
     content = _uncertainty(study.result, phrases)
-    warnings = profile_warnings(study.result.profiles)
+    warnings = study.page.warnings
     lines = [*(f"- {phrase}" for phrase in phrases), *warnings]
     show(
         output,

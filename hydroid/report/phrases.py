@@ -232,11 +232,17 @@ def strain_phrase(problem: Problem, strain: Strain) -> str:
 
 
 def profile_warnings(profiles: Sequence[Profile]) -> tuple[str, ...]:
-    """Say which profiles fit better than the estimate somewhere."""
+    """Say which profiles fit better than the estimate somewhere, and which hang on a bound."""
+    bounded = tuple(
+        f"Within the profile of {p.name}, {listed(p.bounded)} reached a bound, which limits its interval."
+        for p in profiles
+        if p.bounded
+    )
     names = [profile.name for profile in profiles if profile.better_optimum]
     if not names:
-        return ()
+        return bounded
     return (
+        *bounded,
         f"The profile of {listed(names)} found a better fit than the estimate, which is no optimum: fit "
         "again from there, with more iterations or another seed.",
     )

@@ -54,6 +54,7 @@ class UncertaintyStudy:
         identifiability: directions there.
         profiles: profile likelihoods, as far as they were asked for.
         refits: estimates of the bootstrap, shape (N, P); None where it was not asked for.
+        moved: says that a better optimum was found, and that all this is about it; empty: it was not.
     """
 
     problem: Problem
@@ -62,6 +63,7 @@ class UncertaintyStudy:
     identifiability: Identifiability
     profiles: tuple[Profile, ...] = ()
     refits: Array | None = None
+    moved: str = ""
 
 
 def uncertainty_page(study: UncertaintyStudy) -> Page:
@@ -71,7 +73,7 @@ def uncertainty_page(study: UncertaintyStudy) -> Page:
     intervals = Section("Intervals", tables={"intervals": interval_table(study)}, plots=plots)
     determined = determined_section(study.problem, study.uncertainty, study.identifiability)
     lead = rank_phrase(study.identifiability)
-    warnings = profile_warnings(study.profiles)
+    warnings = (*((study.moved,) if study.moved else ()), *profile_warnings(study.profiles))
     return Page("identifiability", "What the logs determine", lead, (intervals, determined), warnings)
 
 

@@ -113,7 +113,7 @@ def _fold_table(folds: Sequence[IdentifiedModel]) -> Table:
             relative = 100 * spread / abs(mean) if mean else np.inf
             rows.append((parameter.name, parameter.unit, *map(float, column), relative))
     header = ("name", "unit", *(short_name(fold.source) for fold in folds), "spread [%]")
-    note = "Each column: refined without one log. spread: standard deviation of the columns relative to their mean."
+    note = "Each column: refined without one log. spread: their standard deviation relative to their mean."
     return Table("Parameters without one log", header, tuple(rows), note, ("spread [%]",))
 
 

@@ -1,6 +1,6 @@
 """Intervals without the linear approximation: profile likelihood, and residual block bootstrap."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
-from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, decompose
+from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, at_bounds, decompose
 
 THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
@@ -26,6 +26,8 @@ ZOOMS = 4
 """times that steps are made smaller because the interval ends within the first two"""
 BETTER_BELOW = -0.1
 """deviance below which a profile has reached a better optimum; above it, only rounding"""
+BETTER_BY = 1e-3
+"""part of the cost by which a refit must be better than the estimate; below it, only rounding"""
 QUICK = RefinementSettings(iterations=50, gain_tolerance=1e-6)
 BOOTSTRAP_STEPS = 4
 """Gauss-Newton steps of a refit"""
@@ -46,6 +48,7 @@ class Profile:
         deviance: rise of the cost in units of the noise, (n,): about ((value - estimate) / sd)² near it.
         interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
         lowest: all parameters at the point of the lowest deviance, shape (P,).
+        bounded: other parameters that lie at a bound somewhere within the interval.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Profile:
     deviance: Array
     interval: tuple[float, float]
     lowest: Array
+    bounded: tuple[str, ...] = ()
 
     @property
     def better_optimum(self) -> bool:
@@ -94,7 +98,13 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
         _crossing(values[centre::-1], deviance[centre::-1], -np.inf),
         _crossing(values[centre:], deviance[centre:], np.inf),
     )
-    return Profile(name, values, deviance, interval, points[int(np.argmin(deviance))][1])
+    within = np.array([t for d, t in points if d <= THRESHOLD])
+    bounded = tuple(
+        parameter.name
+        for j, parameter in enumerate(problem.parameters.parameters)
+        if j != i and uncertainty.free[j] and any(at.any() for _, at in at_bounds(parameter, within[:, j]))
+    )
+    return Profile(name, values, deviance, interval, points[int(np.argmin(deviance))][1], bounded)
 
 
 def bootstrap(
@@ -120,6 +130,21 @@ def bootstrap(
             step = -((residuals(batch) + shift) @ pseudo) * uncertainty.jacobian.scale[free]
             batch[:, free] = np.clip(batch[:, free] + np.nan_to_num(step), lower, upper)
     return estimates
+
+
+def better_optimum(
+    problem: Problem, uncertainty: Uncertainty, profiles: Sequence[Profile], refits: Array | None
+) -> Array | None:
+    """Return the best of all parameters that profiles and refits reached, shape (P,); None: the estimate."""
+    lowest = [p.lowest for p in profiles if p.better_optimum]
+    if refits is not None:
+        cost = np.sum(_with_priors(problem, uncertainty)(np.vstack([uncertainty.theta, refits])) ** 2, axis=1)
+        best = int(np.argmin(np.where(np.isfinite(cost), cost, np.inf)))
+        lowest += [refits[best - 1]] if cost[best] < (1 - BETTER_BY) * cost[0] else []
+    if not lowest:
+        return None
+    cost = np.sum(_with_priors(problem, uncertainty)(np.array(lowest)) ** 2, axis=1)
+    return lowest[int(np.argmin(cost))]
 
 
 def _walk(

@@ -14,7 +14,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings, PriorSettings
 from hydroid.uncertainty.covariance import quantile, uncertainty, uncertainty_from
 from hydroid.uncertainty.flags import Flag, ParameterStatus
-from hydroid.uncertainty.intervals import THRESHOLD, bootstrap, profile
+from hydroid.uncertainty.intervals import THRESHOLD, better_optimum, bootstrap, profile
 from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.noise import MIN_LEVEL, Noise, channel_noise, fit_noise, unbiased
 from hydroid.uncertainty.noise_error import STEP, neighbours
@@ -335,6 +335,9 @@ def test_a_profile_from_no_optimum_finds_the_better_one():
     np.testing.assert_allclose(found.lowest, theta, atol=0.3 * deviation)
     cost = np.sum(problem.residuals(np.stack([off, found.lowest])) ** 2, axis=1)
     assert cost[1] < cost[0]
+    assert better_optimum(problem, uncertainty(problem, off), [found], None) is found.lowest
+    at = uncertainty(problem, theta)
+    assert better_optimum(problem, at, [profile(problem, at, "b")], theta[None]) is None
 
 
 @pytest.mark.parametrize("phi", [0.0, AR1])

@@ -44,7 +44,7 @@ class Band:
     @property
     def model_limits(self) -> bool:
         """Whether the model, not the noise, limits the prediction."""
-        return self.inside < 1 - MOST_OUTSIDE
+        return self.inside < 1 - MOST_OUTSIDE and self.model_error > 0
 
 
 def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:

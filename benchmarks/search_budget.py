@@ -41,11 +41,11 @@ EXACT = np.deg2rad(1e-4)
 
 @cache
 def stage_1(log: str) -> dict[str, float]:
-    """Values of stage 1's estimate on a log, the gain left out."""
+    """Masses of stage 1's estimate on a log."""
     problem = make(log, {"search.nsga2.generations": 0})
     result = fit(problem, lambda state, memo: None, Silent())
     values = problem.parameters.mapping(result.best.theta)
-    return {name: value for name, value in values.items() if name != "K"}
+    return {name: value for name, value in values.items() if name.startswith("M")}
 
 
 def make(name: str, changes: dict[str, object]) -> Problem:

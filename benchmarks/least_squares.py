@@ -115,7 +115,8 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
         mech, theta = searched("fit-mech", ga)
         point = refine(mech, theta, RefinementSettings(), lambda n, rms: None).point
         values = mech.parameters.mapping(mech.parameters.from_unit(point[None])[0])
-        return searched("fit-hyd", ga | {f"parameters.{n}.fixed": v for n, v in values.items() if n[0] == "M"})
+        masses = {f"parameters.{n}.fixed": v for n, v in values.items() if n[0] == "M"}
+        return searched("fit-hyd", ga | masses)
 
     def joint() -> tuple[Problem, np.ndarray]:
         problem, theta = stage_2()

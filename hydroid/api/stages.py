@@ -147,7 +147,10 @@ def _fit_files(
     if logs:
         settings = load_settings(config, overrides)
         if options.start is not None:
-            settings = load_settings(config, _started(settings, Path(options.start)) | overrides)
+            started = _started(settings, Path(options.start))
+            settings = load_settings(
+                config, overrides | {k: v for k, v in started.items() if k not in overrides}
+            )
     else:
         logs, settings = _own_inputs(out, overrides, options)
     folder = Path(out or Path("runs") / f"{Path(logs[0]).stem}-{settings.stage}-{settings.search.name}")

@@ -22,7 +22,7 @@ from hydroid.simulation import Candidates
 
 @pytest.fixture(scope="module")
 def candidate() -> Candidates:
-    return nominal({"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "hydraulics.current_max": 1.2})
+    return nominal({"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "parameters.I_max.fixed": 1.2})
 
 
 def nominal(settings: dict[str, float]) -> Candidates:

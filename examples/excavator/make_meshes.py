@@ -62,6 +62,7 @@ def main(folder: Path) -> None:
         if not solid.is_watertight or solid.volume <= 0:
             raise SystemExit(f"{part.__name__} is not watertight")
         data = solid.export(file_type="stl")
+        assert isinstance(data, bytes)
         (folder / f"{part.__name__}.stl").write_bytes(data)
         print(f"{part.__name__:10} {len(solid.faces):5} faces  {solid.volume:.2f} m³")
 

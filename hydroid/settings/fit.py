@@ -10,7 +10,7 @@ from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import expanded, parameter_set, prior
+from hydroid.settings.parameters import expanded, parameter, prior
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
 from hydroid.settings.simulation import ClusterSettings, SimulationSettings
@@ -68,21 +68,23 @@ class FitSettings(Settings):
     def _of_the_stage(self) -> "FitSettings":
         if len(set(self.outputs)) < len(self.outputs):
             raise ValueError("outputs: a joint is listed twice")
-        for name, parameter in self.parameters.items():
-            hydraulic = parameter.quantity in TARGETS
+        for name, own in self.parameters.items():
+            hydraulic = own.quantity in TARGETS
             if self.stage == "mech" and hydraulic:
-                raise ValueError(f"{name}: stage mech has no {parameter.quantity}; set stage: hyd")
-            if self.stage == "hyd" and parameter.quantity == "gain":
+                raise ValueError(f"{name}: stage mech has no {own.quantity}; set stage: hyd")
+            if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"{name}: stage hyd has no gain; the hydraulics take its place")
             try:
-                prior(self, parameter)
+                prior(self, own)
             except ValueError as error:
                 raise ValueError(f"parameters.{name}: {error}") from None
         return self
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
-        return parameter_set(self)
+        starts = any(p.states_start for p in self.parameters.values() if p.fixed is None)
+        log = self.scale == "log"
+        return ParameterSet(tuple(parameter(self, n, p, log, starts) for n, p in self.parameters.items()))
 
     def freed(self) -> "FitSettings":
         """Return the settings with every parameter free that can be, as a joint refinement has them."""

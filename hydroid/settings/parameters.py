@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from annotated_types import Gt
 
-from hydroid.parameters import Parameter, ParameterSet, Prior
+from hydroid.parameters import Parameter, Prior
+from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import TARGETS, HydraulicSettings, actuator_values
 from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
-
-if TYPE_CHECKING:
-    from hydroid.settings.fit import FitSettings
 
 QUANTILE = 1.96
 """standard deviations of a Gaussian that hold 95 % on both sides"""
@@ -26,6 +24,20 @@ MAY_BE_ZERO = {
 }
 POSITIVE = {"mass"} | {name for name, sides in TARGETS.items() if not MAY_BE_ZERO & set(sides)}
 """quantities that must be above 0"""
+
+
+class Machine(Protocol):
+    """What a fit's settings say of the machine, where nominal values come from."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        ...
+
+    @property
+    def hydraulics(self) -> HydraulicSettings:
+        """The hydraulics of all joints."""
+        ...
 
 
 def expanded(parameters: Mapping[str, Any], compared: tuple[int, ...]) -> dict[str, Any]:
@@ -61,29 +73,23 @@ def expanded(parameters: Mapping[str, Any], compared: tuple[int, ...]) -> dict[s
     return result
 
 
-def parameter_set(settings: "FitSettings") -> ParameterSet:
-    """Return the parameters of a fit in the order of theta."""
-    starts = any(p.states_start for p in settings.parameters.values() if p.fixed is None)
-    return ParameterSet(tuple(_parameter(settings, n, p, starts) for n, p in settings.parameters.items()))
-
-
-def nominal_value(settings: "FitSettings", parameter: ParameterSettings) -> float | None:
+def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
     if parameter.nominal is not None:
         return parameter.nominal
-    arm = settings.arm
+    arm = machine.arm
     if parameter.link is not None:
         return next((float(part.mass) for part in arm.parts if part.name == parameter.link), None)
     if parameter.quantity not in TARGETS:
         return None
     joints = parameter.joints or range(1, len(arm.joints) + 1)
     actuators = [arm.joints[j - 1].actuator for j in joints if j <= len(arm.joints)]
-    tables = [actuator_values(a, settings.hydraulics) for a in actuators]
+    tables = [actuator_values(a, machine.hydraulics) for a in actuators]
     values = {table[side] for table in tables for side in TARGETS[parameter.quantity]}
     return values.pop() if len(values) == 1 else None
 
 
-def prior(settings: "FitSettings", parameter: ParameterSettings) -> Prior | None:
+def prior(machine: Machine, parameter: ParameterSettings) -> Prior | None:
     """Return the prior of a parameter; None: it has none.
 
     Raises:
@@ -91,7 +97,7 @@ def prior(settings: "FitSettings", parameter: ParameterSettings) -> Prior | None
     """
     if not parameter.has_prior:
         return None
-    nominal = nominal_value(settings, parameter)
+    nominal = nominal_value(machine, parameter)
     if nominal is None:
         raise ValueError(
             f"a prior on {parameter.quantity} needs nominal: value; neither `hydraulics` nor the arm's file "
@@ -107,13 +113,18 @@ def prior(settings: "FitSettings", parameter: ParameterSettings) -> Prior | None
     return Prior(nominal, math.log(parameter.within) / QUANTILE, log=True)
 
 
-def _parameter(settings: "FitSettings", name: str, own: ParameterSettings, starts: bool) -> Parameter:
-    known = prior(settings, own)
+def parameter(machine: Machine, name: str, own: ParameterSettings, log: bool, starts: bool) -> Parameter:
+    """Return one parameter with its bounds and prior.
+
+    `log`: on a log scale where it is positive, as one with a log-normal prior always is. `starts`: with a
+    start value where the settings or the machine give one.
+    """
+    known = prior(machine, own)
     lower, upper = own.bounds or _default_bounds(own, known)
-    start = own.start if own.start is not None else nominal_value(settings, own)
+    start = own.start if own.start is not None else nominal_value(machine, own)
     start = min(max(start, lower), upper) if starts and start is not None else None
-    log = lower > 0 and (settings.scale == "log" or (known is not None and known.log))
-    return Parameter(name, own.unit, lower, upper, own.fixed, log, start, known)
+    on_log = lower > 0 and (log or (known is not None and known.log))
+    return Parameter(name, own.unit, lower, upper, own.fixed, on_log, start, known)
 
 
 def _default_bounds(own: ParameterSettings, known: Prior | None) -> tuple[float, float]:

@@ -106,8 +106,9 @@ def parameter_table(problem: Problem, fit: Fit) -> Table:
     labels = [estimate_label(fit, name) for name in names]
     rows: list[tuple[Cell, ...]] = []
     for i, parameter in enumerate(problem.parameters.parameters):
-        bounded = parameter.lower < parameter.upper
-        bounds = (Given(parameter.lower), Given(parameter.upper)) if bounded else (None, None)
+        bounds = (parameter.lower, parameter.upper) if parameter.lower < parameter.upper else (None, None)
+        if given := problem.settings.parameters[parameter.name].bounds:
+            bounds = (Given(given[0]), Given(given[1]))
         values = (float(fit.estimates[name].theta[i]) for name in names)
         status = fit.uncertainty.status[i]
         ends = (unless_nan(end) for end in fit.uncertainty.interval[i])

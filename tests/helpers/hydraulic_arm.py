@@ -86,3 +86,17 @@ class DrivenArm:
     def failed(self) -> np.ndarray:
         """Candidates for which MuJoCo warned, (n,)."""
         return self.batch.warning[:, :, 1].any(axis=1)
+
+
+def lone_wheel(actuator: Actuator, command: np.ndarray, inertia: float, start: float = 0.0) -> np.ndarray:
+    """Angles [rad], (T,), of an inertia [kg·m²] that nothing but one joint's actuator moves, from rest."""
+    angle, velocity = np.full((1, 1), start), np.zeros((1, 1))
+    state, mass = actuator.start(angle, np.zeros((1, 1))), np.full((1, 1), inertia)
+    out = []
+    for u in command:
+        torque, armature = actuator.advance(state, [u], angle, velocity, mass)
+        mass = inertia + armature
+        velocity = velocity + 0.01 * torque / mass
+        angle = actuator.close(state, velocity, mass)
+        out.append(angle[0, 0])
+    return np.array(out)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from hydraulic_arm import lone_wheel
 from recovery import assert_recovered, duties, recover, settings_of
 from scipy.spatial.transform import Rotation
 
@@ -29,16 +30,7 @@ def motion(arm: Arm, command: np.ndarray, start: float) -> np.ndarray:
     nominal = nominal_parameters(arm, SETTINGS, [SHOULDER])
     moved = linkages(arm, [SHOULDER], [SHOULDER])
     actuator = Actuator(nominal, moved, 50.0, 0.01, SETTINGS)
-    angle, velocity, inertia = np.full((1, 1), start), np.zeros((1, 1)), 20.0
-    state, mass = actuator.start(angle, np.zeros((1, 1))), np.full((1, 1), inertia)
-    out = []
-    for u in command:
-        torque, armature = actuator.advance(state, [u], angle, velocity, mass)
-        mass = inertia + armature
-        velocity = velocity + 0.01 * torque / mass
-        angle = actuator.close(state, velocity, mass)
-        out.append(angle[0, 0])
-    return np.array(out)
+    return lone_wheel(actuator, command, 20.0, start)
 
 
 def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm):

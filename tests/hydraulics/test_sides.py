@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from hydraulic_arm import lone_wheel
 from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.errors import SettingsError
@@ -26,16 +27,7 @@ def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray
     linkage = np.array([(ROTARY, *[0] * (len(LINKAGE) - 1))], LINKAGE).view(np.recarray)
     nominal = nominal_parameters(arm, SETTINGS, [3])
     actuator = Actuator(with_values(nominal, values), linkage, 5.0, 0.01, SETTINGS)
-    angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05
-    state, mass = actuator.start(angle, np.zeros((1, 1))), np.full((1, 1), inertia)
-    out = []
-    for u in command:
-        torque, armature = actuator.advance(state, [u], angle, velocity, mass)
-        mass = inertia + armature
-        velocity = velocity + 0.01 * torque / mass
-        angle = actuator.close(state, velocity, mass)
-        out.append(angle[0, 0])
-    return np.array(out)
+    return lone_wheel(actuator, command, 0.05)
 
 
 def test_swapped_sides_mirror_the_motion(arm: Arm):

@@ -101,15 +101,18 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
-    level times the root of the number of samples per effective sample.
+    level times the root of the number of samples per effective sample. The AR process has its full order here:
+    an order by the AIC jumps, and a refinement would then settle at one of several weights.
     """
-    noise = [channel_noise(channel, residual[channel.rows], objective) for channel in channels]
+    noise = [channel_noise(c, residual[c.rows], objective, by_aic=False) for c in channels]
     square = sum(n.samples * n.level**2 for n in noise)
     return float(np.sqrt(square / sum(n.effective_sample_size for n in noise)))
 
 
-def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
-    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,).
+def channel_noise(
+    channel: Channel, residual: Array, objective: ObjectiveSettings, by_aic: bool = True
+) -> Noise:
+    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,), by `fit_noise`.
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
@@ -124,10 +127,10 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
         return Noise(samples, level * channel.weight, np.empty(0), "settings")
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
     if lacking <= 0:
-        return fit_noise(residual)
+        return fit_noise(residual, by_aic=by_aic)
     impulse = np.zeros(samples)  # its products are those expected of white noise
     impulse[samples // 2] = np.sqrt(lacking)
-    return replace(fit_noise(np.vstack([residual, impulse])), source="smallest")
+    return replace(fit_noise(np.vstack([residual, impulse]), by_aic=by_aic), source="smallest")
 
 
 def covariances(processes: Sequence[Noise], rows: Array) -> Array:
@@ -149,10 +152,10 @@ def covariances(processes: Sequence[Noise], rows: Array) -> Array:
     return out
 
 
-def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
+def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER, by_aic: bool = True) -> Noise:
     """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,).
 
-    Of several rows, (n, T), the products are added.
+    by_aic: the order has the lowest AIC; otherwise it is the highest. Of several rows, (n, T), the products are added.
     """
     forward = backward = rows = np.atleast_2d(rows)
     samples = rows.shape[1]
@@ -168,7 +171,8 @@ def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
         forward, backward = forward + k * backward, backward + k * forward
         reflection.append(k)
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
-    return Noise(samples, level, np.array(reflection[: int(np.argmin(criterion))]))
+    order = int(np.argmin(criterion)) if by_aic else len(reflection)
+    return Noise(samples, level, np.array(reflection[:order]))
 
 
 def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:

@@ -101,8 +101,8 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
-    level times the root of the number of samples per effective sample. The AR process has its full order here:
-    an order by the AIC jumps, and a refinement would then settle at one of several weights.
+    level times the root of the number of samples per effective sample. The AR process has its full order here: an
+    order by the AIC jumps, and a refinement would then settle at one of several weights.
     """
     noise = [channel_noise(c, residual[c.rows], objective, by_aic=False) for c in channels]
     square = sum(n.samples * n.level**2 for n in noise)
@@ -112,7 +112,7 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
 def channel_noise(
     channel: Channel, residual: Array, objective: ObjectiveSettings, by_aic: bool = True
 ) -> Noise:
-    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,), by `fit_noise`.
+    """Return a channel's noise: white as the settings give it, else from its residual, shape (T,).
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
@@ -155,7 +155,8 @@ def covariances(processes: Sequence[Noise], rows: Array) -> Array:
 def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER, by_aic: bool = True) -> Noise:
     """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,).
 
-    by_aic: the order has the lowest AIC; otherwise it is the highest. Of several rows, (n, T), the products are added.
+    by_aic: the order has the lowest AIC; otherwise it is the highest.
+    Of several rows, (n, T), the products are added.
     """
     forward = backward = rows = np.atleast_2d(rows)
     samples = rows.shape[1]

@@ -101,8 +101,8 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
-    level times the root of the number of samples per effective sample. The AR process has its full order here: an
-    order by the AIC jumps, and a refinement would then settle at one of several weights.
+    level times the root of the number of samples per effective sample. The AR process has its full order:
+    the order of the lowest AIC jumps, and a refinement would then settle at one of several weights.
     """
     noise = [channel_noise(c, residual[c.rows], objective, by_aic=False) for c in channels]
     square = sum(n.samples * n.level**2 for n in noise)

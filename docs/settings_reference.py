@@ -90,7 +90,9 @@ def _type(annotation: Any) -> str:
         return " or ".join(dict.fromkeys(_type(a) for a in arguments))
     if origin is tuple:
         inner = _type(arguments[0])
-        return f"list of {inner}s" if arguments[-1] is Ellipsis else f"list of {len(arguments)} {inner}s"
+        return (
+            f"list of {inner}s" if arguments[-1] is Ellipsis else f"list of {len(arguments)} {_plural(inner)}"
+        )
     if origin is dict:
         inner = _type(arguments[1])
         return f"mapping to {inner}" if inner.startswith("list") else f"mapping to {inner}s"
@@ -98,6 +100,10 @@ def _type(annotation: Any) -> str:
         return "mapping" if annotation is not Arm else "text or mapping"
     plain = {float: "number", int: "whole number", str: "text", bool: "true or false", Path: "path"}
     return plain.get(annotation, "null")
+
+
+def _plural(kind: str) -> str:
+    return kind.replace("list of", "lists of", 1) if kind.startswith("list of") else f"{kind}s"
 
 
 def _default(field: FieldInfo) -> str:

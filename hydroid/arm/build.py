@@ -1,6 +1,7 @@
 """Settings and meshes -> MJCF: a serial arm on a fixed base that MuJoCo can show, step and save.
 
-Each link is one body with its frame in its joint; mass and inertia come from the mesh and the nominal mass.
+Each link is one body with its frame in its joint. Its inertia is that of the settings, or else that of its
+mesh or shape with the nominal mass.
 Damping, stiffness and friction stay zero: they are what a fit finds. Cylinders are drawn as spatial tendons
 between their pivots and carry no force; torque enters by one motor a joint.
 """
@@ -13,10 +14,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arm.mesh import mass_properties
+from hydroid.arm.mesh import mass_properties, read_mesh, shape_properties
 from hydroid.arm.model import mujoco_errors
 from hydroid.files import write_atomic
-from hydroid.settings.arm import Arm, Joint, LinearActuator, Link
+from hydroid.settings.arm import Arm, Joint, LinearActuator
+from hydroid.settings.parts import Box, Cylinder, Link
 
 Array = NDArray[np.float64]
 
@@ -63,10 +65,10 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
     spec.modelname, spec.meshdir = arm.name, str(folder)
     spec.comment = f"{arm.name}: built by `hydroid build-model` from the arm's YAML and meshes; edit those"
     spec.compiler.savecompiled = spec.compiler.savecanonical = False
-    _place_scene(spec, arm)
     body = spec.worldbody.add_body(name="base", pos=arm.base.at)
-    mass_properties(folder / arm.base.mesh)
-    _add_shape(spec, body, arm.base.mesh, "steel")
+    if arm.base.mesh is not None:
+        mass_properties(folder / arm.base.mesh)
+        _add_mesh(spec, body, arm.base.mesh, "steel")
     for link, joint in zip(arm.links, arm.joints, strict=True):
         child = body.add_body(name=link.name, pos=joint.at)
         _add_joint(spec, child, joint)
@@ -80,6 +82,7 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
     for name in arm.poses:
         spec.add_key(name=name, qpos=arm.pose(name))
     _exclude_contacts(spec)
+    _place_scene(spec, arm)
     return spec
 
 
@@ -97,16 +100,27 @@ def write_model(arm: Arm, path: Path, mesh_folder: Path | None = None) -> None:
 
 
 def _add_part(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: Link, folder: Path, material: str) -> None:
-    properties = mass_properties(folder / part.mesh)
-    i = part.mass * properties.inertia
-    body.explicitinertial = True
-    body.mass = part.mass
-    body.ipos = properties.centre
+    body.explicitinertial, body.mass = True, part.mass
+    if part.inertia is not None:
+        centre, i = np.array(part.inertia.centre), part.inertia.matrix
+        if part.mesh is not None:
+            read_mesh(folder / part.mesh)  # it may be open: it is only shown
+    elif part.shape is not None:
+        properties = shape_properties(part.shape)
+        centre, i = properties.centre, part.mass * properties.inertia
+    else:
+        assert part.mesh is not None
+        properties = mass_properties(folder / part.mesh)
+        centre, i = properties.centre, part.mass * properties.inertia
+    body.ipos = centre
     body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
-    _add_shape(spec, body, part.mesh, material)
+    if part.mesh is not None:
+        _add_mesh(spec, body, part.mesh, material)
+    elif part.shape is not None:
+        _add_shape(body, part.shape, material)
 
 
-def _add_shape(spec: mujoco.MjSpec, body: mujoco.MjsBody, mesh: str, material: str) -> None:
+def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, mesh: str, material: str) -> None:
     """Show the mesh, and collide with the capsule that MuJoCo fits to it."""
     name = Path(mesh).with_suffix("").as_posix()
     if spec.mesh(name) is None:
@@ -114,6 +128,18 @@ def _add_shape(spec: mujoco.MjSpec, body: mujoco.MjsBody, mesh: str, material: s
     look = {"meshname": name, "material": material, "mass": 0}
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, group=VISUAL_GROUP, contype=0, conaffinity=0, **look)
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, group=COLLISION_GROUP, **look)
+
+
+def _add_shape(body: mujoco.MjsBody, shape: Box | Cylinder, material: str) -> None:
+    """Show the shape, and collide with it."""
+    if isinstance(shape, Box):
+        size = [0.5 * length for length in shape.size]
+        form = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": size, "pos": shape.at}
+    else:
+        ends = [*shape.ends[0], *shape.ends[1]]
+        form = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "size": [shape.radius, 0, 0], "fromto": ends}
+    body.add_geom(group=VISUAL_GROUP, contype=0, conaffinity=0, mass=0, material=material, **form)
+    body.add_geom(group=COLLISION_GROUP, mass=0, **form)
 
 
 def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, joint: Joint) -> None:
@@ -145,6 +171,12 @@ def _place_scene(spec: mujoco.MjSpec, arm: Arm) -> None:
     base = np.array(arm.base.at)
     tip = base + np.sum([joint.at for joint in arm.joints], axis=0)
     centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
+    with mujoco_errors(spec.modelname):
+        whole = spec.compile().stat
+    if reach < 0.2 * whole.extent:  # one joint, or joints close together: the links reach farther
+        centre, reach = np.round(whole.center, 6), round(0.5 * float(whole.extent), 6)
+    if reach > 4.0:
+        spec.geom("floor").size = [round(1.25 * reach, 3)] * 2 + [0.1]
     for light in spec.lights:
         light.pos = centre - light.dir
     for camera in spec.cameras:

@@ -1,10 +1,11 @@
-"""A link's mesh -> volume, centre of mass and inertia at uniform density.
+"""A link's mesh or shape -> volume, centre of mass and inertia at uniform density.
 
 A closed, outward-facing surface fixes the integrals of 1, x and x xᵀ over the volume inside it (divergence
 theorem, face by face). A surface that is open, inverted or in other units gives numbers all the same, and
 wrong ones: hence the checks.
 """
 
+import math
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,15 +16,16 @@ from numpy.typing import NDArray
 
 from hydroid.errors import MeshError
 from hydroid.files import is_file
+from hydroid.settings.parts import Box, Cylinder
 
-LARGEST_LINK = 5.0  # [m]; a link beyond this is taken for one in millimetres
+LARGEST_LINK = 50.0  # [m]; a link beyond this is taken for one in millimetres
 KINDS = (".stl", ".obj")
 SMALLEST_VOLUME = 1e-9  # [m³]; one cubic millimetre
 
 
 @dataclass(frozen=True)
 class MassProperties:
-    """What a mesh says of a link whose mass is not known yet."""
+    """What a mesh or a shape says of a link whose mass is not known yet."""
 
     volume: float
     """[m³]"""
@@ -41,7 +43,7 @@ def mass_properties(path: Path) -> MassProperties:
             inverted, or without volume.
     """
     with np.errstate(all="ignore"):  # what is not finite is refused below
-        mesh = _read(path)
+        mesh = read_mesh(path)
         _check(mesh, str(path))
     inertia = np.asarray(mesh.moment_inertia, dtype=float) / mesh.mass
     return MassProperties(
@@ -51,7 +53,26 @@ def mass_properties(path: Path) -> MassProperties:
     )
 
 
-def _read(path: Path) -> trimesh.Trimesh:
+def shape_properties(shape: Box | Cylinder) -> MassProperties:
+    """Return the same of a block or a round bar."""
+    if isinstance(shape, Box):
+        square = np.array(shape.size) ** 2
+        return MassProperties(
+            float(np.prod(shape.size)), np.array(shape.at), np.diag(square.sum() - square) / 12
+        )
+    low, high = np.array(shape.ends)
+    length = float(np.linalg.norm(high - low))
+    along, across = (high - low) / length, shape.radius**2 / 4 + length**2 / 12
+    inertia = across * np.eye(3) + (shape.radius**2 / 2 - across) * np.outer(along, along)
+    return MassProperties(math.pi * shape.radius**2 * length, 0.5 * (low + high), inertia)
+
+
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """Read an STL or OBJ file as it is, open or closed, in whatever unit.
+
+    Raises:
+        MeshError: missing, unreadable, an ASCII STL, or empty.
+    """
     where = str(path)
     if not is_file(path):
         raise MeshError("no such mesh", where=where, hint="put the link's STL there, or correct its name")

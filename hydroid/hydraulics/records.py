@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.errors import SettingsError
 from hydroid.hydraulics.solenoid import curve_exists, force_curve
 from hydroid.hydraulics.valve import conductance
 from hydroid.settings.arm import Arm, Joint
@@ -144,9 +145,11 @@ def linkages(
     """
     table = np.zeros((1 if parameters is None else len(parameters), len(joints)), LINKAGE)
     for place, j in enumerate(joints):
-        actuator = arm.joints[j].actuator
         if j not in driven:
             continue
+        actuator = arm.joints[j].actuator
+        if actuator is None:
+            raise without_actuator(arm, j)
         one = table[:, place]
         one["kind"] = ROTARY
         if isinstance(actuator, LinearActuator):
@@ -164,6 +167,13 @@ def linkages(
                 retracted = four_bar(retracted, actuator.four_bar)[0]
             one["shortest"] = triangle(retracted, one["a"], one["b"], one["theta0"])[0]
     return table.view(np.recarray)
+
+
+def without_actuator(arm: Arm, joint: int) -> SettingsError:
+    """Return the error of a joint, 0-based, that is driven in stage 2 and has no actuator."""
+    what = f"joint {joint + 1} ({arm.joints[joint].name}) has no actuator"
+    hint = "stage 2 needs its cylinder (two pivots, areas) or rotary actuator: add actuator: to the joint"
+    return SettingsError(what, where=f"the arm's file of {arm.name}", hint=hint)
 
 
 def coefficients(parameters: Records, linkages: Records) -> NDArray[np.void]:

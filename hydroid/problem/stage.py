@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import nominal_parameters
+from hydroid.hydraulics.records import nominal_parameters, without_actuator
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -53,8 +53,14 @@ class Stage:
         return Candidates(**arm, actuators=actuators)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
-        """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
+        """Refuse driven, (J,), or compared joints, 0-based, that the model cannot move.
+
+        Those are joints for which stage 1 has no gain or no damping, or stage 2 no actuator.
+        """
         if self._hydraulics is not None:
+            for joint in sorted({*np.flatnonzero(driven).tolist(), *outputs}):
+                if joint < len(self._arm.joints) and self._arm.joints[joint].actuator is None:
+                    raise without_actuator(self._arm, joint)
             return
         for quantity in ("gain", "damping"):
             serving = [slots for name, slots in self._slots.items() if self._quantities[name] == quantity]

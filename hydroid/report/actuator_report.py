@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import coefficients, linkages
+from hydroid.hydraulics.records import coefficients, linkages, without_actuator
 from hydroid.hydraulics.solenoid import coil_current, coil_force, curve_exists, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
@@ -77,6 +77,8 @@ def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> 
             hint="it needs F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²",
         )
     settings = arm.joints[joint - 1]
+    if settings.actuator is None:
+        raise without_actuator(arm, joint - 1)
     return JointActuator(f"Joint {joint}, {settings.name}", p, settings.actuator, settings.range)
 
 

@@ -5,7 +5,7 @@ Units are those of a drawing (m, deg, mm, mm², cm³/rad); other packages turn t
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,47 +21,9 @@ from hydroid.settings.linkage import (
     Vector,
     four_bar,
 )
-from hydroid.settings.load import Positive, Settings, load
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-
-
-class Base(Settings):
-    """The fixed base that carries the first joint."""
-
-    mesh: str
-    """STL file in the folder of the meshes"""
-    at: Vector = (0.0, 0.0, 0.0)
-    """position of the base's frame in the world [m]"""
-
-
-class Link(Settings):
-    """A moving link; the origin of its mesh lies in its joint."""
-
-    name: Name
-    """name of the link"""
-    mesh: str
-    """STL file in the folder of the meshes"""
-    mass: Positive
-    """nominal mass [kg]"""
-
-
-class FixedPart(Link):
-    """A part bolted to a link, such as a fixed jaw or a tool."""
-
-    carried_by: Name
-    """name of the link that carries the part"""
-    at: Vector = (0.0, 0.0, 0.0)
-    """position in the frame of that link [m]"""
-
-
-class PayloadPlace(Settings):
-    """Where the gripper holds the mass that a log's `payloads` names."""
-
-    carried_by: Name
-    """name of the link that carries the payload"""
-    at: Vector
-    """position of its centre of mass in the frame of that link [m]"""
+from hydroid.settings.load import Settings, load
+from hydroid.settings.parts import Base, FixedPart, Link, Name, PayloadPlace
+from hydroid.settings.pivots import place_pivots
 
 
 class Joint(Settings):
@@ -77,8 +39,8 @@ class Joint(Settings):
     """smallest and largest angle [deg]"""
     continuous: bool = False
     """true: the joint turns without stops, and `range` only limits the viewer's slider"""
-    actuator: Annotated[LinearActuator | RotaryActuator, Field(discriminator="kind")]
-    """what turns the joint; its `kind` decides which settings it has"""
+    actuator: Annotated[LinearActuator | RotaryActuator, Field(discriminator="kind")] | None = None
+    """what turns the joint; its `kind` decides which settings it has. Stage 1 needs none"""
 
     @model_validator(mode="after")
     def _possible(self) -> "Joint":
@@ -97,9 +59,9 @@ class Arm(Settings):
     """name of the arm"""
     model: Annotated[Path, Strict(False)]
     """the MJCF model, relative to this file"""
-    meshes: Annotated[Path, Strict(False)]
+    meshes: Annotated[Path, Strict(False)] = Path("meshes")
     """folder of the STL files, relative to this file"""
-    base: Base
+    base: Base = Base()
     links: Annotated[tuple[Link, ...], Field(min_length=1)]
     """the links, from the base outwards"""
     fixed: tuple[FixedPart, ...] = ()
@@ -110,6 +72,12 @@ class Arm(Settings):
     """where the gripper holds a payload; null: logs have no payloads"""
     poses: dict[Name, tuple[float, ...]]
     """named poses: the angle of each joint, by name [deg]"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pivots_as_triangles(cls, values: Any) -> Any:
+        """Turn cylinders that are given by their two pivots into triangles."""
+        return place_pivots(values) if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _consistent(self) -> "Arm":

@@ -223,11 +223,17 @@ TARGETS = {name: (name,) for name in QUANTITIES} | {
 
 
 def actuator_values(
-    actuator: LinearActuator | RotaryActuator, settings: HydraulicSettings
+    actuator: LinearActuator | RotaryActuator | None, settings: HydraulicSettings
 ) -> dict[str, float | None]:
-    """Return the value of every quantity of one actuator, in the units of QUANTITIES; None: no limit."""
+    """Return the value of every quantity of one actuator, in the units of QUANTITIES; None: no limit.
+
+    A joint without an actuator has sizes of 1, which nothing uses: it is never driven in stage 2.
+    """
     values: dict[str, float | None] = settings.model_dump()
     values["pivot_distance_1"] = values["pivot_distance_2"] = values["pivot_angle"] = 0.0
+    if actuator is None:
+        sizes = dict.fromkeys(("opening_a", "opening_b", "area_a", "area_b"), 1.0)
+        return {name: (values | sizes)[name] for name in QUANTITIES}
     values["opening_a"] = values["opening_b"] = actuator.max_opening
     if isinstance(actuator, LinearActuator):
         values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b

@@ -96,11 +96,24 @@ class FourBar(Settings):
         return math.radians(self.phase_deg)
 
 
+class Pivots(Settings):
+    """The two points where a cylinder is pinned, as CAD gives them."""
+
+    parent: Vector
+    """pivot on the parent link (the base for the first joint) [m]"""
+    child: Vector
+    """pivot on the link that the joint moves [m]"""
+    frame: Literal["link", "arm"] = "link"
+    """link: each point in the frame of its link; arm: both in the world, with all joints at angle 0"""
+
+
 class LinearActuator(Settings):
     """A cylinder that spans a triangle with the joint."""
 
     kind: Literal["linear"]
     """linear: a cylinder"""
+    pivots: Pivots | None = None
+    """both pivots as points, in place of a, b, theta0, extends, a_on, towards and offset"""
     a: Positive
     """distance of one pivot from the joint's axis [m]"""
     b: Positive
@@ -111,7 +124,7 @@ class LinearActuator(Settings):
     """direction in which the joint turns when the rod runs out: with negative the angle between the pivots is
     theta0 - q, and a positive command turns the joint to negative angles"""
     stroke: Positive
-    """stroke of the rod [mm]"""
+    """stroke of the rod [mm]; with `pivots` it may be left out, and is what the joint's range takes"""
     four_bar: FourBar | None = None
     """linkage between cylinder and joint; a, b and theta0 are then those of the triangle at the rocker's
     pivot, with the rocker's angle for the joint's; null: the cylinder acts on the joint itself"""

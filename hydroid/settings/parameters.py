@@ -84,7 +84,7 @@ def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | Non
         return None
     joints = parameter.joints or range(1, len(arm.joints) + 1)
     actuators = [arm.joints[j - 1].actuator for j in joints if j <= len(arm.joints)]
-    tables = [actuator_values(a, machine.hydraulics) for a in actuators]
+    tables = [actuator_values(a, machine.hydraulics) for a in actuators if a is not None]
     values = {table[side] for table in tables for side in TARGETS[parameter.quantity]}
     return values.pop() if len(values) == 1 else None
 

@@ -19,7 +19,7 @@ BOOM = {
     "base": {"at": [0, 0, 1.5]},
     "links": [
         {"name": "boom", "shape": {"kind": "box", "size": [6, 0.3, 0.5], "at": [3, 0, 0]}, "mass": 1500},
-        {"name": "bar", "shape": {"kind": "cylinder", "ends": [[0, 0, 0], [2, 0, -2]], "radius": 0.1}, "mass": 90},
+        {"name": "bar", "mass": 90, "shape": {"kind": "cylinder", "ends": [[0] * 3, [2, 0, -2]], "radius": 0.1}},
     ],
     "joints": [
         {"name": "lift", "axis": [0, -1, 0], "at": [0.2, 0, 0.5], "range": [-20, 60]},

@@ -72,9 +72,13 @@ def open_workers(
             target = _start_local(stack, int(local[1] or os.cpu_count() or 1))
         else:
             target = _start_slurm(stack, settings) if dask == "slurm" else _address(dask, insecure)
+        client: Any = Client.__new__(Client)
         try:
-            client: Any = Client(target, timeout=CONNECT)
+            client.__init__(target, timeout=CONNECT)
         except (OSError, ValueError, TypeError, RuntimeError) as error:
+            # a refused client left open is closed when it is collected; in the thread that another waits
+            # for, that would wait for the other
+            _close(client)
             words = " ".join(str(error).split())
             hint = "check the address; for tls:// name the folder of its credentials in DASK_CONFIG"
             raise RunError(

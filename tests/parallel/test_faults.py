@@ -1,6 +1,5 @@
 """Workers that die, schedulers that are lost, fits that are stopped: slow, since processes start and end."""
 
-import gc
 import json
 import os
 import signal
@@ -176,7 +175,6 @@ def test_a_scheduler_of_a_script_refuses_foreigners(site: Site, monkeypatch: pyt
     assert site.address.startswith("tls://")
     monkeypatch.setattr(cluster, "CONNECT", 2.0)
     for given in (site.address, site.address.replace("tls", "tcp"), str(site.file)):
-        gc.collect()  # refused clients close here, not in the thread of the next one, which would wait for it
         with (
             pytest.raises(RunError, match="no Dask scheduler answers"),
             open_workers(given, ClusterSettings()),

@@ -104,7 +104,6 @@ def test_only_the_loopback_listens_with_tls_and_no_page_is_served(two: DaskWorke
             urlopen(f"http://127.0.0.1:{info['services']['dashboard']}/{page}")
 
 
-@pytest.mark.slow  # Dask sometimes cannot start its thread beside clients that have just been refused
 def test_a_foreign_client_is_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
     """Without credentials, with those of another run, and without TLS."""
     address = two.client.scheduler_info()["address"]
@@ -114,10 +113,30 @@ def test_a_foreign_client_is_refused(two: DaskWorkers, monkeypatch: pytest.Monke
     with pytest.raises(RunError, match="no Dask scheduler answers"):
         opened(address.replace("tls", "tcp"))
     for other in (distributed.Security.temporary(), distributed.Security(require_encryption=True)):
-        gc.collect()  # refused clients close here, not in the thread of the next one, which would wait for it
         with pytest.raises((OSError, TypeError)):
             distributed.Client(address, security=other, timeout=2.0)
+        gc.collect()  # it closes here, and not in the thread of the next one
     assert two.count == 2
+
+
+def test_a_refused_client_leaves_nothing_to_close(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
+    """Collected in the thread that the next client waits for, an open one would wait for that client."""
+    collected: list[int] = []
+    make_loop = distributed.utils.get_loop_factory
+
+    def collect():
+        collected.append(gc.collect())
+        return make_loop()
+
+    monkeypatch.setattr(distributed.utils, "get_loop_factory", collect)
+    gc.disable()
+    try:
+        for _ in range(2):
+            with pytest.raises(RunError, match=r"no Dask scheduler answers .*TLS"):
+                opened(two.client.scheduler_info()["address"])
+    finally:
+        gc.enable()
+    assert len(collected) == 2
 
 
 @pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json"])

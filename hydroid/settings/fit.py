@@ -55,14 +55,22 @@ class FitSettings(Settings):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, values: Any) -> Any:
-        names = values.get("parameters") if isinstance(values, dict) else None
+    def _named(cls, values: Any, info: ValidationInfo) -> Any:
+        """Read the arm first: joints and links may be given by its names."""
+        if not isinstance(values, dict):
+            return values
+        names = values.get("parameters")
         if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
             raise ValueError("parameter names must be plain words such as K or M1")
-        if not isinstance(names, dict):
-            return values
+        arm = _read_arm(values.get("arm", cls.model_fields["arm"].default), info)
+        known = isinstance(arm, Arm)
+        if known and info.context is not None:
+            info.context["joints"] = arm.joint_names
         compared = values.get("outputs", cls.model_fields["outputs"].default)
-        return {**values, "parameters": expanded(names, compared)}
+        if isinstance(names, dict):
+            among = (arm.joint_names, arm.link_names) if known else ((), ())
+            values = {**values, "parameters": expanded(names, compared, *among)}
+        return {**values, "arm": arm}
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":

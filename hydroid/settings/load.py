@@ -5,7 +5,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from hydroid.errors import SettingsError
 from hydroid.settings.document import Lines, read_document, read_yaml
@@ -62,13 +70,18 @@ def _with_tuples(values: Any) -> Any:
     return tuple(_with_tuples(value) for value in values) if isinstance(values, list) else values
 
 
-def _number_of(key: Any) -> Any:
-    """JSON and `--set` spell the number of a joint as text."""
-    return int(key) if isinstance(key, str) and key.isascii() and key.isdecimal() else key
+def _number_of(key: Any, info: ValidationInfo) -> Any:
+    """Take a joint's name, or its number as text, as JSON and `--set` spell it, for its number from 1."""
+    names = (info.context or {}).get("joints", ())
+    if not isinstance(key, str) or (key.isascii() and key.isdecimal()):
+        return int(key) if isinstance(key, str) else key
+    if key in names:
+        return names.index(key) + 1
+    raise ValueError(f"no joint {key!r}" + (f"; the arm's joints: {', '.join(names)}" if names else ""))
 
 
 JointNumber = Annotated[int, BeforeValidator(_number_of), Field(ge=1)]
-"""of a joint of the arm, from 1"""
+"""of a joint of the arm, from 1; in a file its name will do"""
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 

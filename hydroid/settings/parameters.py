@@ -40,36 +40,41 @@ class Machine(Protocol):
         ...
 
 
-def expanded(parameters: Mapping[str, Any], compared: tuple[int, ...]) -> dict[str, Any]:
-    """Return the settings of parameters, as YAML gives them, with one entry for each joint of `each`.
+def expanded(
+    parameters: Mapping[str, Any], compared: Any, joints: tuple[str, ...] = (), links: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
 
-    `compared` are the joints that `each: true` means. With one of them a mechanical parameter serves all
-    joints, because those that are driven but not compared need it too.
+    `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
+    mechanical parameter serves all joints, because those that are driven but not compared need it too.
 
     Raises:
-        ValueError: a parameter with `joints` and `each`.
+        ValueError: a parameter with `joints` or `link` and `each`.
     """
     result: dict[str, Any] = {}
     for name, entry in parameters.items():
         if not isinstance(entry, dict) or not (each := entry.get("each")):
             result[name] = {**result.get(name, {}), **entry} if isinstance(entry, dict) else entry
             continue
-        if entry.get("joints") is not None:
-            raise ValueError(
-                f"{name}: give joints that share it or each: joints that have their own, not both"
-            )
+        mass = entry.get("quantity") == "mass"
+        if entry.get("link" if mass else "joints") is not None:
+            what = "link or each: links" if mass else "joints that share it or each: joints"
+            raise ValueError(f"{name}: give {what} that have their own, not both")
         shared = {key: value for key, value in entry.items() if key != "each"}
-        joints = compared if each is True else each
-        if not isinstance(joints, list | tuple) or not all(isinstance(j, int) for j in joints):
+        chosen = (links if mass else compared) if each is True else each
+        allowed = str if mass else int | str
+        if not isinstance(chosen, list | tuple) or not all(isinstance(c, allowed) for c in chosen):
             result[name] = entry  # refused as any other wrong value
-        elif len(joints) == 1:
+            continue
+        numbers = [joints.index(c) + 1 if not mass and c in joints else c for c in chosen]
+        if len(numbers) == 1 and not mass:
             everywhere = each is True and entry.get("quantity") in MECHANICAL_UNITS
-            result[name] = shared | ({} if everywhere else {"joints": tuple(joints)})
-        else:
-            for joint in joints:
-                own = f"{name}_{joint}"
-                changes = result.get(own, parameters.get(own, {}))
-                result[own] = {**shared, "joints": (joint,), **changes}
+            result[name] = shared | ({} if everywhere else {"joints": tuple(numbers)})
+            continue
+        for number in numbers:
+            own = f"{name}_{number}"
+            changes = result.get(own, parameters.get(own, {}))
+            result[own] = {**shared, **({"link": number} if mass else {"joints": (number,)}), **changes}
     return result
 
 

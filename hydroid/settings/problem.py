@@ -31,6 +31,7 @@ class ParameterSettings(Settings):
       A_A: {quantity: area_a, joints: [2], within: 2}                  # around the value of the arm's file
       M3:  {quantity: mass, link: link3, nominal: 20, sd: 1}           # weighed
       D:   {quantity: damping, each: true, bounds: [20, 5000]}         # D_2, D_3, ... of compared joints
+      M:   {quantity: mass, each: true, within: 2}                     # M_link1, M_link2, ... of all links
     """
 
     quantity: str
@@ -40,7 +41,8 @@ class ParameterSettings(Settings):
     """joints that share the parameter; null: all"""
     each: bool | tuple[JointNumber, ...] = False
     """joints that have a parameter each, NAME_2, NAME_3, ...; true: those that are compared. With one joint
-    the name stays as it is. Entries under NAME_2 change joint 2's"""
+    the name stays as it is. Entries under NAME_2 change joint 2's. Of a mass: links that have one each,
+    NAME_LINK; true: all links"""
     link: str | None = None
     """link whose mass the parameter is"""
     bounds: tuple[float, float] | None = None

@@ -2,8 +2,10 @@ from pathlib import Path
 
 import pytest
 
+import hydroid
 from hydroid.assets import assets, find_config
 from hydroid.errors import SettingsError
+from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
@@ -150,3 +152,52 @@ def test_yaml_cannot_run_code(tmp_path: Path):
 def test_the_assets_are_where_they_should_be():
     for folder in ("models", "meshes", "configs"):
         assert any((assets() / folder).iterdir())
+
+
+NAMED = """
+arm: ARM
+outputs: [swing, boom]
+parameters:
+  K: {quantity: gain, each: true, nominal: 5, within: 4}
+  D: {quantity: damping, each: [boom, 4], bounds: [1, 10]}
+  S: {quantity: stiffness, joints: [arm], fixed: 0}
+  M: {quantity: mass, each: true, within: 2}
+  m: {quantity: mass, each: [boom], fixed: 5}
+log: {joints: {bucket: null, boom: {command: {column: lift}}}}
+objective: {weights: {boom: 2}}
+design: {joints: [boom]}
+""".replace("ARM", str(Path(__file__).parents[2] / "examples" / "excavator" / "arm.yaml"))
+
+
+def test_joints_and_links_may_be_given_by_name(tmp_path):
+    path = tmp_path / "fit.yaml"
+    path.write_text(NAMED.replace("  m: {quantity: mass, each: [boom], fixed: 5}\n", ""))
+    settings = hydroid.load_settings(path, {"log.joints.arm.angle.column": "q"})
+    assert settings.outputs == (1, 2)
+    assert settings.log.joints[4].command is None
+    assert settings.log.joints[2].command.column == ("lift",)
+    assert settings.log.joints[3].angle.column == "q"
+    assert settings.objective.weights == {2: 2.0}
+    assert settings.design.joints == (2,)
+    joints = {name: p.joints for name, p in settings.parameters.items() if p.link is None}
+    assert joints == {"K_1": (1,), "K_2": (2,), "D_2": (2,), "D_4": (4,), "S": (3,)}
+    masses = [p.link for p in settings.parameters.values() if p.quantity == "mass"]
+    assert masses == list(settings.arm.link_names)
+    assert "M_bucket" in settings.parameters
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[swing, boom]", "[swing, bom]", "line 3: outputs.1: no joint 'bom'; the arm's joints: swing"),
+        ("{bucket: null", "{buckt: null", "no joint 'buckt'"),
+        ("[boom, 4]", "[boom, tip]", "no joint 'tip'; the arm's joints: swing"),
+        ("each: true, within", "each: true, link: boom, within", "give link or each: links .* not both"),
+        ("[boom], fixed", "[bom], fixed", "bom"),
+    ],
+)  # fmt: skip
+def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, message):
+    path = tmp_path / "fit.yaml"
+    path.write_text(NAMED.replace(old, new))
+    with pytest.raises(SettingsError, match=message):
+        Stage(hydroid.load_settings(path))

@@ -26,6 +26,8 @@ class ParameterEstimate(Settings):
     unit: str
     sd: float | None = None
     """standard deviation, in the unit of the value"""
+    sd_by_log: float | None = None
+    """the same from the differences between several logs; null where one log alone determines the value"""
     interval: tuple[float | None, float | None] = (None, None)
     """95 % interval"""
     flag: str | None = None

@@ -12,6 +12,7 @@ from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.problem.problem import Problem
 from hydroid.report import style
+from hydroid.report.by_log_report import by_log_warning
 from hydroid.report.estimates import estimates as draw_estimates
 from hydroid.report.objectives import learning, pareto
 from hydroid.report.page import Page, Plot, Section, log_names
@@ -35,6 +36,7 @@ from hydroid.report.suggestion_report import suggestion_sections
 from hydroid.report.table import Cell, Given, Table, number, numbers_csv, unless_nan
 from hydroid.report.uncertainty_report import determined_section
 from hydroid.suggestion.suggest import Suggestions
+from hydroid.uncertainty.by_log import by_log
 
 INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
 INDICES_NOTE = (
@@ -96,7 +98,8 @@ def fit_page(
     )
     versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
     title = f"Parameters of {problem.settings.arm.name}"
-    warnings, data = fit_warnings(problem, fit), _data(problem, fit)
+    warnings = (*fit_warnings(problem, fit), *by_log_warning(by_log(problem, fit.uncertainty)))
+    data = _data(problem, fit)
     return Page("report", title, fit_summary(fit), sections, warnings, versions, data)
 
 

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report import style
+from hydroid.report.by_log_report import by_log_table, by_log_warning
 from hydroid.report.page import Page, Plot, Section, log_names
 from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
 from hydroid.report.table import Cell, Table, unless_nan
+from hydroid.uncertainty.by_log import by_log
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.directions import Identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE
@@ -73,7 +75,11 @@ def uncertainty_page(study: UncertaintyStudy) -> Page:
     intervals = Section("Intervals", tables={"intervals": interval_table(study)}, plots=plots)
     determined = determined_section(study.problem, study.uncertainty, study.identifiability)
     lead = rank_phrase(study.identifiability)
-    warnings = (*((study.moved,) if study.moved else ()), *profile_warnings(study.profiles))
+    warnings = (
+        *((study.moved,) if study.moved else ()),
+        *profile_warnings(study.profiles),
+        *by_log_warning(by_log(study.problem, study.uncertainty)),
+    )
     return Page("identifiability", "What the logs determine", lead, (intervals, determined), warnings)
 
 
@@ -83,11 +89,17 @@ def determined_section(problem: Problem, uncertainty: Uncertainty, result: Ident
     drawn = partial(correlation, uncertainty, result.names)
     points = direction_phrases(problem, result)
     correlations = Plot("correlation", _CAPTIONS["correlation"], drawn)
+    logs = by_log(problem, uncertainty)
+    several = {} if logs is None else {"by_log": by_log_table(problem, uncertainty, logs)}
     return Section(
         "What the logs do not determine",
         "" if points else "Nothing: every direction in the table is determined.",
         points=points,
-        tables={"directions": direction_table(result), "noise": noise_table(problem, uncertainty)},
+        tables={
+            "directions": direction_table(result),
+            "noise": noise_table(problem, uncertainty),
+            **several,
+        },
         plots=(values, correlations) if np.sum(_correlated(uncertainty)) > 1 else (values,),
     )
 

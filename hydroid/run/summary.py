@@ -5,6 +5,7 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
+from hydroid.uncertainty.by_log import by_log
 from hydroid.uncertainty.covariance import Uncertainty
 
 
@@ -50,11 +51,14 @@ def noise_levels(problem: Problem, uncertainty: Uncertainty) -> dict[str, float]
 
 def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str, ParameterEstimate]:
     """Return each parameter with its uncertainty, by name."""
+    logs = by_log(problem, uncertainty)
+    by_logs = np.full(len(uncertainty.theta), np.nan) if logs is None else logs.relative
     return {
         parameter.name: ParameterEstimate(
             value=float(uncertainty.theta[i]),
             unit=parameter.unit,
             sd=finite(uncertainty.standard_deviation[i]),
+            sd_by_log=finite(by_logs[i] * uncertainty.jacobian.scale[i]),
             interval=(finite(uncertainty.interval[i, 0]), finite(uncertainty.interval[i, 1])),
             flag=status.flag.value,
             source=None if status.source is None else status.source.value,

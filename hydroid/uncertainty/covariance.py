@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 from scipy.stats import norm as normal
 
-from hydroid.parameters import Array, Parameter
+from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
@@ -111,11 +111,7 @@ def uncertainty_from(
     shares = np.ones(len(theta))
     shares[free] = data_shares(derivatives.prior_slopes[free], relative[free] ** 2)
     relative[unidentifiable] = np.inf
-    half, log = widths * relative, problem.parameters.log
-    with np.errstate(over="ignore"):  # inf without an interval
-        factor = np.exp(np.where(log, half, 0.0))
-    change = np.where(log, 0.0, half * derivatives.scale)
-    interval = np.stack([theta / factor - change, theta * factor + change], axis=1)
+    interval = ends(problem.parameters, theta, derivatives.scale, widths * relative)
     status: list[ParameterStatus] = []
     for i, parameter in enumerate(parameters):
         if not free[i]:
@@ -142,6 +138,20 @@ def covariance_of(root: Array) -> tuple[Array, NDArray[np.bool_]]:
     measured = values > RANK_TOLERANCE * values.max(initial=0.0)
     inverse = directions[measured] / values[measured, None]
     return inverse.T @ inverse, np.linalg.norm(directions[~measured], axis=0) > NULL_COMPONENT
+
+
+def ends(parameters: ParameterSet, theta: Array, scale: Array, half: Array) -> Array:
+    """Return intervals, shape (P, 2), from half their widths in relative changes, shape (P,).
+
+    Those on a log scale are multiplicative. No end is below 0 where the parameter cannot be.
+    """
+    log = parameters.log
+    with np.errstate(over="ignore"):  # inf without an interval
+        factor = np.exp(np.where(log, half, 0.0))
+    change = np.where(log, 0.0, half * scale)
+    low = theta / factor - change
+    low = np.where(np.isfinite(low) & (parameters.lower >= 0), np.maximum(low, 0.0), low)
+    return np.stack([low, theta * factor + change], axis=1)
 
 
 def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, NDArray[np.bool_]], ...]:

@@ -75,7 +75,7 @@ def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Fin
                 "(log.repair_s)"
             )
         if signal.kind == "time":
-            hint = "time is a number in log.time.unit (s or ms), not a date or clock time"
+            hint = "time is a number in log.time.unit, or a time of day (12:30:05.25), with or without date"
         yield recording.finding("error", what, hint, rows, signal)
 
 

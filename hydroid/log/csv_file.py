@@ -1,93 +1,126 @@
-"""Bytes -> lines -> header -> numbers: the CSV dialects that loggers and spreadsheets write.
+"""Bytes -> lines -> table: the CSV dialects that loggers and spreadsheets write.
 
-Accepted: `,` `;` tab (and what a first line `sep=;` says), decimal commas where the separator is not a comma,
-comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted cells, blank lines.
+Accepted: `,` `;` tab (and what a first line `sep=;` says), decimal commas where the separator is no comma,
+comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted cells, blank lines, and
+what `hydroid.log.csv_layout` finds: a preamble, several rows of names, a row of units.
 """
 
 import codecs
-import csv
-import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.errors import LogError
+from hydroid.log.clock import clock_seconds, is_clock
+from hydroid.log.csv_layout import Layout, find_layout, is_content, is_number, split
 from hydroid.log.log import Floats
+from hydroid.log.table import Cells
 
 MAX_BYTES = 2**28
 MAX_LINE = 100_000  # characters; also below the csv module's own limit for one cell
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 
 
-@dataclass(frozen=True)
-class CsvFile:
-    """All lines of a file, the line [1-based] of its header, and the names of its columns."""
+@dataclass(frozen=True, eq=False)
+class CsvTable:
+    """All lines of a file and where its table stands in them; a `Table`."""
 
     source: str
     lines: Sequence[str]
-    header: int
-    names: tuple[str, ...]
-    separator: str
+    found: Layout
+    encoding: str
+    place: str = "line"
 
-    def text(self, line: int, column: int) -> str:
+    @property
+    def layout(self) -> str:
+        """The format in a few words."""
+        separator = _SEPARATORS[self.found.separator]
+        return f"CSV in {self.encoding.upper().removesuffix('-SIG')} separated by {separator}"
+
+    @property
+    def header(self) -> int:
+        """Line of the names [1-based]."""
+        return self.found.header
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self.found.names
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units by name, from a row of units."""
+        return self.found.units
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Lines that are left out, and what the others were taken for."""
+        return self.found.remarks
+
+    def text(self, row: int, column: str) -> str:
         """Return the cell of a line [1-based] as it stands in the file."""
-        cells = _split(self.lines[line - 1], self.separator)
-        return cells[column].strip() if column < len(cells) else ""
+        cells, at = split(self.lines[row - 1], self.found.separator), self.names.index(column)
+        return cells[at].strip() if at < len(cells) else ""
+
+    def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
+        """Read columns, as `Table` says."""
+        width, separator = len(self.names), self.found.separator
+        wanted = [self.names.index(name) for name in columns]
+        below = range(self.found.header, len(self.lines))
+        kept = [k for k in below if is_content(self.lines[k], separator) and k + 1 not in self.found.skipped]
+        rows, lines = [self.lines[k] for k in kept], np.array(kept, np.int64) + 1
+        if separator != ",":
+            rows = [row.replace(",", ".") for row in rows]  # decimal commas
+        values = _plain_numbers(rows, wanted, width, separator)
+        if values is not None:
+            return Cells(values, lines, np.zeros(len(lines), bool))
+        parted = [split(row, separator) for row in rows]
+        ragged = np.array([len(c) < width or any(map(str.strip, c[width:])) for c in parted], bool)
+        whole = [[cells[c].strip() for c in wanted] for cells, r in zip(parted, ragged, strict=True) if not r]
+        values = np.full((len(rows), len(columns)), np.nan)
+        clocks = [c for c in range(len(columns)) if any(cells[c] for cells in whole) and _is_clock(whole, c)]
+        for c in range(len(columns)):
+            values[~ragged, c] = (
+                clock_seconds([cells[c] for cells in whole])
+                if c in clocks
+                else [float(cells[c]) if is_number(cells[c]) else np.nan for cells in whole]
+            )
+        remarks = tuple(f"{columns[c]} holds times of day, taken as seconds from the first" for c in clocks)
+        return Cells(values, lines, ragged, frozenset(columns[c] for c in clocks), remarks)
 
 
-def open_csv(path: Path) -> CsvFile:
-    """Read a file and find its header.
+def open_csv(path: Path, wanted: Collection[str] = ()) -> CsvTable:
+    """Read a file and find its table.
+
+    Args:
+        path: the file.
+        wanted: names of columns that the settings ask for; they tell the header from other lines.
 
     Raises:
         LogError: it cannot be read, is not text, or has no header.
     """
     source = str(path)
-    lines = _decode(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text, encoding = _decode(path)
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
     if len(lines[longest]) > MAX_LINE:
         raise LogError(
             f"is longer than {MAX_LINE} characters", where=f"{source}, line {longest + 1}", hint=_IS_CSV
         )
-    declared = re.fullmatch(r"sep=([,;\t|]) *", lines[0])
-    start = 1 if declared else 0
-    content = [*islice((i for i in range(start, len(lines)) if _is_content(lines[i])), 2)]
-    if not content:
+    found = find_layout(lines, wanted)
+    if found is None:
         raise LogError("is empty", where=source, hint=_IS_CSV)
-    head, row = lines[content[0]], lines[content[-1]]
-    separator = declared[1] if declared else _separator(head, row)
-    names = tuple(name.strip() for name in _split(head, separator))
-    header = content[0] + 1
-    if all(_is_number(name.replace(",", ".")) for name in names if name):
+    if all(is_number(name, found.separator) for name in found.names if name):
         hint = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError("has no header: this line holds numbers", where=f"{source}, line {header}", hint=hint)
-    return CsvFile(source, lines, header, names, separator)
+        where = f"{source}, line {found.header}"
+        raise LogError("has no header: this line holds numbers", where=where, hint=hint)
+    return CsvTable(source, lines, found, encoding)
 
 
-def read_cells(file: CsvFile, columns: Sequence[int]) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
-    """Read the numbers of the given columns, shape (R, columns), NaN where a cell holds none.
-
-    Also returns the line [1-based] of each row, and which rows have more or fewer cells than the header.
-    """
-    width, separator = len(file.names), file.separator
-    below = range(file.header, len(file.lines))
-    numbers = [k for k in below if _is_content(file.lines[k], separator)]
-    rows = [file.lines[k] for k in numbers]
-    lines = np.array(numbers, np.int64) + 1
-    if separator != ",":
-        rows = [row.replace(",", ".") for row in rows]  # decimal commas
-    values = _plain_numbers(rows, columns, width, separator)
-    if values is not None:
-        return values, lines, np.zeros(len(lines), bool)
-    values, ragged = np.full((len(rows), len(columns)), np.nan), np.zeros(len(rows), bool)
-    for k, row in enumerate(rows):
-        cells = _split(row, separator)
-        ragged[k] = len(cells) < width or (len(cells) > width and any(map(str.strip, cells[width:])))
-        if not ragged[k]:
-            values[k] = [float(cells[c]) if _is_number(cells[c]) else np.nan for c in columns]
-    return values, lines, ragged
+def _is_clock(rows: Sequence[Sequence[str]], column: int) -> bool:
+    return is_clock(next(cells[column] for cells in rows if cells[column]))
 
 
 def _plain_numbers(rows: Sequence[str], columns: Sequence[int], width: int, separator: str) -> Floats | None:
@@ -103,50 +136,44 @@ def _plain_numbers(rows: Sequence[str], columns: Sequence[int], width: int, sepa
 _IS_CSV = "a log is a CSV file with a header, one row a sample"
 
 
-def _decode(path: Path) -> str:
+def read_start(path: Path, size: int = MAX_BYTES + 1) -> bytes:
+    """Return the first bytes of a file.
+
+    Raises:
+        LogError: it cannot be read.
+    """
     try:
         with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            return file.read(size)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise LogError(f"cannot be read ({reason})", where=str(path)) from None
+
+
+def _decode(path: Path) -> tuple[str, str]:
+    data = read_start(path)
     if len(data) > MAX_BYTES:
         raise LogError(
             f"is larger than {MAX_BYTES >> 20} MiB", where=str(path), hint="cut it into several logs"
         )
-    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
+    for encoding in _encodings(data):
         try:
             text = data.decode(encoding)
         except UnicodeDecodeError:
             continue
         if "\0" not in text:
-            return text
+            return text, encoding
         break
-    raise LogError("is not a text file", where=str(path), hint=_IS_CSV)
+    hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else _IS_CSV
+    raise LogError("is not a text file", where=str(path), hint=hint)
 
 
-def _is_content(line: str, separator: str = ",") -> bool:
-    bare = line.strip(" \t" + separator)
-    return bare != "" and not bare.startswith("#")
-
-
-def _separator(header: str, row: str) -> str:
-    """Choose what parts the header into as many cells as the row below it, or else parts it at all."""
-    parts = {s: len(_split(header, s)) for s in "\t;,"}
-    candidates = [s for s in parts if parts[s] > 1]
-    agreeing = [s for s in candidates if parts[s] == len(_split(row, s))]
-    return [*agreeing, *candidates, ","][0]
-
-
-def _split(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
-
-
-def _is_number(cell: str) -> bool:
-    """True for what float() reads, but for the digit groups of Python's own literals (1_000)."""
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell
+def _encodings(data: bytes) -> tuple[str, ...]:
+    """Encodings to be tried; UTF-16 without a byte order mark has a zero in nearly every other byte."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return ("utf-16",)
+    start = data[:2000]
+    for encoding, zeros in (("utf-16-le", start[1::2]), ("utf-16-be", start[::2])):
+        if len(zeros) > 8 and zeros.count(0) > 0.9 * len(zeros):
+            return (encoding,)
+    return ("utf-8-sig", "latin-1")

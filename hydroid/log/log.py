@@ -104,7 +104,8 @@ class Finding:
     """What is wrong or worth knowing, where, and what to do.
 
     An error: the log cannot be used; a warning: look at it; a note: what the reader did. `line` [1-based] is
-    that of the first place, and `column` its name in the header, where there is one.
+    that of the first place, and `column` its name in the header, where there is one. Binary formats have rows
+    instead of lines (`place`).
     """
 
     level: Level
@@ -113,11 +114,12 @@ class Finding:
     hint: str = ""
     line: int | None = None
     column: str = ""
+    place: str = "line"
 
     @property
     def where(self) -> str:
         """The file, and the line and column where known."""
-        line = f", line {self.line}" if self.line else ""
+        line = f", {self.place} {self.line}" if self.line else ""
         return self.source + line + (f", column {self.column}" if self.column else "")
 
     def error(self) -> LogError:

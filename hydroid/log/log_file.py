@@ -10,9 +10,9 @@ import numpy as np
 from hydroid.errors import LogError
 from hydroid.files import write_atomic
 from hydroid.log.checks import check_recording, sample_period
-from hydroid.log.csv_file import open_csv
 from hydroid.log.delay import delay_findings
 from hydroid.log.log import Finding, Floats, Log, numbered
+from hydroid.log.open_table import open_table
 from hydroid.log.resample import fill, hold, is_on_grid, resample, unwrap
 from hydroid.log.signals import (
     Recording,
@@ -74,11 +74,11 @@ def check_log(
     Returns:
         The log, None if any finding is an error; and all findings, errors first.
     """
+    wanted = map_signals(settings, ranges)
     try:
-        file = open_csv(path)
+        file = open_table(path, [signal.name for signal in wanted], settings.period_s)
     except LogError as error:
         return None, [Finding("error", error.what, error.where, error.hint)]
-    wanted = map_signals(settings, ranges)
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:
         wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in file.names]
@@ -89,7 +89,12 @@ def check_log(
     signals = [signal for signal in wanted if signal.name in file.names]
     log = None
     if signals and signals[0].kind == "time":
-        recording, notes = unwrap(read_recording(file, signals))
+        try:
+            recording, remarks = read_recording(file, signals)
+        except LogError as error:
+            return None, [*findings, Finding("error", error.what, error.where, error.hint)]
+        recording, notes = unwrap(recording)
+        notes += remarks
         if repair:
             recording, repairs = fill(recording, settings.repair_s)
             notes += repairs

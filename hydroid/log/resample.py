@@ -59,7 +59,7 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]
     what += f", {_count(lost, 'row')} without a time left out" if lost else ""
     line = min([*recording.lines[filled.any(axis=1) | added][:1], *first])
     hint = "angles interpolated, commands held"
-    return recording, [Finding("warning", what, recording.file.source, hint, int(line))]
+    return recording, [replace(recording.finding("warning", what, hint), line=int(line))]
 
 
 def _insert(recording: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.log.csv_file import CsvFile, read_cells
 from hydroid.log.log import Finding, Floats, Level
-from hydroid.settings.log import LogSettings
+from hydroid.log.table import Table
+from hydroid.settings.log import SECONDS, LogSettings
 
 _MAX_LISTED = 40  # column names in a message
 _MAX_MISSING = 4  # missing columns in a message
@@ -45,10 +45,10 @@ class Recording:
     """The used columns of one file, R rows of C signals, time first.
 
     Values are in [s], [%], [rad] or [Pa], shape (R, C), NaN where the file holds no number. `lines`, (R,), is
-    the line [1-based] of each row; `ragged`, (R,), marks rows whose number of cells is wrong.
+    the line or row of the file [1-based] of each; `ragged`, (R,), marks rows whose number of cells is wrong.
     """
 
-    file: CsvFile
+    file: Table
     signals: tuple[Signal, ...]
     values: Floats
     lines: NDArray[np.int64]
@@ -69,10 +69,11 @@ class Recording:
     ) -> Finding:
         """Make a finding at the first of `rows` that counts the others."""
         if len(rows) > 1:
-            last = self.lines[rows[-1]]
-            what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to line {last})"
+            last = f"{self.file.place} {self.lines[rows[-1]]}"
+            what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to {last})"
         line = int(self.lines[rows[0]]) if len(rows) else None
-        return Finding(level, what, self.file.source, hint, line, signal.name if signal else "")
+        column = signal.name if signal else ""
+        return Finding(level, what, self.file.source, hint, line, column, self.file.place)
 
     def take(self, rows: NDArray[np.int64]) -> "Recording":
         """Return a copy with these rows, in this order."""
@@ -85,7 +86,7 @@ class Recording:
     def text(self, row: int, column: int) -> str:
         """Return the cell of a row and a signal as it stands in the file."""
         name = self.signals[column].name
-        return self.file.text(int(self.lines[row]), self.file.names.index(name))
+        return self.file.text(int(self.lines[row]), name)
 
     def motions(self, joints: int | None = None) -> tuple[Floats, Floats]:
         """Return command [%] and angle [rad], shapes (R, J): 0 where undriven, NaN where unmeasured."""
@@ -110,7 +111,7 @@ class Recording:
 
 def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
     """Return the signals that the settings ask for, time first; joint ranges [rad], shape (J, 2)."""
-    signals = [Signal(settings.time.column, "time", gain=1e-3 if settings.time.unit == "ms" else 1.0)]
+    signals = [Signal(settings.time.column, "time", gain=SECONDS[settings.time.unit])]
     margin = np.deg2rad(settings.angle_margin_deg)
     for joint in range(1, len(ranges) + 1):
         if command := settings.command_of(joint):
@@ -131,7 +132,7 @@ def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
     return signals
 
 
-def absent_joints(file: CsvFile, wanted: Sequence[Signal], needed: Collection[int]) -> list[int]:
+def absent_joints(file: Table, wanted: Sequence[Signal], needed: Collection[int]) -> list[int]:
     """Return the joints, other than those `needed`, of which the file has no column though it has others'.
 
     A column of a similar name speaks against it: it is rather misspelt.
@@ -141,7 +142,7 @@ def absent_joints(file: CsvFile, wanted: Sequence[Signal], needed: Collection[in
     return sorted({s.joint for s in wanted} - known - {0, *needed}) if known else []
 
 
-def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
+def missing_columns(file: Table, wanted: Sequence[Signal]) -> list[Finding]:
     """Return the columns that are missing or ambiguous."""
     findings: list[Finding] = []
     lacking = [signal for signal in wanted if signal.name not in file.names]
@@ -172,14 +173,22 @@ def missing_columns(file: CsvFile, wanted: Sequence[Signal]) -> list[Finding]:
     return findings
 
 
-def read_recording(file: CsvFile, signals: Sequence[Signal]) -> Recording:
-    """Read the cells of the signals and scale them to SI; a number that is too large counts as none."""
-    cells, lines, ragged = read_cells(file, [file.names.index(signal.name) for signal in signals])
-    gain, offset = (np.array([getattr(c, name) for c in signals]) for name in ("gain", "offset"))
+def read_recording(file: Table, signals: Sequence[Signal]) -> tuple[Recording, list[Finding]]:
+    """Read the cells of the signals and scale them to SI; a number that is too large counts as none.
+
+    Also returns notes on what the reader did.
+
+    Raises:
+        LogError: columns that cannot be read together.
+    """
+    held = {signal.name for signal in signals if signal.kind == "command"}
+    cells = file.read([signal.name for signal in signals], held)
+    gain = np.array([1.0 if signal.name in cells.clocks else signal.gain for signal in signals])
     with np.errstate(all="ignore"):
-        values = cells * gain + offset
+        values = cells.values * gain + np.array([signal.offset for signal in signals])
         values[~(np.abs(values) < 1e100)] = np.nan
-    return Recording(file, tuple(signals), values, lines, ragged)
+    notes = [Finding("note", remark, file.source) for remark in (*file.remarks, *cells.remarks)]
+    return Recording(file, tuple(signals), values, cells.rows, cells.ragged), notes
 
 
 def _hint(name: str, names: Sequence[str]) -> str:

@@ -15,6 +15,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_va
 from hydroid.settings.load import JointNumber, NotNegative, Settings
 
 JOINT = "{joint}"
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0}
+"""in each unit of log.time"""
 
 
 def _as_columns(value: Any) -> Any:
@@ -42,8 +44,8 @@ class TimeColumn(Settings):
 
     column: Name = "time_s"
     """name in the header"""
-    unit: Literal["s", "ms"] = "s"
-    """unit of the cells"""
+    unit: Literal["s", "ms", "us", "ns", "min", "h", "day"] = "s"
+    """unit of the cells; dates and times of day are recognised"""
 
 
 class CommandColumns(Settings):

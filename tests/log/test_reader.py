@@ -112,14 +112,40 @@ def test_time_in_milliseconds_and_from_any_start(tmp_path: Path) -> None:
     np.testing.assert_array_equal(log.angle, plain.angle)
 
 
-def test_clock_times_are_refused_clearly(tmp_path: Path) -> None:
-    def stamp(rows: list[list[str]]) -> None:
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda k: f"2024-05-01T12:00:00.{k:02d}",
+        lambda k: f"2024-05-01 12:00:00.{k:02d}Z",
+        lambda k: f"20240501T12:00:00.{k:02d}+02:00",
+        lambda k: f"01.05.2024 12:00:00.{k:02d}",
+        lambda k: f"5/1/2024 12:00:00.{k:02d} PM",
+        lambda k: f"12:00:00.{k:02d}0000000",
+        lambda k: f"23:59:59.{k + 60:02d}" if k < 40 else f"00:00:00.{k - 40:02d}",
+        lambda k: f"2024-02-29 23:59:59.{k + 60:02d}" if k < 40 else f"2024-03-01 00:00:00.{k - 40:02d}",
+    ],
+)
+def test_dates_and_times_of_day_count_from_the_first(stamp, tmp_path: Path) -> None:
+    def clock(rows: list[list[str]]) -> None:
         for k, row in enumerate(rows[1:]):
-            row[0] = f"2024-05-01T12:00:00.{k:02d}"
+            row[0] = stamp(k)
 
-    fault = faults(edited(tmp_path, stamp))[0]
-    assert (fault.line, fault.column) == (2, "time_s")
-    assert "not a date or clock time" in fault.hint
+    plain, _ = read(edited(tmp_path, lambda rows: None))
+    for unit in ("s", "ms"):  # the unit is that of numbers
+        log, notes = read(edited(tmp_path, clock), LogSettings.model_validate({"time": {"unit": unit}}))
+        assert [f.what for f in notes] == ["time_s holds times of day, taken as seconds from the first"]
+        np.testing.assert_array_equal(log.time, plain.time)
+        np.testing.assert_array_equal(log.angle, plain.angle)
+
+
+def test_a_faulty_time_of_day_is_a_fault_of_its_cell(tmp_path: Path) -> None:
+    def clock(rows: list[list[str]]) -> None:
+        for k, row in enumerate(rows[1:]):
+            row[0] = f"12:00:00.{k:02d}" if k != 7 else "2024-02-31T12:00:00"
+
+    (fault,) = faults(edited(tmp_path, clock))
+    assert (fault.line, fault.column) == (9, "time_s")
+    assert "12:30:05.25" in fault.hint
 
 
 def test_a_missing_column_names_what_there_is_and_the_nearest(tmp_path: Path) -> None:

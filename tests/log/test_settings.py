@@ -70,7 +70,7 @@ def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
         ("command: {column: 3}", "a column's name"),
         ("command: {scale: 0}", "must not be 0"),
         ("angle: {unit: grad}", "'deg' or 'rad'"),
-        ("time: {unit: us}", "'s' or 'ms'"),
+        ("time: {unit: week}", "'h' or 'day'"),
         ("joints: {0: null}", "at least 1"),
         ("joints: {2: u2}", "joints.2"),
         ("joints: {2: {comand: null}}", "comand"),

@@ -1,0 +1,65 @@
+"""Which range the numbers of a command column have: percent, or what amplifiers and joysticks give."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydroid.log.log import Floats
+
+TOLERANCE = 0.03  # of a range: converters overshoot, and joysticks do not rest exactly in the middle
+LEAST_USE = 0.2  # part of a range that a log about its middle uses at least
+RESTING = 0.05  # part of the samples that has the same value, for this to be the value at rest
+SYMMETRIC = {1.0: "±1", 10.0: "±10 V", 100.0: "%", 1000.0: "±1000", 32767.0: "±32767"}
+"""ranges about 0, by their end"""
+RAISED = {
+    "4 to 20 mA": (4.0, 20.0),
+    "0 to 5 V": (0.0, 5.0),
+    "0 to 10 V": (0.0, 10.0),
+    "0 to 1": (0.0, 1.0),
+    "0 to 100": (0.0, 100.0),
+    "0 to 255": (0.0, 255.0),
+    "0 to 1023": (0.0, 1023.0),
+    "0 to 4095": (0.0, 4095.0),
+    "1000 to 2000 µs": (1000.0, 2000.0),
+}
+"""ranges whose middle stands for no command"""
+
+
+@dataclass(frozen=True)
+class CommandRange:
+    """A range by its name, and what brings it to percent: command [%] = scale · cell + offset."""
+
+    name: str
+    scale: float
+    offset: float
+
+
+def likely_range(values: Floats) -> CommandRange | None:
+    """Return the range that fits the cells of one signed command column, shape (R,); None if none does."""
+    values = values[~np.isnan(values)]
+    if not len(values) or not values.any():
+        return None
+    low, high, rest = float(values.min()), float(values.max()), _rest(values)
+    raised = next(_raised(low, high, rest), None) if low >= 0 and rest > 0 else None
+    if raised:
+        return raised
+    largest = max(-low, high)
+    end = next((end for end in SYMMETRIC if largest <= end * (1 + TOLERANCE)), None)
+    return None if end is None else CommandRange(SYMMETRIC[end], 100 / end, 0.0)
+
+
+def _raised(low: float, high: float, rest: float) -> Iterator[CommandRange]:
+    for name, (start, end) in RAISED.items():
+        middle, half = (start + end) / 2, (end - start) / 2
+        slack = 2 * half * TOLERANCE
+        inside = start - slack <= low and high <= end + slack
+        if inside and abs(rest - middle) <= slack and high - low >= LEAST_USE * 2 * half:
+            yield CommandRange(name, 100 / half, -100 * middle / half)
+
+
+def _rest(values: Floats) -> float:
+    """Return the value of a command at rest: the most common one, or else the first."""
+    kinds, counts = np.unique(values, return_counts=True)
+    most = int(counts.argmax())
+    return float(kinds[most] if counts[most] >= RESTING * len(values) else values[0])

@@ -1,0 +1,86 @@
+"""What `guess_columns` makes of tables that nobody has described."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydroid.errors import LogError
+from hydroid.log import ColumnGuess, guess_columns, open_table, read_log
+from hydroid.settings.log import LogSettings
+
+JOINTS = ("swing", "boom", "stick", "bucket")
+T = np.arange(2000) * 0.02
+STEPS = np.repeat(np.random.default_rng(1).choice([-80.0, -40, 0, 0, 40, 80], 40), 50)
+SWEEP = 20 * np.sin(0.4 * T)
+
+
+def guess(folder: Path, names: list[str], *columns: np.ndarray, above: str = "") -> ColumnGuess:
+    path = folder / "log.csv"
+    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=above + ",".join(names), comments="")
+    return guess_columns(open_table(path), JOINTS)
+
+
+def test_the_default_names(tmp_path: Path) -> None:
+    found = guess(tmp_path, ["time_s", "u2_pct", "q2_deg"], T, STEPS, SWEEP)
+    assert found.log["time"] == {"column": "time_s", "unit": "s"}
+    assert found.log["period_s"] == 0.02
+    assert found.log["joints"] == {
+        2: {"command": {"column": "u2_pct"}, "angle": {"column": "q2_deg", "unit": "deg"}}
+    }
+    assert found.unused == ()
+
+
+@pytest.mark.parametrize(
+    ("scale", "offset", "unit", "entry"),
+    [
+        (0.01, 0, "", {"scale": 100.0}),
+        (0.1, 0, "V", {"scale": 10.0}),
+        (10, 0, "", {"scale": 0.1}),
+        (1, 0, "%", {}),
+        (0.08, 12, "mA", {"scale": 12.5, "offset": -150.0}),
+        (0.025, 2.5, "V", {"scale": 40.0, "offset": -100.0}),
+        (0.05, 5, "V", {"scale": 20.0, "offset": -100.0}),
+    ],
+)
+def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: dict, tmp_path: Path) -> None:
+    names = ["Time [ms]", f"boomCmd [{unit}]", "boomAngle"]
+    found = guess(tmp_path, names, 1000 * T, offset + scale * STEPS, np.deg2rad(SWEEP))
+    assert found.log["time"] == {"column": "Time [ms]", "unit": "ms"}
+    mapped = found.log["joints"][2]
+    assert mapped["command"] == {"column": names[1], **entry}
+    assert mapped["angle"] == {"column": "boomAngle", "unit": "rad"}
+    settings = LogSettings.model_validate({**found.log, "angle_margin_deg": 10})
+    log, _ = read_log(tmp_path / "log.csv", settings, np.deg2rad([[-60, 60]] * 4))
+    np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(log.angle[:, 1]), SWEEP, atol=1e-9)
+
+
+def test_columns_without_a_telling_name_are_told_by_how_they_change(tmp_path: Path) -> None:
+    found = guess(tmp_path, ["x", "Kanal1", "Kanal2"], T, STEPS, SWEEP)
+    assert found.log["time"]["column"] == "x"
+    mapped = found.log["joints"]
+    assert (mapped[1]["command"]["column"], mapped[2]["angle"]["column"]) == ("Kanal1", "Kanal2")
+
+
+def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path) -> None:
+    found = guess(tmp_path, ["t", "up", "down", "pot (deg)"], T, STEPS.clip(0), (-STEPS).clip(0), SWEEP)
+    assert found.log["joints"][1]["command"]["column"] == ["up", "down"]
+    assert found.log["joints"][1]["angle"]["column"] == "pot (deg)"
+    assert any("by their order: check" in reason for reason in found.reasons)
+
+
+def test_numbers_from_zero_other_words_for_joints_and_derived_signals(tmp_path: Path) -> None:
+    names = ["stamp", "valve0", "pos0", "valve1", "pos1", "dipper_angle", "vel1_rad", "p1_bar"]
+    found = guess(tmp_path, names, T, STEPS, SWEEP, -STEPS, -SWEEP, SWEEP, SWEEP, SWEEP + 50)
+    mapped = found.log["joints"]
+    assert mapped[1]["command"]["column"] == "valve0"
+    assert mapped[2]["angle"]["column"] == "pos1"
+    assert mapped[3] == {"command": None, "angle": {"column": "dipper_angle", "unit": "deg"}}
+    assert found.unused == ("vel1_rad", "p1_bar")
+    assert any("count from 0" in reason for reason in found.reasons)
+
+
+def test_no_time_is_an_error_that_lists_the_columns(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="the columns are: a, b"):
+        guess(tmp_path, ["a", "b"], STEPS, SWEEP)

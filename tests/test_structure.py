@@ -14,7 +14,7 @@ LAYERS = [
     {"estimate"},
     {"identified"},
     {"log", "arm", "hydraulics"},
-    {"simulation", "search", "parallel"},
+    {"simulation", "search", "parallel", "cad"},
     {"problem"},
     {"plant", "prediction"},
     {"uncertainty"},

@@ -67,7 +67,7 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
     spec.compiler.savecompiled = spec.compiler.savecanonical = False
     body = spec.worldbody.add_body(name="base", pos=arm.base.at)
     if arm.base.mesh is not None:
-        mass_properties(folder / arm.base.mesh)
+        read_mesh(folder / arm.base.mesh)  # it may be open: it is only shown
         _add_mesh(spec, body, arm.base.mesh, "steel")
     for link, joint in zip(arm.links, arm.joints, strict=True):
         child = body.add_body(name=link.name, pos=joint.at)

@@ -104,8 +104,9 @@ meshes: setup
 model: meshes
 	$(BIN)/hydroid build-model
 
-docs: setup  ## the reference of all settings, docs/settings.md
+docs: setup  ## the reference of all settings, and the documentation as pages: build/docs/index.html
 	$(BIN)/python docs/settings_reference.py > docs/settings.md
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 clean:
 	rm -rf .venv runs dist build

@@ -1,4 +1,4 @@
-"""Wall time of a population against workers, and what a chunk costs: the numbers of docs/scaling.md.
+"""Wall time of a population against workers, and what a chunk costs: the numbers of docs/cluster.md.
 
     python benchmarks/scaling.py [--rounds 5]
 

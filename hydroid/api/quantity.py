@@ -21,7 +21,7 @@ class QuantityResult:
     Attributes:
         value: at the estimate, of the shape S that the function returns.
         sd: standard deviation, shape S; infinite where the logs do not determine it.
-        interval: of 95 %, shape (*S, 2).
+        interval: of 95 %, shape (S, 2).
         unit: as given.
     """
 

@@ -65,7 +65,8 @@ def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Fin
         if not len(rows):
             continue
         text = recording.text(rows[0], column)
-        what = f"{text[:30]!r} is not a number" if text else "the cell is empty"
+        empty = "the cell is empty" if recording.file.header else "no value is there"
+        what = f"{text[:30]!r} is not a number" if text else empty
         hint = (
             f"correct the cell, or use --repair, which fills bad cells of up to {longest:g} s (log.repair_s)"
         )

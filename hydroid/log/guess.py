@@ -97,15 +97,20 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
 
 def _columns(table: Table) -> tuple[list[_Column], frozenset[str]]:
     """Read every column of numbers, those of the usual length; also returns which hold times of day."""
+    names = list(dict.fromkeys(name for name in table.names if name))
+    told = {name: kind_of(name, unit_of(name, table.units.get(name, ""))) for name in names}
+    held = {name for name in names if told[name] == "command"}
     read: dict[str, Floats] = {}
     clocks = frozenset[str]()
-    for name in dict.fromkeys(name for name in table.names if name):
+    for group in (names, [name for name in names if told[name] != "other"], *([name] for name in names)):
         try:
-            cells = table.read([name])
+            cells = table.read(group, held)
         except LogError:
-            continue  # text
-        read[name] = cells.values[:, 0]
+            continue  # text, or different lengths or clocks
+        read |= dict(zip(group, cells.values.T, strict=True))
         clocks |= cells.clocks
+        if len(group) > 1:
+            break
     lengths = [len(values) for values in read.values()]
     usual = max(set(lengths), key=lengths.count, default=0)
     columns = list[_Column]()

@@ -1,4 +1,4 @@
-"""One CSV log <-> `Log`: open, map, repair, check, resample; and written so that it reads back the same."""
+"""One log <-> `Log`: open, map, repair, check, resample; and written so that it reads back the same."""
 
 import csv
 import io
@@ -39,7 +39,7 @@ def read_log(
     """Read a log that is to be used.
 
     Args:
-        path: the CSV file.
+        path: the file.
         settings: its columns, units and tolerances.
         ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
         outputs: joints (numbers, from 1) whose angles a fit compares.
@@ -76,7 +76,7 @@ def check_log(
     """
     wanted = map_signals(settings, ranges)
     try:
-        file = open_table(path, [signal.name for signal in wanted], settings.period_s)
+        file = open_table(path, settings, [signal.name for signal in wanted])
     except LogError as error:
         return None, [Finding("error", error.what, error.where, error.hint)]
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)

@@ -159,7 +159,7 @@ def missing_columns(file: Table, wanted: Sequence[Signal]) -> list[Finding]:
             hint += (
                 f"; for a joint that is not in the log set it to null, such as log.joints.{joints[-1]}=null"
             )
-        what = f"the header lacks {names}"
+        what = f"the {'header' if file.header else 'file'} lacks {names}"
         findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
     for name, count in Counter(file.names).items():
         if count > 1 and any(signal.name == name for signal in wanted):

@@ -1,0 +1,160 @@
+"""Binary formats: the same bits as the CSV they were made from, and one clear line for a bad file."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_files import NAMES, cells, faults, lines, read, save
+from log_formats import matlab, write_mat, write_mat73, write_parquet
+
+from hydroid.errors import LogError
+from hydroid.log import Log, open_table
+from hydroid.settings.log import LogSettings
+
+VALUES = cells()
+COLUMNS = {name: VALUES[:, k] for k, name in enumerate(NAMES)}
+WRITERS = {"mat": write_mat, "mat73": write_mat73, "parquet": write_parquet}
+
+
+def same(log: Log, tmp_path: Path) -> None:
+    reference, _ = read(save(tmp_path / "plain.csv", lines(VALUES)))
+    np.testing.assert_array_equal(log.time, reference.time)
+    np.testing.assert_array_equal(log.command, reference.command)
+    np.testing.assert_array_equal(log.angle, reference.angle)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_the_same_bits_as_the_csv(kind: str, tmp_path: Path) -> None:
+    log, findings = read(WRITERS[kind](tmp_path / "log", COLUMNS))
+    assert findings == []
+    same(log, tmp_path)
+
+
+def settings(time: str, command: str, angle: str) -> LogSettings:
+    return LogSettings.model_validate(
+        {"time": {"column": time}, "command": {"column": command}, "angle": {"column": angle}}
+    )
+
+
+MATRIX = settings("t", "u[{joint}]", "q[{joint}]")
+T, U, Q = VALUES[:, 0], VALUES[:, 1:3], VALUES[:, 3:5]
+SIMULINK = {
+    "time": T[:, None],
+    "signals": [{"values": x, "label": label} for x, label in ((U, "u"), (Q, ""))],
+}
+CONTROL_DESK = {
+    "X": {"Name": "time", "Data": T[None], "Unit": "s"},
+    "Y": [
+        {"Name": name, "Data": x[None], "Unit": unit}
+        for name, x, unit in (
+            ("Rig/Valve 1", U[:, 0], "V"),
+            ("Rig/Valve 2", U[:, 1], "V"),
+            ("Rig/Angle 1", Q[:, 0], "deg"),
+            ("Rig/Angle 2", Q[:, 1], "deg"),
+        )
+    ],
+    "Capture": {"Version": "1"},
+}
+STRUCTS = {
+    "matrices": ({"t": T[:, None], "u": U, "q": Q}, MATRIX),
+    "rows": ({"t": T[None], "u": U.T, "q": Q.T}, MATRIX),
+    "struct": (
+        {"rec": {"t": T[:, None], "plant": {"u": U, "q": Q}}},
+        settings("rec.t", "rec.plant.u[{joint}]", "rec.plant.q[{joint}]"),
+    ),
+    "Simulink": ({"log": SIMULINK}, settings("log.time", "log.u[{joint}]", "log.signals[2][{joint}]")),
+    "ControlDesk": ({"rec001": CONTROL_DESK}, settings("time", "Rig/Valve {joint}", "Rig/Angle {joint}")),
+}
+
+
+@pytest.mark.parametrize("kind", STRUCTS)
+def test_structs_of_matlab(kind: str, tmp_path: Path) -> None:
+    from h5py import File
+    from scipy.io import savemat
+
+    variables, mapping = STRUCTS[kind]
+    savemat(tmp_path / "v5.mat", variables)
+    with File(tmp_path / "v73.mat", "w", userblock_size=512) as file:
+        for name, value in variables.items():
+            matlab(file, name, value)
+    for name in ("v5.mat", "v73.mat"):
+        log, findings = read(tmp_path / name, mapping)
+        assert findings == []
+        same(log, tmp_path)
+
+
+def test_timestamps_and_null_in_parquet(tmp_path: Path) -> None:
+    import pyarrow
+
+    stamps = pyarrow.array(
+        (1e9 * T).round().astype(np.int64) + 1_700_000_000 * 10**9, pyarrow.timestamp("ns", "UTC")
+    )
+    log, findings = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
+    assert findings == []
+    same(log, tmp_path)
+    gone = pyarrow.array([None, *COLUMNS["u1_pct"][1:]])
+    (fault,) = faults(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "u1_pct": gone}))
+    assert (fault.place, fault.line, fault.column) == ("row", 1, "u1_pct")
+    assert fault.what == "no value is there"
+
+
+def test_a_faulty_value_has_its_row(tmp_path: Path) -> None:
+    angle = COLUMNS["q1_deg"].copy()
+    angle[40] = 120
+    (fault,) = faults(write_mat(tmp_path / "log.mat", {**COLUMNS, "q1_deg": angle}))
+    assert "log.mat, row 41, column q1_deg: angle of joint 1 is 120 deg" in str(fault)
+
+
+def truncated(path: Path) -> Path:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    return path
+
+
+def workbook(folder: Path) -> Path:
+    (folder / "a.xlsx").write_bytes(b"PK\3\4\0\0")
+    return folder / "a.xlsx"
+
+
+MATLAB = "cannot be read as a MATLAB file"
+BAD = {
+    "truncated mat": (lambda p: truncated(write_mat(p / "log.mat", COLUMNS)), MATLAB),
+    "truncated v7.3": (lambda p: truncated(write_mat73(p / "log.mat", COLUMNS)), MATLAB),
+    "truncated parquet": (lambda p: truncated(write_parquet(p / "a", COLUMNS)), "cannot be read as Parquet"),
+    "text for .mat": (lambda p: save(p / "log.mat", lines(VALUES)), MATLAB),
+    "empty mat": (lambda p: write_mat(p / "log.mat", {"note": np.array("x")}), "holds no array of numbers"),
+    "text in parquet": (
+        lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": ["up"] * 80}),
+        "column u1_pct: holds text, such as 'up'",
+    ),
+    "other length": (
+        lambda p: write_mat(p / "log.mat", {**COLUMNS, "q2_deg": T[:40]}),
+        "column q2_deg: holds 40 values, but column time_s holds 80",
+    ),
+    "missing": (
+        lambda p: write_mat(p / "log.mat", {k: v for k, v in COLUMNS.items() if k != "q2_deg"}),
+        "the file lacks 'q2_deg'",
+    ),
+    "workbook": (workbook, "save the sheet as CSV"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_bad_file_is_refused_in_one_line(kind: str, tmp_path: Path) -> None:
+    make, said = BAD[kind]
+    (fault,) = faults(make(tmp_path))
+    assert said in str(fault)
+    assert str(fault).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("kind", "package", "extra"), [("mat73", "h5py", "mat"), ("parquet", "pyarrow", "parquet")]
+)
+def test_a_missing_package_names_its_extra(
+    kind: str, package: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = WRITERS[kind](tmp_path / "log", COLUMNS)
+    for name in [name for name in sys.modules if name.partition(".")[0] == package]:
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(LogError, match=rf"needs the package {package}.*pip install 'hydroid\[{extra}\]'"):
+        open_table(path)

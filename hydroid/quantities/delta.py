@@ -24,6 +24,8 @@ from hydroid.uncertainty.jacobian import slopes_of
 
 STEP = 1e-3
 """relative step of the differences: it averages the small jumps that events between two samples make"""
+GIVEN_BELOW = 1e-3
+"""relative change per relative change of any free parameter, below which the settings give a quantity"""
 _NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
 
 
@@ -126,7 +128,7 @@ class Precision:
         sd[lost] = np.inf
         interval[np.isposinf(sd)] = -np.inf, np.inf
         interval[np.isposinf(sd) & positive] = 0.0, np.inf
-        return Known(value, sd, interval, np.all(slopes == 0, axis=0))
+        return Known(value, sd, interval, np.all(abs(slopes) <= GIVEN_BELOW * abs(value), axis=0))
 
 
 def precision(parameters: ParameterSet, uncertainty: Uncertainty) -> Precision:

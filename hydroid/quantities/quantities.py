@@ -33,12 +33,12 @@ class Quantities:
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
-    """Return the quantities of every joint that a log drives or that is compared, at a fit's estimate."""
+    """Return the quantities of every compared joint at a fit's estimate."""
     known = precision(problem.parameters, uncertainty)
     estimate = problem.stage.candidates(uncertainty.theta[None])
     scalars: dict[str, QuantityEstimate] = {}
     curves: dict[str, CurveEstimate] = {}
-    for joint in problem.active_joints:
+    for joint in problem.settings.outputs:
         bench = make_bench(problem.settings, problem.logs, joint)
         measure = joint_measure(bench, estimate)
         columns = [column for column, _ in measure(estimate)]

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from hydroid.api.stages import collect as collect
     from hydroid.api.stages import fit_hyd as fit_hyd
     from hydroid.api.stages import fit_mech as fit_mech
+    from hydroid.api.start import init as init
     from hydroid.api.study import Study as Study
     from hydroid.errors import HydroidError as HydroidError
     from hydroid.identified import IdentifiedModel as IdentifiedModel
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from hydroid.parallel.cluster import open_workers as open_workers
     from hydroid.plant import Plant as Plant
     from hydroid.plant import load_plant as load_plant
+    from hydroid.project import Project as Project
 
 __version__ = "0.1.0"
 
@@ -61,12 +63,14 @@ _NAMES = {
     "hydroid.api.model": "build_model simulate",
     "hydroid.api.plan": "design suggest",
     "hydroid.api.quantity": "QuantityResult quantity",
+    "hydroid.api.start": "init",
     "hydroid.api.study": "Study",
     "hydroid.errors": "HydroidError",
     "hydroid.identified": "IdentifiedModel identified load_identified start_values",
     "hydroid.log": "Log write_log",
     "hydroid.parallel.cluster": "open_workers",
     "hydroid.plant": "Plant load_plant",
+    "hydroid.project": "Project",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

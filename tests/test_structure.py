@@ -23,6 +23,7 @@ LAYERS = [
     {"suggestion"},
     {"run"},
     {"report"},
+    {"project"},
     {"viewer"},
     {"api"},
     {"cli"},

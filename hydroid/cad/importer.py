@@ -155,7 +155,7 @@ class _Posed:
         joint, model = self.chain.joints[k], self.model
         before = self.data.xanchor[self.chain.joints[k - 1]] if k else np.zeros(3)
         name = _word(model.joint(joint).name or f"{model.body(self.chain.bodies[k]).name}_joint")
-        low, high = np.degrees(model.jnt_range[joint]).round(6).tolist()
+        low, high = np.degrees(model.jnt_range[joint]).round(4).tolist()
         limited = bool(model.jnt_limited[joint]) and low < high
         if not limited:
             self.source.notes.append(

@@ -8,7 +8,9 @@ import numpy as np
 import trimesh
 
 from hydroid.arm.mesh import LARGEST_LINK
+from hydroid.arm.model import mujoco_errors
 from hydroid.cad.imported import Array
+from hydroid.errors import ModelError
 
 DENSITY = 1000.0
 """of a body without a mass [kg/m³], MuJoCo's; steel links are hollow"""
@@ -112,3 +114,26 @@ def ball(mass: float) -> Array:
     """Return the inertia of a steel ball about its centre [kg·m²], shape (3, 3)."""
     radius = (mass / STEEL / (4 / 3 * np.pi)) ** (1 / 3)
     return 0.4 * mass * radius**2 * np.eye(3)
+
+
+def showable(mesh: trimesh.Trimesh, name: str, notes: list[str]) -> trimesh.Trimesh | None:
+    """Return the mesh if MuJoCo can show it, or else its hull, with a note; None: neither."""
+    for candidate, what in ((mesh, "its hull is shown"), (mesh.convex_hull, "it is not shown")):
+        spec = mujoco.MjSpec()
+        spec.assets = {"a.stl": stl(candidate)}
+        spec.add_mesh(name="a", file="a.stl")
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="a", mass=0)
+        try:
+            with mujoco_errors(f"mesh of {name}"):
+                spec.compile()
+            return candidate
+        except ModelError as error:
+            notes.append(f"{error}: {what}")
+    return None
+
+
+def stl(mesh: trimesh.Trimesh) -> bytes:
+    """Return a mesh as binary STL."""
+    content = mesh.export(file_type="stl")
+    assert isinstance(content, bytes)
+    return content

@@ -9,11 +9,12 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from hydroid.cli import fit, judge, look, model, options, plan, stopping
+from hydroid.cli import fit, judge, look, model, options, plan, start, stopping
 
 STOPPED = 130
 """exit status of a command that Ctrl-C or a signal stopped, as in shells"""
 GROUPS = {
+    "start": "Start with your own arm and log",
     "look": "Look at logs, at the arm and at its actuators",
     "fit": "Fit parameters to logs",
     "judge": "Judge a fit",
@@ -48,6 +49,7 @@ app = typer.Typer(
 
 
 COMMANDS = (
+    ("start", start.init, "write a project from an arm's CAD and a log", "mine --arm robot.urdf --log a.csv"),
     ("look", look.check, "find faults in logs", "LOG.csv"),
     ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
     ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),

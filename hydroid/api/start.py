@@ -1,0 +1,43 @@
+"""Start with your own arm and log: `init` writes a project."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hydroid.errors import SettingsError
+from hydroid.files import is_file
+
+if TYPE_CHECKING:
+    from hydroid.project import Project
+
+
+def init(
+    folder: str | Path,
+    arm: str | Path | None = None,
+    logs: Sequence[str | Path] = (),
+    *,
+    tip: str | None = None,
+) -> "Project":
+    """Write a project that runs: arm file, model, settings of both stages, a picture of the arm, next steps.
+
+        project = hydroid.init("mine", "robot.urdf", ["a.csv", "b.csv"])
+        print(*project.notes, *project.columns, *project.commands, sep="\\n")
+
+    Args:
+        folder: where; what is there is not overwritten.
+        arm: its URDF or MJCF; None: a template of boxes to be filled in.
+        logs: the columns are guessed from the first. Of several, the next steps keep the last to validate on.
+        tip: name of the link at which the arm ends, where the file's joints branch; None: the branch that the
+            log names, or the longest.
+
+    Raises:
+        SettingsError: a file of the project is there already.
+        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot.
+        RunError: the folder cannot be written.
+    """
+    for path in (*logs, *([] if arm is None else [arm])):
+        if not is_file(Path(path)):
+            raise SettingsError("no such file", where=str(path))
+    from hydroid.project import write_project
+
+    return write_project(Path(folder), None if arm is None else Path(arm), [Path(log) for log in logs], tip)

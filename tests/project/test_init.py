@@ -1,0 +1,198 @@
+"""A project out of an arm's CAD and a log: it runs, says what it assumed, and overwrites nothing."""
+
+import json
+import shutil
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+from machine import write_log
+from robots import link, write_robot
+from typer.testing import CliRunner
+
+import hydroid
+from hydroid.cli.app import app
+from hydroid.errors import LogError, ModelError, SettingsError
+from hydroid.settings.arm import load_arm
+
+QUICK = {
+    "search.multistart": {"starts": 1, "iterations": 1, "horizons": []},
+    "refinement": {"iterations": 1},
+}
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a URDF, three logs of a machine like it, and a project `mine` of all."""
+    folder = tmp_path_factory.mktemp("lab")
+    robot = write_robot(folder)
+    hydroid.init(folder / "machine", robot)
+    for seed in range(3):
+        write_log(folder / "machine", folder / f"move_{seed}.csv", seed, seconds=8.0)
+    hydroid.init(folder / "mine", robot, sorted(folder.glob("move_*.csv")))
+    return folder
+
+
+def test_the_model_has_the_files_masses_and_inertias(place: Path):
+    arm = load_arm(place / "mine" / "arm.yaml")
+    built = mujoco.MjSpec.from_file(str(place / "mine" / "arm.xml")).compile()
+    assert arm.link_names == ("house", "boom", "stick")
+    np.testing.assert_allclose([built.body(name).mass[0] for name in arm.link_names], [800, 200, 90])
+    square = np.array([2.0, 0.2, 0.3]) ** 2
+    expected = np.sort((square.sum() - square) * 200 / 12)
+    np.testing.assert_allclose(np.sort(built.body("boom").inertia), expected, rtol=1e-6)
+    assert [mesh.name for mesh in sorted((place / "mine" / "links").iterdir())] == [
+        "base.stl", "boom.stl", "house.stl", "stick.stl",
+    ]  # fmt: skip
+
+
+def test_columns_units_and_scales_are_those_of_the_log(place: Path):
+    settings = hydroid.load_settings(place / "mine" / "fit-hyd.yaml")
+    assert settings.outputs == (1, 2, 3)
+    assert settings.log.command_of(2).column == ("valve_boom_joint_V",)
+    assert settings.log.command_of(2).scale == 10
+    assert settings.log.angle_of(3).unit == "rad"
+    assert settings.log.time.unit == "ms"
+    page = (place / "mine" / "fit-mech.yaml").read_text()
+    assert "# - valve_boom_joint_V: command in ±10 V of joint 2 (boom_joint), by its unit" in page
+
+
+def test_both_stages_start_near_the_log(place: Path):
+    """Valves sized by the arm's weight and the log's speeds are within a factor of 2.5 of the truth's."""
+    first = hydroid.load_settings(place / "machine" / "fit-hyd.yaml").parameters
+    second = hydroid.load_settings(place / "mine" / "fit-hyd.yaml")
+    assert set(first) == set(second.parameters)
+    openings = [joint.actuator.max_opening for joint in second.arm.joints]
+    true = [joint.actuator.max_opening for joint in load_arm(place / "machine" / "arm.yaml").joints]
+    assert np.all(np.abs(np.log(np.array(openings) / true)) < np.log(2.5))
+
+
+def test_both_stages_and_what_follows_run(place: Path, tmp_path: Path):
+    logs = sorted(place.glob("move_*.csv"))[:1]
+    mech = hydroid.fit_mech(logs, tmp_path / "mech", config=place / "mine" / "fit-mech.yaml", overrides=QUICK)
+    hyd = hydroid.fit_hyd(
+        logs, tmp_path / "hyd", mech=mech.out, config=place / "mine" / "fit-hyd.yaml", overrides=QUICK
+    )
+    values = hyd.results[0].model.values
+    assert values["M_boom"] == pytest.approx(mech.results[0].model.values["M_boom"])
+    assert hydroid.plot_actuator(hyd.out, 3, tmp_path / "actuator")
+    hydroid.simulate(hyd.out, logs[0], tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_text().startswith("t_ms,")
+    plant = hydroid.load_plant(hyd.out)
+    assert plant.step(np.array([50.0, 0, 0])).shape == (3,)
+
+
+@pytest.mark.slow
+def test_from_cad_and_log_to_a_validated_fit(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Every command of the next steps, as they stand; the last log was not fitted."""
+    monkeypatch.chdir(place)
+    shutil.rmtree("mine")
+    command = ["init", "mine", "--arm", "digger/urdf/digger.urdf", "--json"]
+    for name in sorted(Path().glob("move_*.csv")):
+        command += ["--log", str(name)]
+    done = CliRunner().invoke(app, command)
+    steps = json.loads(done.stdout)["commands"]
+    assert [step.split()[1] for step in steps] == ["check", "fit-mech", "fit-hyd", "validate", "suggest"]
+    for step in steps[:4]:
+        done = CliRunner().invoke(app, [*step.split()[1:], "--json"])
+        assert done.exit_code == 0, done.output
+    results = json.loads(done.stdout)["results"]
+    errors = [result["mae_deg"] for result in results if result["fit"] == "hyd"]
+    assert len(errors) == 3
+    assert max(errors) < 0.5
+
+
+def test_nothing_is_overwritten(place: Path):
+    before = {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
+    with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder"):
+        hydroid.init(place / "mine")
+    assert before == {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
+    assert {path.name for path in place.iterdir()} == {"digger", "machine", "mine"} | {
+        f"move_{k}.csv" for k in range(3)
+    }
+
+
+def test_a_folder_with_other_things_in_it_will_do(tmp_path: Path):
+    robot = write_robot(tmp_path)
+    project = hydroid.init(tmp_path / "digger", robot)
+    assert (tmp_path / "digger" / "arm.yaml").is_file()
+    assert (tmp_path / "digger" / "meshes" / "boom.stl").is_file()
+    assert set(project.files) >= {"arm.yaml", "arm.xml", "arm.png", "fit-mech.yaml", "fit-hyd.yaml", "links"}
+
+
+def test_an_error_leaves_nothing_behind(tmp_path: Path):
+    robot, log = write_robot(tmp_path), tmp_path / "log.csv"
+    log.write_text("name,colour\nboom,red\nstick,blue\n")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(LogError, match="no column that looks like a time"):
+        hydroid.init(tmp_path / "new" / "mine", robot, [log])
+    robot.write_text(robot.read_text().replace("</robot>", ""))
+    with pytest.raises(ModelError, match="cannot be read as XML"):
+        hydroid.init(tmp_path / "new" / "mine", robot)
+    with pytest.raises(SettingsError, match="no such file"):
+        hydroid.init(tmp_path / "new" / "mine", tmp_path / "none.urdf")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
+    hydroid.init(tmp_path / "mine")
+    arm = load_arm(tmp_path / "mine" / "arm.yaml")
+    assert [joint.actuator.kind for joint in arm.joints] == ["linear", "linear"]
+    assert arm.joints[0].actuator.sense == 1
+    assert arm.joints[1].actuator.sense == -1  # its cylinder pushes the stick down
+    write_log(tmp_path / "mine", tmp_path / "a.csv", seconds=3.0)
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit-hyd.yaml")
+    assert {"area_A_boom", "area_B_boom", "open_A_1"} <= set(settings.parameters)
+    assert hydroid.build_model(tmp_path / "mine" / "arm.yaml").name == "arm.xml"
+
+
+def changed_log(place: Path, tmp_path: Path, change) -> Path:
+    """The first log with its numbers changed."""
+    lines = (place / "move_0.csv").read_text().splitlines()
+    values = np.array([[float(cell) for cell in line.split(";")] for line in lines[1:]])
+    path = tmp_path / "changed.csv"
+    np.savetxt(path, change(values), fmt="%.6g", delimiter=";", header=lines[0], comments="")
+    return path
+
+
+def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_path: Path):
+    log = changed_log(place, tmp_path, lambda v: v * [1, 1, -1, 1, 1, 1, 1])
+    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit-mech.yaml")
+    assert [settings.log.command_of(j).scale for j in (1, 2, 3)] == [10, -10, 10]
+    (line,) = [line for line in project.columns if "turned round" in line]
+    assert line == "boom_joint moves against its command: the sign of the command is turned round"
+
+
+def test_angles_outside_the_arms_range_are_said(place: Path, tmp_path: Path):
+    log = changed_log(place, tmp_path, lambda v: v + np.array([0, 0, 0, 0, 0, 2.0, 0]))
+    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    (line,) = [
+        line for line in project.columns if line.startswith("boom_joint: the angles in the log run from")
+    ]
+    assert "but the arm's file allows -28.6479 to 68.7549: give the angle an offset" in line
+
+
+def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
+    lines = (place / "move_0.csv").read_text().replace("valve_stick_joint_V", "torque").splitlines()
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit-mech.yaml")
+    assert project.unused == ("torque",)
+    assert settings.outputs == (1, 2)
+    assert settings.simulation.other_joints == "measured"
+
+
+def test_the_command_prints_what_it_assumed_and_what_is_next(place: Path, tmp_path: Path):
+    robot = write_robot(tmp_path, boom=link("boom", ixx=0, iyy=0, izz=0))
+    done = CliRunner().invoke(app, ["init", str(tmp_path / "mine"), "--arm", str(robot)])
+    assert done.exit_code == 0
+    assert (
+        "  link boom: its inertia is 0; the inertia of its mesh at uniform density is taken\n" in done.output
+    )
+    assert f"  hydroid fit-mech LOG.csv --config {tmp_path}/mine/fit-mech.yaml" in done.output
+    page = (tmp_path / "mine" / "next-steps.md").read_text()
+    assert "- link boom: its inertia is 0" in page
+    assert yaml.safe_load((tmp_path / "mine" / "arm.yaml").read_text())["name"] == "digger"

@@ -18,7 +18,7 @@ from hydroid.hydraulics.cylinder import (
 )
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import coil_current, plunger_step, plunger_weight, side_voltage
+from hydroid.hydraulics.solenoid import coil_current, drag_of, plunger_step, plunger_weight, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 
 
@@ -72,12 +72,12 @@ def command(c: Any, w: Any, recent: Any, period: float, substeps: int) -> None:
     w.fresh_a = (c.delay_a / period - late) * substeps
     place = recent.size - 1 - int(late)
     w.new_a, w.old_a = drive_a(c, recent[place]), drive_a(c, recent[place - 1])
-    w.plunger_weight_a = plunger_weight(c.plunger_damping_a, step, c)
+    w.plunger_weight_a = plunger_weight(c.plunger_damping_a * max(c.plunger_back_a, 1.0), step, c)
     late = np.floor(c.delay_b / period)
     w.fresh_b = (c.delay_b / period - late) * substeps
     place = recent.size - 1 - int(late)
     w.new_b, w.old_b = drive_b(c, recent[place]), drive_b(c, recent[place - 1])
-    w.plunger_weight_b = plunger_weight(c.plunger_damping_b, step, c)
+    w.plunger_weight_b = plunger_weight(c.plunger_damping_b * max(c.plunger_back_b, 1.0), step, c)
 
 
 @compilable
@@ -88,8 +88,10 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
     pull_a, pull_b = w.old_a + part_a * (w.new_a - w.old_a), w.old_b + part_b * (w.new_b - w.old_b)
     before = spool(z.stroke_a, z.stroke_b)
     a, b = (z.stroke_a, z.speed_a), (z.stroke_b, z.speed_b)
-    z.stroke_a, z.speed_a = plunger_step(a, pull_a, c.plunger_damping_a, step, w.plunger_weight_a, c)
-    z.stroke_b, z.speed_b = plunger_step(b, pull_b, c.plunger_damping_b, step, w.plunger_weight_b, c)
+    drag_a = drag_of(c.plunger_damping_a, c.plunger_back_a, pull_a, z.stroke_a, c)
+    drag_b = drag_of(c.plunger_damping_b, c.plunger_back_b, pull_b, z.stroke_b, c)
+    z.stroke_a, z.speed_a = plunger_step(a, pull_a, drag_a, step, w.plunger_weight_a, c)
+    z.stroke_b, z.speed_b = plunger_step(b, pull_b, drag_b, step, w.plunger_weight_b, c)
     return 0.5 * (before + spool(z.stroke_a, z.stroke_b))
 
 

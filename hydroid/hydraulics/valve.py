@@ -10,6 +10,10 @@ The article leaves A(x) open. Ours: A_max min((|x| − overlap)/w, 1)^n, each di
 overlap, w and n, plus a leakage area on all four edges. With a flow limit, the pump gives no more than that
 to this actuator; with a check valve (`hydroid.hydraulics.pump`) no oil runs back to it.
 
+A spool is cut with notches, so its opening is no one power of the travel. Four factors, `notch_1` to
+`notch_4`, change the slope of the power law where it is below 4, 10, 25 and 50 % of full: a monotone curve of
+five parts, which still ends at A_max.
+
 The article's edges open alike. A real spool's do not: `return_a` and `return_b` are the openings of A→T and
 B→T as multiples of those of P→B and P→A. So a load that is lowered can be held by the oil that leaves, while
 the other chamber fills from the tank through an anti-cavitation check valve.
@@ -21,11 +25,32 @@ import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, power, select
 
+NOTCHES = (0.04, 0.1, 0.25, 0.5)
+"""parts of the full opening where the notches of a valve's curve end; ours"""
+
 
 @compilable
 def spool(stroke_a: Any, stroke_b: Any) -> Any:
     """Spool displacement x [m], equation (6), from the plungers' strokes [m]."""
     return stroke_a - stroke_b
+
+
+@compilable
+def notched(share: Any, steepness: Any) -> Any:
+    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
+
+    `steepness` are the factors of the four parts below 4, 10, 25 and 50 %. Where all are 1, the result is the
+    power law's, to the bit.
+    """
+    first, second, third, fourth = steepness
+    low, middle, high, half = NOTCHES
+    more = (first - 1.0) * np.minimum(share, low)
+    more = more + (second - 1.0) * np.minimum(np.maximum(share - low, 0.0), middle - low)
+    more = more + (third - 1.0) * np.minimum(np.maximum(share - middle, 0.0), high - middle)
+    more = more + (fourth - 1.0) * np.minimum(np.maximum(share - high, 0.0), half - high)
+    whole = (first - 1.0) * low + (second - 1.0) * (middle - low)
+    whole = whole + (third - 1.0) * (high - middle) + (fourth - 1.0) * (half - high)
+    return (share + more) / (1.0 + whole)
 
 
 @compilable
@@ -36,7 +61,14 @@ def opening(spool: Any, c: Any) -> Any:
     slot = select(towards_a, c.slot_width_a, c.slot_width_b)
     fraction = np.minimum(np.maximum(beyond, 0.0) / slot, 1.0)
     exponent = select(towards_a, c.opening_exponent_a, c.opening_exponent_b)
-    return select(towards_a, c.opening_a, c.opening_b) * power(fraction, exponent)
+    share = power(fraction, exponent)
+    steepness = (
+        select(towards_a, c.notch_1_a, c.notch_1_b),
+        select(towards_a, c.notch_2_a, c.notch_2_b),
+        select(towards_a, c.notch_3_a, c.notch_3_b),
+        select(towards_a, c.notch_4_a, c.notch_4_b),
+    )
+    return select(towards_a, c.opening_a, c.opening_b) * notched(share, steepness)
 
 
 def conductance(flow_coefficient: Any, density: Any) -> Any:

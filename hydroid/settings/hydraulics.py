@@ -97,6 +97,10 @@ class HydraulicSettings(Settings):
         20.0, "N·s/m", "λ of equation (5), coil A; the spool lags behind its coil by at most λ/K, here 10 ms"
     )
     plunger_damping_b: NotNegative = _quantity(20.0, "N·s/m", "the same of coil B")
+    plunger_back_a: Positive = _quantity(
+        1.0, "", "damping of coil A's plunger on its way back, as a multiple of that on its way out"
+    )
+    plunger_back_b: Positive = _quantity(1.0, "", "the same of coil B")
     plunger_stiffness: Positive = _quantity(2.0, "N/mm", "K of equation (5)")
     slot_width_a: Positive = _quantity(
         2.0, "mm", "w of equation (7): spool travel from first to full opening, towards A"
@@ -110,6 +114,19 @@ class HydraulicSettings(Settings):
         "1: opening proportional to spool travel; above 1: it grows faster towards the end; towards A",
     )
     opening_exponent_b: Positive = _quantity(1.0, "", "the same towards B")
+    notch_1_a: Positive = _quantity(
+        1.0,
+        "",
+        "slope of the opening, as a multiple of what the exponent says, where that is 0 to 4 % of full; "
+        "towards A",
+    )
+    notch_1_b: Positive = _quantity(1.0, "", "the same towards B")
+    notch_2_a: Positive = _quantity(1.0, "", "the same from 4 to 10 %, towards A")
+    notch_2_b: Positive = _quantity(1.0, "", "the same towards B")
+    notch_3_a: Positive = _quantity(1.0, "", "the same from 10 to 25 %, towards A")
+    notch_3_b: Positive = _quantity(1.0, "", "the same towards B")
+    notch_4_a: Positive = _quantity(1.0, "", "the same from 25 to 50 %, towards A; 1 beyond")
+    notch_4_b: Positive = _quantity(1.0, "", "the same towards B")
     return_a: Positive = _quantity(
         1.0, "", "opening of edge A→T as a multiple of edge P→B's; both open for a motion towards B"
     )

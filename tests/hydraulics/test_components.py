@@ -24,7 +24,7 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import conductance, opening, port_flow, root
+from hydroid.hydraulics.valve import conductance, notched, opening, port_flow, root
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
 
@@ -120,12 +120,24 @@ def test_opening_has_overlap_slope_and_ceiling_a_side():
     spool = np.array([-3e-3, -1e-3, -0.1e-3, 0.0, 0.3e-3, 1.5e-3, 3e-3])
     valve = {"opening_a": 4e-7, "slot_width_a": 2e-3, "overlap_a": 0.5e-3, "opening_exponent_a": 1.0}
     line = {"opening_b": 2e-7, "slot_width_b": 2e-3, "overlap_b": 0.2e-3, "opening_exponent_b": 1.0}
+    line |= {f"notch_{k}_{side}": 1.0 for k in (1, 2, 3, 4) for side in "ab"}
     area = opening(spool, SimpleNamespace(**valve, **line))
     np.testing.assert_allclose(area, [2e-7, 0.8e-7, 0, 0, 0, 2e-7, 4e-7], atol=1e-20)
     curved = opening(
         spool, SimpleNamespace(**valve | {"opening_exponent_a": 2.0}, **line | {"slot_width_b": 1e-3})
     )
     np.testing.assert_allclose(curved[[1, 5]], [1.6e-7, 1e-7])
+
+
+def test_notches_bend_the_opening_between_its_ends():
+    share = np.linspace(0.0, 1.0, 1001)
+    assert np.array_equal(notched(share, (1.0, 1.0, 1.0, 1.0)), share)
+    bent = notched(share, (0.2, 3.0, 0.5, 2.0))
+    assert bent[[0, -1]] == pytest.approx([0.0, 1.0])
+    slope = np.diff(bent) / np.diff(share)
+    assert (slope > 0).all()
+    middles = np.searchsorted(share, [0.02, 0.07, 0.2, 0.4])  # one in each part
+    np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
 
 
 def test_flow_law_is_the_orifice_law_away_from_zero_and_smooth_through_it():

@@ -85,3 +85,18 @@ def test_a_valve_that_differs_by_side_is_recovered():
     start = {"t_A": 0.1, "t_B": 0.1, "lag_A": 100.0, "lag_B": 100.0, "n_A": 1.5, "n_B": 1.5}
     start |= {"dead_A": 12.0, "dead_B": 12.0}
     assert_recovered(recover(settings, [log], truth, start), settings, truth)
+
+
+def test_notches_and_a_slow_return_are_recovered():
+    """A valve curve of five parts towards A, and a plunger that returns slower, from one log of duties."""
+    truth = {"notch_1": 0.5, "notch_2": 2.0, "notch_3": 0.6, "notch_4": 1.5, "lag": 100.0, "back": 2.5}
+    parameters: dict[str, dict[str, object]] = {
+        name: {"quantity": f"{name}_a", "joints": [2], "bounds": [0.2, 5.0]} for name in list(truth)[:4]
+    }
+    parameters["lag"] = {"quantity": "plunger_damping_a", "joints": [2], "bounds": [5.0, 500.0]}
+    parameters["back"] = {"quantity": "plunger_back_a", "joints": [2], "bounds": [0.2, 5.0]}
+    settings = settings_of(parameters)
+    pose = settings.arm.pose("study")
+    log = duties(pose, {2: [15, -60, 25, 0, 40, -70, 60, 0, 20, -50, 90, -90, 30, 10]}, dwell=0.8)
+    start = dict.fromkeys(list(truth)[:4], 1.0) | {"lag": 60.0, "back": 1.0}
+    assert_recovered(recover(settings, [log], truth, start), settings, truth)

@@ -19,7 +19,7 @@ def test_every_setting_is_described():
 
 
 def test_the_table_of_quantities_has_all_that_settings_and_the_arm_give():
-    assert len(QUANTITIES) == 57
+    assert len(QUANTITIES) == 67
     arm = {
         "area_a",
         "area_b",

@@ -15,12 +15,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hydroid.api.convert import Conversion as Conversion
+    from hydroid.api.convert import convert as convert
     from hydroid.api.fit import FitResult as FitResult
     from hydroid.api.fit import fit as fit
     from hydroid.api.judge import identifiability as identifiability
     from hydroid.api.judge import sensitivity as sensitivity
     from hydroid.api.judge import surface as surface
     from hydroid.api.judge import validate as validate
+    from hydroid.api.look import Check as Check
     from hydroid.api.look import LogCheck as LogCheck
     from hydroid.api.look import check as check
     from hydroid.api.look import load_settings as load_settings
@@ -56,10 +59,11 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _NAMES = {
+    "hydroid.api.convert": "Conversion convert",
     "hydroid.api.fit": "FitResult fit",
     "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",
     "hydroid.api.judge": "identifiability sensitivity surface validate",
-    "hydroid.api.look": "LogCheck check load_settings plot_actuator read_commands read_logs view",
+    "hydroid.api.look": "Check LogCheck check load_settings plot_actuator read_commands read_logs view",
     "hydroid.api.model": "build_model simulate",
     "hydroid.api.plan": "design suggest",
     "hydroid.api.quantity": "QuantityResult quantity",

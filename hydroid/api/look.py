@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,12 +79,12 @@ def read_with_findings(
             read.append(path)
             continue
         log, findings = read_log(
-            Path(path), settings.log, _ranges(settings), outputs=settings.outputs, repair=repair
+            Path(path), settings.log, joint_ranges(settings), outputs=settings.outputs, repair=repair
         )
-        _report(findings)
         found += findings
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
+    _report(found)
     return read, found
 
 
@@ -107,7 +107,7 @@ def read_commands(
 
     start = settings.arm.pose(pose or settings.start_pose)
     log, findings = read_log(
-        Path(path), settings.log, _ranges(settings), angles_required=False, repair=repair
+        Path(path), settings.log, joint_ranges(settings), angles_required=False, repair=repair
     )
     _report(findings)
     return replace(log, angle=np.where(log.measured & (pose is None), log.angle, start))
@@ -115,29 +115,55 @@ def read_commands(
 
 @dataclass(frozen=True, eq=False)
 class LogCheck:
-    """What `check` found in one file: the log, None if it is unusable, and all findings, errors first."""
+    """What `check` found in one file.
+
+    Attributes:
+        path: the file.
+        log: None if it is unusable.
+        findings: all of them, errors first.
+        moved_deg: range over which each driven joint moved, by its number.
+    """
 
     path: Path
     log: "Log | None"
     findings: "list[Finding]"
+    moved_deg: dict[int, float] = field(default_factory=dict[int, float])
 
 
-def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> list[LogCheck]:
-    """Find everything that is wrong or odd about logs.
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What `check` found in each file, and in all usable ones together."""
 
-        for result in hydroid.check(["a.csv"], hydroid.load_settings("fit-mech")):
-            print(result.path, *result.findings)
+    logs: list[LogCheck]
+    findings: "list[Finding]"
+
+
+def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> Check:
+    """Find everything that is wrong or odd about logs, and what they lack.
+
+        result = hydroid.check(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
+        for log in result.logs:
+            print(log.path, *log.findings)
+        print(*result.findings)
 
     Args:
-        logs: CSV files.
+        logs: files.
         settings: of the fit that is to use them.
         repair: fill holes up to `log.repair_s`.
     """
-    from hydroid.log import check_log
+    from hydroid.log import check_log, motion_findings, moved, survey
 
     how: dict[str, Any] = {"outputs": settings.outputs, "repair": repair}
-    paths = [Path(path) for path in logs]
-    return [LogCheck(path, *check_log(path, settings.log, _ranges(settings), **how)) for path in paths]
+    results: list[LogCheck] = []
+    for path in map(Path, logs):
+        log, findings = check_log(path, settings.log, joint_ranges(settings), **how)
+        if log is None:
+            results.append(LogCheck(path, log, findings))
+            continue
+        joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+        motions = {joint: moved(log, joint) for joint in joints}
+        results.append(LogCheck(path, log, [*findings, *motion_findings(log)], motions))
+    return Check(results, survey([result.log for result in results if result.log]))
 
 
 def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/actuator") -> list[Path]:
@@ -226,12 +252,14 @@ def _require_hydraulics(model: IdentifiedModel) -> None:
         raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
 
 
-def _ranges(settings: FitSettings) -> np.ndarray:
-    """Ranges of the joints [rad], shape (J, 2)."""
+def joint_ranges(settings: FitSettings) -> np.ndarray:
+    """Return the ranges of the arm's joints [rad], shape (J, 2)."""
     return np.stack([settings.arm.lower, settings.arm.upper], axis=1)
 
 
 def _report(findings: "Sequence[Finding]") -> None:
-    for finding in findings:
+    from hydroid.log.log import grouped, in_one_line
+
+    for finding, others in grouped(findings):
         level = logging.WARNING if finding.level == "warning" else NOTE
-        _log.log(level, "%s: %s", finding.level, finding)
+        _log.log(level, "%s: %s", finding.level, in_one_line(finding, others))

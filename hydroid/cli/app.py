@@ -51,6 +51,7 @@ app = typer.Typer(
 COMMANDS = (
     ("start", start.init, "write a project from an arm's CAD and a log", "mine --arm robot.urdf --log a.csv"),
     ("look", look.check, "find faults in logs", "LOG.csv"),
+    ("look", look.convert, "write a log of any format as plain CSV", "LOG.mat --out LOG.csv"),
     ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
     ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),
     ("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech"),

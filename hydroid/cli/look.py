@@ -1,4 +1,4 @@
-"""`hydroid check`, `view` and `plot-actuator`."""
+"""`hydroid check`, `convert`, `view` and `plot-actuator`."""
 
 import os
 import sys
@@ -12,21 +12,64 @@ from hydroid.cli.options import Config, Folder, Logs, NominalEstimate, Output, R
 from hydroid.cli.output import show
 
 if TYPE_CHECKING:
-    from hydroid.api.look import LogCheck
+    from hydroid.api.look import Check, LogCheck
     from hydroid.identified import IdentifiedModel
+    from hydroid.log import Finding
 
 
 def check(
     logs: Logs, output: Output, config: Config = "fit-mech", setting: Set = None, repair: Repair = False
 ) -> None:
-    """List the faults of logs and anything unusual in them. The exit status is 2 if a log is unusable."""
+    """List the faults of logs, anything unusual in them, and what they lack, once for all logs that have it.
+
+    The exit status is 2 if a log is unusable.
+    """
     from hydroid.api.look import check, load_settings
 
-    results = check(logs, load_settings(config, overrides(setting)), repair=repair)
-    lines = [line for result in results for line in _lines(result)]
-    show(output, lambda: {"logs": [_plain(result) for result in results]}, lines)
-    if any(result.log is None for result in results):
+    result = check(logs, load_settings(config, overrides(setting)), repair=repair)
+    plain = {"logs": [_plain(log) for log in result.logs], "findings": [*map(_finding, result.findings)]}
+    show(output, lambda: plain, _lines(result))
+    if any(log.log is None for log in result.logs):
         raise typer.Exit(2)
+
+
+def convert(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="CSV, .mat, Parquet, ROS bag or MCAP.")],
+    output: Output,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT.csv", help="The CSV to write.")],
+    config: Annotated[
+        str | None,
+        typer.Option(
+            help="Settings that map the columns (`log`): a YAML file, or the name of a shipped config "
+            "[default: the columns are guessed, and each guess is printed]."
+        ),
+    ] = None,
+    setting: Set = None,
+    repair: Repair = False,
+) -> None:
+    """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
+
+    With settings it holds what a fit uses: resampled to log.period_s, delayed by log.delay_s, with its signs.
+    """
+    from hydroid.api.convert import convert
+    from hydroid.api.look import load_settings
+
+    settings = load_settings(config or "fit-mech", overrides(setting)) if config or setting else None
+    result = convert(log, out, settings, repair=repair)
+    guessed = [*result.guess.reasons] if result.guess else []
+    left = [f"not used: {', '.join(result.guess.unused)}"] if result.guess and result.guess.unused else []
+    notes = [f"{finding.level}: {finding}" for finding in result.findings]
+    summary = f"{out}: {len(result.log.time)} samples, {result.log.duration:.2f} s"
+    plain = {
+        "out": str(out),
+        "samples": len(result.log.time),
+        "duration_s": result.log.duration,
+        "period_s": result.log.period,
+        "log": result.guess and result.guess.log,
+        "reasons": guessed,
+        "findings": [*map(_finding, result.findings)],
+    }
+    show(output, lambda: plain, [*guessed, *left, *notes, f"{summary}, every {result.log.period:g} s"])
 
 
 def view(
@@ -86,26 +129,39 @@ def _model(estimate: NominalEstimate, output: Output) -> "IdentifiedModel":
     return model
 
 
-def _lines(result: "LogCheck") -> list[str]:
-    lines = [f"{finding.level}: {finding}" for finding in result.findings]
-    if result.log is not None:
-        samples, seconds = len(result.log.time), result.log.duration
-        driven = ", ".join(map(str, _driven(result))) or "none"
-        lines.append(f"{result.path}: {samples} samples, {seconds:.2f} s, driven joints: {driven}")
-    return lines
+def _lines(result: "Check") -> list[str]:
+    from hydroid.log import grouped, in_one_line
+
+    every = [finding for log in result.logs for finding in log.findings]
+    findings = sorted([*every, *result.findings], key=lambda f: ("error", "warning", "note").index(f.level))
+    lines = [f"{finding.level}: {in_one_line(finding, others)}" for finding, others in grouped(findings)]
+    return lines + [_summary(log) for log in result.logs if log.log is not None]
+
+
+def _summary(result: "LogCheck") -> str:
+    assert result.log is not None
+    samples, seconds = len(result.log.time), result.log.duration
+    driven = ", ".join(map(str, _driven(result))) or "none"
+    moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in result.moved_deg.items())
+    text = f"{result.path}: {samples} samples, {seconds:.2f} s, driven joints: {driven}"
+    return f"{text}; moved: {moved}" if moved else text
 
 
 def _plain(result: "LogCheck") -> dict[str, Any]:
-    findings = [{"level": f.level, "what": f.what, "where": f.where, "hint": f.hint} for f in result.findings]
-    used = result.log is not None
     return {
         "log": str(result.path),
-        "usable": used,
+        "usable": result.log is not None,
         "samples": len(result.log.time) if result.log else None,
         "duration_s": float(result.log.duration) if result.log else None,
         "driven_joints": _driven(result),
-        "findings": findings,
+        "moved_deg": {str(joint): deg for joint, deg in result.moved_deg.items()},
+        "findings": [*map(_finding, result.findings)],
     }
+
+
+def _finding(finding: "Finding") -> dict[str, str]:
+    names = ("level", "kind", "what", "where", "hint")
+    return {name: getattr(finding, name) for name in names}
 
 
 def _driven(result: "LogCheck") -> list[int]:

@@ -12,7 +12,10 @@ from hydroid.cli import stopping
 from hydroid.cli.output import log_lines
 
 Logs = Annotated[
-    list[Path], typer.Argument(metavar="LOG.csv...", help="Logs of commands [%] and joint angles.")
+    list[Path],
+    typer.Argument(
+        metavar="LOG...", help="Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP."
+    ),
 ]
 Config = Annotated[str, typer.Option(help="Settings: a YAML file, or the name of a shipped config.")]
 OwnConfig = Annotated[

@@ -2,9 +2,10 @@
 
 from hydroid.log.delay import Delay, suggest_delay
 from hydroid.log.guess import ColumnGuess, guess_columns
-from hydroid.log.log import Finding, Log, Warn
+from hydroid.log.log import Finding, Log, Warn, grouped, in_one_line
 from hydroid.log.log_file import check_log, read_log, write_log
 from hydroid.log.open_table import open_table
+from hydroid.log.survey import motion_findings, moved, survey
 from hydroid.log.table import Table
 
 __all__ = [
@@ -15,9 +16,14 @@ __all__ = [
     "Table",
     "Warn",
     "check_log",
+    "grouped",
     "guess_columns",
+    "in_one_line",
+    "motion_findings",
+    "moved",
     "open_table",
     "read_log",
     "suggest_delay",
+    "survey",
     "write_log",
 ]

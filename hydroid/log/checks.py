@@ -6,19 +6,13 @@ import numpy as np
 
 from hydroid.log.log import Finding, Floats, numbered
 from hydroid.log.signals import Recording
+from hydroid.log.suspicion import outside_hint, time_hint, unit_findings
 from hydroid.settings.log import LogSettings
 
 GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
 JITTER = 0.25  # in sample periods: a larger variation of the steps is a warning
 SLOWEST = 10  # largest ratio of the file's period to log.period_s: held commands would not explain the motion
 ROUNDING = 1e-6  # [%], of a scaled command
-FRACTION = 1.0  # [%]: no valve of a manipulator opens at smaller commands
-MOVES = 3.0  # [deg], of the mean over WINDOW: more than noise and settling
-WINDOW = 0.5  # [s]
-HALF_TURN = 3.2  # just above pi: few joints turn further, in rad
-STRONG = 30.0  # [%], past the dead band of a valve
-LEAST = 300.0  # [% s] of strong commands before their effect is judged
-SLUGGISH = 0.015  # [deg/(% s)]: 1.5 deg/s at full command; the rig's slowest joint turns 16 times as fast
 PRESENTED = {
     "command": (1.0, "%", "correct the cells, or log.command's scale and offset"),
     "angle": (
@@ -42,7 +36,7 @@ def check_recording(
         *_outside(recording),
         *_jumps(recording),
         *_constant(recording, outputs),
-        *_units(recording),
+        *unit_findings(recording),
     ]
 
 
@@ -56,7 +50,9 @@ def _ragged(recording: Recording) -> Iterator[Finding]:
     rows = np.flatnonzero(recording.ragged)
     if len(rows):
         what = f"the row should have {len(recording.file.names)} cells, as the header has"
-        yield recording.finding("error", what, "correct or delete the line, or use --repair", rows)
+        yield recording.finding(
+            "error", what, "correct or delete the line, or use --repair", rows, None, "row"
+        )
 
 
 def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Finding]:
@@ -77,7 +73,7 @@ def _holes(recording: Recording, longest: float, repaired: bool) -> Iterator[Fin
             )
         if signal.kind == "time":
             hint = "time is a number in log.time.unit, or a time of day (12:30:05.25), with or without date"
-        yield recording.finding("error", what, hint, rows, signal)
+        yield recording.finding("error", what, hint, rows, signal, "hole")
 
 
 def _time(recording: Recording, settings: LogSettings) -> Iterator[Finding]:
@@ -88,18 +84,20 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[Finding]:
         at = np.flatnonzero(steps <= 0)[0]
         what = f"time does not increase: {time[at + 1]:.12g} s follows {time[at]:.12g} s"
         hint = "delete or sort the lines, or log the time with more digits"
-        yield recording.finding("error", what, hint, back, signal)
+        yield recording.finding("error", what, hint, back, signal, "time order")
         return
     duration = time[-1] - time[0] if len(time) else 0.0
     if len(time) < 2 or duration < settings.shortest_s:
         what = f"holds {len(time)} samples over {duration:.6g} s, fewer than {settings.shortest_s:g} s"
         hint = "give a longer log, set log.time.unit if it is wrong, or lower log.shortest_s"
-        yield recording.finding("error", what, hint)
+        hint = time_hint(recording, sample_period(time)) or hint
+        yield recording.finding("error", what, hint, kind="duration")
         return
     period = sample_period(time)
     if period > SLOWEST * settings.period_s:
         what = f"has a sample every {period:.6g} s, at most {SLOWEST * settings.period_s:g} s can be used"
-        yield recording.finding("error", what, "log faster, or set log.time.unit if it is wrong", (), signal)
+        hint = time_hint(recording, period) or "log faster, or set log.time.unit if it is wrong"
+        yield recording.finding("error", what, hint, (), signal, "period")
     yield from _steps(recording, steps, rows, period, settings.repair_s)
 
 
@@ -115,11 +113,11 @@ def _steps(
         hint = f"cut the log into two files there (--repair fills gaps up to log.repair_s: {longest:g} s)"
         if steps[gaps].max() <= longest * (1 + 1e-9) + period:
             hint = "fill it with --repair"
-        yield recording.finding("error", what, hint, rows[1:][gaps], signal)
+        yield recording.finding("error", what, hint, rows[1:][gaps], signal, "gap")
     elif len(uneven):
         what = f"sample period varies from {per_row.min():.4g} to {per_row.max():.4g} s around {period:.4g} s"
         hint = "commands are held and angles interpolated"
-        yield recording.finding("warning", what, hint, rows[1:][uneven], signal)
+        yield recording.finding("warning", what, hint, rows[1:][uneven], signal, "jitter")
 
 
 def _outside(recording: Recording) -> Iterator[Finding]:
@@ -131,7 +129,8 @@ def _outside(recording: Recording) -> Iterator[Finding]:
         to_unit, unit, hint = PRESENTED[signal.kind]
         value, low, high = (to_unit * x for x in (values[rows[0]], signal.low, signal.high))
         what = f"{signal} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
-        yield recording.finding("error", what, hint, rows, signal)
+        hint = outside_hint(recording, signal, values) or hint
+        yield recording.finding("error", what, hint, rows, signal, "outside")
 
 
 def _jumps(recording: Recording) -> Iterator[Finding]:
@@ -146,7 +145,7 @@ def _jumps(recording: Recording) -> Iterator[Finding]:
             first = np.rad2deg(steps[np.abs(steps) > np.pi][0])
             what = f"{signal} jumps by {first:.6g} deg from one sample to the next"
             hint = "correct the cells, or log.angle's unit and scale"
-            yield recording.finding("error", what, hint, far, signal)
+            yield recording.finding("error", what, hint, far, signal, "jump")
 
 
 def _constant(recording: Recording, outputs: Sequence[int]) -> Iterator[Finding]:
@@ -160,48 +159,14 @@ def _constant(recording: Recording, outputs: Sequence[int]) -> Iterator[Finding]
         what = f"angle of {numbered(still)} never changes"
         what += " though it is driven" if len(still) == 1 and still[0] in driven else ""
         hint = "check the sensor and log.angle"
-        yield recording.finding("warning", what, hint, (), names["angle", still[0]])
+        yield recording.finding("warning", what, hint, (), names["angle", still[0]], "angle is constant")
     held = [j for j in joints if j in outputs and ("command", j) in names and _is_constant(command[:, j - 1])]
     if held:
         what = f"command of {numbered(held)}, whose angle is compared, is constant"
         hint = "such a log alone says little: fit it together with others"
-        yield recording.finding("warning", what, hint, (), names["command", held[0]])
+        yield recording.finding("warning", what, hint, (), names["command", held[0]], "command is constant")
 
 
 def _is_constant(values: Floats) -> bool:
     there = values[~np.isnan(values)]
     return len(there) > 0 and bool((there == there[0]).all())
-
-
-def _units(recording: Recording) -> Iterator[Finding]:
-    """Values that are allowed but look as if they had another unit: fractions for %, radians for degrees.
-
-    The arm's motion must contradict the unit; nothing is said where another explanation is possible.
-    """
-    if np.isnan(recording.values).any() or len(recording.time) < 2 or (np.diff(recording.time) <= 0).any():
-        return  # has faults to be mended first
-    command, angle = recording.motions()
-    driven = np.flatnonzero(command.any(axis=0) & ~np.isnan(angle[0]))
-    if not len(driven):
-        return
-    command, largest = np.abs(command), np.rad2deg(np.nanmax(np.abs(angle)))
-    # means over windows of half a second, shape (windows, driven); the last may be shorter
-    starts = np.flatnonzero(np.diff(np.floor((recording.time - recording.time[0]) / WINDOW), prepend=-1.0))
-    counts = np.diff(starts, append=len(angle))
-    means = np.add.reduceat(np.rad2deg(angle[:, driven]), starts, axis=0) / counts[:, None]
-    if command.max() <= FRACTION:
-        moved = np.ptp(means, axis=0)
-        joint = int(driven[moved.argmax()]) + 1
-        if moved.max() > MOVES:
-            what = f"no command exceeds {FRACTION:g} %, yet joint {joint} turns by {moved.max():.3g} deg"
-            hint = "if commands are fractions from -1 to 1, set log.command.scale: 100"
-            yield recording.finding("warning", what, hint, (), recording.signal("command", joint))
-    elif largest <= HALF_TURN:
-        strong = np.where(command[:-1, driven] > STRONG, command[:-1, driven], 0.0)
-        push, path = np.diff(recording.time) @ strong, np.abs(np.diff(means, axis=0)).sum(axis=0)
-        judged = push > LEAST
-        if judged.any() and ((path > 0) & (path < SLUGGISH * push))[judged].all():
-            joint = int(driven[judged][0]) + 1
-            what = f"no angle exceeds {HALF_TURN:g} deg, and joint {joint} hardly follows strong commands"
-            hint = "if angles are in rad, set log.angle.unit: rad"
-            yield recording.finding("warning", what, hint, (), recording.signal("angle", joint))

@@ -7,12 +7,19 @@ from datetime import date
 import numpy as np
 
 from hydroid.log.log import Floats
+from hydroid.settings.log import SECONDS
 
 DAY = 86_400 * 10**9  # [ns]
 _TIME = re.compile(
     r"(?:.*?[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
 )
 _ISO_DATE = re.compile(r"(\d{4})-?(\d{2})-?(\d{2})[T ]")
+
+
+def likely_unit(step: float) -> str:
+    """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "": in none."""
+    units = ("s", "ms", "us", "ns", "min", "day")
+    return next((name for name in units if 9e-4 < step * SECONDS[name] < 0.6), "")
 
 
 def is_clock(cell: str) -> bool:

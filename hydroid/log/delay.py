@@ -25,6 +25,7 @@ MAX_RESIDUAL = 0.5  # above it command and motion do not belong together
 MAX_ACAUSAL_RESIDUAL = 0.25  # motion ahead of its command takes stronger evidence
 STOP_ZONE = 0.02  # part of the logged travel, at each of its ends, in which a joint may stand at a stop
 STANDING = 0.03  # part of the largest speed below which it stands
+FAST = 0.1  # part of the largest speed above which it moves
 STOPPED = 0.2  # how long it must stand there [s]
 _ROUNDING = 1e-9  # part of a sum of squares
 
@@ -62,28 +63,38 @@ def suggest_delay(log: Log, joint: int) -> Delay | None:
     return Delay(float(lag[best]), int(sign[best]))
 
 
+def stands_at_stop(log: Log, joint: int) -> NDArray[np.bool_]:
+    """Return where a measured joint (number, from 1) stands at an end of its travel, shape (T,).
+
+    It must be pushed on by a command that is larger than most of those that move it: a joint also stands
+    while its command is in the dead band.
+    """
+    width = SMOOTHING / log.period
+    q = log.angle[:, joint - 1]
+    command, angle = _smooth(log.command[:, joint - 1], width), _smooth(q, width)
+    speed = _smooth(q, width, derivative=True)
+    moving = np.abs(speed) > FAST * np.abs(speed).max()
+    enough = np.median(np.abs(command[moving])) if moving.any() else np.inf
+    return _at_stop(command, angle, speed, log.period) & (np.abs(command) > enough)
+
+
 def delay_findings(log: Log, delay_s: float, column: Callable[[int], str]) -> list[Finding]:
-    """Report commands that look early, late, or of the wrong sign; `column` names a joint's."""
+    """Report commands that look early or late; `column` names a joint's."""
     joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
     delays = {joint: delay for joint in joints if (delay := suggest_delay(log, joint))}
     early = [j for j, d in delays.items() if d.lag > PLAIN[1] + log.period / 2]
     late = [j for j, d in delays.items() if d.lag < ACAUSAL]
-    against = [j for j, d in delays.items() if d.sign < 0]
     findings = list[Finding]()
     if early:
         lag = float(np.median([delays[j].lag for j in early]))
         what = f"command of {numbered(early)} looks {lag:.2f} s early against the angle"
         hint = f"set log.delay_s: {delay_s + lag:.2f} if the machine has that transport delay"
-        findings.append(Finding("note", what, log.source, hint, column=column(early[0])))
+        findings.append(Finding("note", what, log.source, hint, column=column(early[0]), kind="early"))
     if late:
         lag = float(np.median([delays[j].lag for j in late]))
         what = f"angle of {numbered(late)} moves {-lag:.2f} s before the command, as no machine does"
         hint = f"the log's clocks differ: mend the log, or set log.delay_s: {delay_s + lag:.2f}"
-        findings.append(Finding("warning", what, log.source, hint, column=column(late[0])))
-    if against:
-        what = f"angle of {numbered(against)} moves against the command"
-        hint = "give log.command or log.angle a negative scale if one is logged the other way around"
-        findings.append(Finding("warning", what, log.source, hint, column=column(against[0])))
+        findings.append(Finding("warning", what, log.source, hint, column=column(late[0]), kind="late"))
     return findings
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.log.clock import likely_unit
 from hydroid.log.column_words import Kind, direction, joint_of, kind_of, number_in, unit_of
 from hydroid.log.command_range import likely_range
 from hydroid.log.log import Floats
@@ -79,17 +80,20 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
     reasons += why
     rad = _in_radians([column for (column, *_) in angles.values()])
     log["joints"] = {}
+    named = {
+        k: f"joint {k}" if name == f"joint{k}" else f"joint {k} ({name})" for k, name in enumerate(joints, 1)
+    }
     for joint in sorted({*angles, *commands}):
         entry: dict[str, Any] = {"command": None, "angle": None}
         if joint in commands:
             entry["command"], said = _command(commands[joint])
-            reasons.append(f"{said} of joint {joint} ({joints[joint - 1]}), {commands[joint][0].why}")
+            reasons.append(f"{said} of {named[joint]}, {commands[joint][0].why}")
         if joint in angles:
             column = angles[joint][0]
             is_rad = column.unit == "rad" or (column.unit == "" and rad)
             entry["angle"] = {"column": column.name, "unit": "rad" if is_rad else "deg"}
             said = f"{column.name}: angle in {entry['angle']['unit']}"
-            reasons.append(f"{said} of joint {joint} ({joints[joint - 1]}), {column.why}")
+            reasons.append(f"{said} of {named[joint]}, {column.why}")
         log["joints"][joint] = entry
     used = {time.name, *(c.name for group in (*angles.values(), *commands.values()) for c in group)}
     return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
@@ -148,9 +152,7 @@ def _time_unit(time: _Column) -> str:
     """Return the unit that the file gives, or the one in which there are 2 to 1000 samples a second."""
     given = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us"}
     unit = given.get(time.unit, time.unit)
-    step = float(np.nanmedian(np.diff(time.values)))
-    plausible = [name for name in ("s", "ms", "us", "ns", "min", "day") if 5e-4 < step * SECONDS[name] < 0.6]
-    return unit if unit in SECONDS else [*plausible, "s"][0]
+    return unit if unit in SECONDS else likely_unit(float(np.nanmedian(np.diff(time.values)))) or "s"
 
 
 def _by_joint(

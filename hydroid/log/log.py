@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from hydroid.errors import LogError
 Floats = NDArray[np.float64]
 Level = Literal["error", "warning", "note"]
 
+_MAX_NAMED = 3  # logs by name in a line
 LONGEST_REST = 2.0
 """of a rest before the first command, what counts for the start pose [s]: a leaking valve lets an arm sink"""
 
@@ -105,7 +107,7 @@ class Finding:
 
     An error: the log cannot be used; a warning: look at it; a note: what the reader did. `line` [1-based] is
     that of the first place, and `column` its name in the header, where there is one. Binary formats have rows
-    instead of lines (`place`).
+    instead of lines (`place`). `kind` is the same for the same finding in other logs.
     """
 
     level: Level
@@ -115,6 +117,7 @@ class Finding:
     line: int | None = None
     column: str = ""
     place: str = "line"
+    kind: str = ""
 
     @property
     def where(self) -> str:
@@ -132,6 +135,24 @@ class Finding:
 
 Warn = Callable[[Finding], None]
 """receives warnings and notes about a log"""
+
+
+def grouped(findings: Sequence[Finding]) -> list[tuple[Finding, list[str]]]:
+    """Return the first finding of each kind, in order, with the other logs that have it too."""
+    groups: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.level, finding.kind or finding.what, finding.column), []).append(finding)
+    first = [(group[0], dict.fromkeys(f.source for f in group)) for group in groups.values()]
+    return [(finding, [log for log in logs if log != finding.source]) for finding, logs in first]
+
+
+def in_one_line(finding: Finding, others: Sequence[str]) -> str:
+    """Return a finding and how many `others` logs have it too, as `grouped` gives them."""
+    if not others:
+        return str(finding)
+    names = ", ".join(Path(log).name for log in others[:_MAX_NAMED])
+    names += ", ..." if len(others) > _MAX_NAMED else ""
+    return f"{finding} (and in {len(others)} more log{'s' if len(others) > 1 else ''}: {names})"
 
 
 def numbered(joints: Sequence[int]) -> str:

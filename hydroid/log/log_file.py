@@ -11,6 +11,7 @@ from hydroid.errors import LogError
 from hydroid.files import write_atomic
 from hydroid.log.checks import check_recording, sample_period
 from hydroid.log.delay import delay_findings
+from hydroid.log.direction import direction_findings
 from hydroid.log.log import Finding, Floats, Log, numbered
 from hydroid.log.open_table import open_table
 from hydroid.log.resample import fill, hold, is_on_grid, resample, unwrap
@@ -78,7 +79,7 @@ def check_log(
     try:
         file = open_table(path, settings, [signal.name for signal in wanted])
     except LogError as error:
-        return None, [Finding("error", error.what, error.where, error.hint)]
+        return None, [_unreadable(error)]
     findings = _mapping_faults(str(path), settings, wanted, len(ranges), outputs)
     if not angles_required:
         wanted = [c for c in wanted if c.kind not in ("angle", "pressure") or c.name in file.names]
@@ -92,7 +93,7 @@ def check_log(
         try:
             recording, remarks = read_recording(file, signals)
         except LogError as error:
-            return None, [*findings, Finding("error", error.what, error.where, error.hint)]
+            return None, [*findings, _unreadable(error)]
         recording, notes = unwrap(recording)
         notes += remarks
         if repair:
@@ -103,6 +104,10 @@ def check_log(
             log, more = _to_log(recording, settings, len(ranges))
             findings += more
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+
+
+def _unreadable(error: LogError) -> Finding:
+    return Finding("error", error.what, error.where, error.hint, kind="unreadable")
 
 
 def _mapping_faults(
@@ -134,17 +139,29 @@ def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[L
     findings = list[Finding]()
     if not is_on_grid(recording.time, period):
         what = f"resampled from {sample_period(recording.time):.6g} s to {period:g} s"
-        findings.append(recording.finding("note", what, "commands held, angles interpolated"))
+        if abs(sample_period(recording.time) / period - 1) < 1e-3:
+            what = f"uneven samples brought to an even period of {period:g} s"
+        findings.append(
+            recording.finding("note", what, "commands held, angles interpolated", kind="resampled")
+        )
     if not log.driven.any():
-        findings.append(recording.finding("warning", "no joint is driven", "check log.command"))
-    findings += delay_findings(log, settings.delay_s, lambda joint: recording.signal("command", joint).name)
+        findings.append(
+            recording.finding("warning", "no joint is driven", "check log.command", kind="undriven")
+        )
+
+    def column(joint: int) -> str:
+        return recording.signal("command", joint).name
+
+    findings += [*delay_findings(log, settings.delay_s, column), *direction_findings(log, column)]
     return log, findings
 
 
-def write_log(path: Path, log: Log, settings: LogSettings) -> None:
+def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = False) -> None:
     """Write a log, whole or not at all.
 
-    The command is written ahead by `settings.delay_s`, so that reading delays it to what `log` holds.
+    Cells have ten digits, or with `exact` as many as it takes to read the same bits back; where no cell does
+    (degrees for a value that was in radians) the last bit may differ. The command is written ahead by
+    `settings.delay_s`, so that reading delays it to what `log` holds.
 
     Raises:
         LogError: the settings map no column for a joint that is driven, or a column for an angle that was not
@@ -165,22 +182,36 @@ def write_log(path: Path, log: Log, settings: LogSettings) -> None:
             hint = f"set log.joints.{signal.joint}.angle: null"
             raise LogError(f"joint {signal.joint} has no angle to write", where=str(path), hint=hint)
     command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
-    columns = [_cells(signal, log, command) for signal in signals]
+    values = [_values(signal, log, command) for signal in signals]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow([signal.name for signal in signals])
-    np.savetxt(text, np.stack(columns, axis=1), fmt=DIGITS, delimiter=",")
+    if exact:
+        cells = [_exact(signal, column) for signal, column in zip(signals, values, strict=True)]
+        text.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+    else:
+        numbers = [(v - signal.offset) / signal.gain for signal, v in zip(signals, values, strict=True)]
+        np.savetxt(text, np.stack(numbers, axis=1), fmt=DIGITS, delimiter=",")
     write_atomic(path, text.getvalue())
 
 
-def _cells(signal: Signal, log: Log, command: Floats) -> Floats:
-    """Return the column [file's unit] whose reading gives the log's values, shape (T,)."""
-    values = log.time
+def _values(signal: Signal, log: Log, command: Floats) -> Floats:
+    """Return what a signal's cells are read as, shape (T,)."""
     if signal.kind == "command":
         values = signal.sign * command[:, signal.joint - 1]
-        values = values.clip(min=0.0) if signal.low == 0 else values
-    elif signal.kind == "angle":
-        values = log.angle[:, signal.joint - 1]
-    elif signal.kind == "pressure":
+        return values.clip(min=0.0) if signal.low == 0 else values
+    if signal.kind == "angle":
+        return log.angle[:, signal.joint - 1]
+    if signal.kind == "pressure":
         assert log.pressure is not None
-        values = log.pressure[:, signal.joint - 1, signal.chamber]
-    return (values - signal.offset) / signal.gain
+        return log.pressure[:, signal.joint - 1, signal.chamber]
+    return log.time
+
+
+def _exact(signal: Signal, values: Floats) -> list[str]:
+    """Return the shortest cells of ten digits or more that are read as these values."""
+    wanted = (values - signal.offset) / signal.gain
+    cells = np.array([DIGITS % cell for cell in wanted], dtype=object)
+    for digits in ("%.15g", "%.16g", "%.17g"):
+        wrong = np.flatnonzero(cells.astype(float) * signal.gain + signal.offset != values)
+        cells[wrong] = [digits % cell for cell in wanted[wrong]]
+    return cells.tolist()

@@ -31,7 +31,7 @@ def unwrap(recording: Recording) -> tuple[Recording, list[Finding]]:
         if wraps.any():
             values[rows[1:], column] -= TURN * np.cumsum(np.sign(steps) * wraps)
             what = f"{signal} wraps by 360 deg and was joined"
-            notes.append(recording.finding("note", what, "", rows[1:][wraps], signal))
+            notes.append(recording.finding("note", what, "", rows[1:][wraps], signal, "wrap"))
     return replace(recording, values=values), notes
 
 
@@ -59,7 +59,7 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]
     what += f", {_count(lost, 'row')} without a time left out" if lost else ""
     line = min([*recording.lines[filled.any(axis=1) | added][:1], *first])
     hint = "angles interpolated, commands held"
-    return recording, [replace(recording.finding("warning", what, hint), line=int(line))]
+    return recording, [replace(recording.finding("warning", what, hint, kind="repair"), line=int(line))]
 
 
 def _insert(recording: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:

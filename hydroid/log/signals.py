@@ -46,6 +46,7 @@ class Recording:
 
     Values are in [s], [%], [rad] or [Pa], shape (R, C), NaN where the file holds no number. `lines`, (R,), is
     the line or row of the file [1-based] of each; `ragged`, (R,), marks rows whose number of cells is wrong.
+    `clocks` are the columns of times of day.
     """
 
     file: Table
@@ -53,6 +54,7 @@ class Recording:
     values: Floats
     lines: NDArray[np.int64]
     ragged: NDArray[np.bool_]
+    clocks: frozenset[str] = frozenset()
 
     @property
     def time(self) -> Floats:
@@ -66,6 +68,7 @@ class Recording:
         hint: str = "",
         rows: Sequence[int] | NDArray[np.int64] = (),
         signal: Signal | None = None,
+        kind: str = "",
     ) -> Finding:
         """Make a finding at the first of `rows` that counts the others."""
         if len(rows) > 1:
@@ -73,7 +76,7 @@ class Recording:
             what += f" (and {len(rows) - 1} more row{'s' if len(rows) > 2 else ''}, to {last})"
         line = int(self.lines[rows[0]]) if len(rows) else None
         column = signal.name if signal else ""
-        return Finding(level, what, self.file.source, hint, line, column, self.file.place)
+        return Finding(level, what, self.file.source, hint, line, column, self.file.place, kind)
 
     def take(self, rows: NDArray[np.int64]) -> "Recording":
         """Return a copy with these rows, in this order."""
@@ -160,11 +163,17 @@ def missing_columns(file: Table, wanted: Sequence[Signal]) -> list[Finding]:
                 f"; for a joint that is not in the log set it to null, such as log.joints.{joints[-1]}=null"
             )
         what = f"the {'header' if file.header else 'file'} lacks {names}"
-        findings.append(Finding("error", what, file.source, hint, file.header, lacking[0].name))
+        findings.append(
+            Finding("error", what, file.source, hint, file.header, lacking[0].name, kind="missing column")
+        )
     for name, count in Counter(file.names).items():
         if count > 1 and any(signal.name == name for signal in wanted):
             what = f"has {count} columns of this name"
-            findings.append(Finding("error", what, file.source, "rename all but one", file.header, name))
+            findings.append(
+                Finding(
+                    "error", what, file.source, "rename all but one", file.header, name, kind="column twice"
+                )
+            )
     for name, count in Counter(signal.name for signal in wanted).items():
         if count > 1:
             users = " and ".join(str(signal) for signal in wanted if signal.name == name)
@@ -187,8 +196,8 @@ def read_recording(file: Table, signals: Sequence[Signal]) -> tuple[Recording, l
     with np.errstate(all="ignore"):
         values = cells.values * gain + np.array([signal.offset for signal in signals])
         values[~(np.abs(values) < 1e100)] = np.nan
-    notes = [Finding("note", remark, file.source) for remark in (*file.remarks, *cells.remarks)]
-    return Recording(file, tuple(signals), values, cells.rows, cells.ragged), notes
+    notes = [Finding("note", remark, file.source, kind=remark) for remark in (*file.remarks, *cells.remarks)]
+    return Recording(file, tuple(signals), values, cells.rows, cells.ragged, cells.clocks), notes
 
 
 def _hint(name: str, names: Sequence[str]) -> str:

@@ -1,0 +1,97 @@
+"""What logs are good for: how far each joint moves, its stops, and commands that no log has."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hydroid.log.delay import stands_at_stop
+from hydroid.log.direction import disagreements
+from hydroid.log.log import Finding, Floats, Log, numbered
+
+HARDLY = 0.5  # [deg]: a joint that is driven strongly moves further
+STRONG = 30.0  # [%]
+REST = 0.2  # [s] of rest before the first command that give a start pose
+AT_STOP = 0.5  # [s] at a stop that are worth a line
+HELD = 0.3  # [s] for which logs hold a command before it counts
+BIN = 5.0  # [%]
+OPEN = 15.0  # [%]: a wider interval without commands leaves the valve curve open
+HIGH = 80.0  # [%]: above the largest command, if it is lower, the curve is open too
+_MAX_LISTED = 6
+
+
+def moved(log: Log, joint: int) -> float:
+    """Return the range over which a measured joint (number, from 1) moved [deg]."""
+    return float(np.rad2deg(np.ptp(log.angle[:, joint - 1])))
+
+
+def motion_findings(log: Log) -> list[Finding]:
+    """Report joints that hardly move or stand at a stop, and a log that does not begin at rest."""
+    findings = list[Finding]()
+    joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+    still = [j for j in joints if np.abs(log.command[:, j - 1]).max() > STRONG and 0 < moved(log, j) < HARDLY]
+    if still:
+        most = max(moved(log, joint) for joint in still)
+        what = f"{numbered(still)} hardly moves under strong commands, by {most:.2g} deg"
+        hint = "check log.joints: is this the angle of that command?"
+        findings.append(Finding("warning", what, log.source, hint, kind="no motion"))
+    stops = {j: float(stands_at_stop(log, j).sum() * log.period) for j in joints if j not in still}
+    stops = {j: seconds for j, seconds in stops.items() if seconds >= AT_STOP}
+    if stops:
+        parts = ", ".join(f"joint {j} for {seconds:.3g} s" for j, seconds in stops.items())
+        what = f"pushed on at the end of its travel: {parts}"
+        hint = "this time tells of the stop and the pump, not of the valve; the arm's range should end there"
+        findings.append(Finding("note", what, log.source, hint, kind="at a stop"))
+    first = int(np.argmax(log.command.any(axis=1)))
+    if log.driven.any() and first * log.period < REST:
+        what = f"begins with a command after {first * log.period:.2g} s" if first else "begins with a command"
+        hint = "the first sample is the start pose: begin a log with a second of rest"
+        findings.append(Finding("note", what, log.source, hint, kind="no rest"))
+    return findings
+
+
+def survey(logs: Sequence[Log]) -> list[Finding]:
+    """Report what all logs together lack or contradict: directions, and commands that none of them has."""
+    if not logs:
+        return []
+    findings, gaps = disagreements(logs), list[str]()
+    one_way = dict[int, str]()
+    joints = np.flatnonzero(np.any([log.driven & log.measured for log in logs], axis=0)) + 1
+    for joint in joints.tolist():
+        levels = {sign: _levels(logs, joint, sign) for sign in (1, -1)}
+        for sign, word in ((1, "positive"), (-1, "negative")):
+            if not len(levels[sign]) and len(levels[-sign]):
+                one_way[joint] = word
+            gaps += [f"joint {joint} {word} {gap}" for gap in _gaps(levels[sign])]
+    source = logs[0].source if len(logs) == 1 else f"{len(logs)} logs"
+    if gaps:
+        listed = ", ".join(gaps[:_MAX_LISTED]) + (
+            f" and {len(gaps) - _MAX_LISTED} more" * (len(gaps) > _MAX_LISTED)
+        )
+        what = f"no command: {listed}; the valve curve is open there"
+        hint = "add logs with such commands, or hold the parameters of the curve"
+        findings.append(Finding("note", what, source, hint, kind="open valve curve"))
+    if one_way:
+        parts = ", ".join(f"joint {joint} {word}" for joint, word in one_way.items())
+        what = f"never commanded: {parts}"
+        hint = "parameters of that direction stay unknown"
+        findings.append(Finding("note", what, source, hint, kind="one direction"))
+    return findings
+
+
+def _levels(logs: Sequence[Log], joint: int, sign: int) -> Floats:
+    """Return the commands of one direction [%] that are held long enough, ascending: means over bins."""
+    commands = [(sign * log.command[:, joint - 1], log.period) for log in logs]
+    values = np.concatenate([u[u > 1] for u, _ in commands])
+    seconds = np.concatenate([np.full((u > 1).sum(), period) for u, period in commands])
+    bins = (values // BIN).astype(int)
+    held = np.bincount(bins, seconds) if len(bins) else np.zeros(0)
+    used = np.flatnonzero(held >= HELD)
+    return np.array([np.average(values[bins == b], weights=seconds[bins == b]) for b in used])
+
+
+def _gaps(levels: Floats) -> list[str]:
+    """Return the intervals without commands between levels [%] and above them."""
+    wide = [(a, b) for a, b in pairwise(levels) if b - a >= OPEN]
+    gaps = [f"between {a:.0f} and {b:.0f} %" for a, b in wide]
+    return [*gaps, f"above {levels[-1]:.0f} %"] if len(levels) and levels[-1] < HIGH else gaps

@@ -103,7 +103,7 @@ def main() -> None:
     began = time.perf_counter()
     found = design(settings, estimate, [], SEED, lambda what, done, of: None)
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
-    period, samples = settings.log.period_s, len(found.best.angle)
+    period = settings.log.period_s
     blind, seeing = (ExperimentSimulator(settings, theta) for theta in (estimate, truth))
     randoms = random_experiments(settings, blind, arguments.random)
     stage = Problem(settings, [found.log])
@@ -119,7 +119,7 @@ def main() -> None:
     order = np.argsort(drawn.max(axis=1))
     middle = order[(len(order) - 1) // 2]  # the better of the two in the middle
     typical = np.median(drawn, axis=0)
-    logs = [e.log(samples, period) for e in (randoms[middle], found.best.experiment)]
+    logs = [e.log(settings) for e in (randoms[middle], found.best.experiment)]
     logs = [simulate_log(settings, log, values, str(TRUTH)) for log in logs]
     for what, log in (("random", logs[0]), ("designed", logs[1])):
         left = violation(log.angle, period, arm, settings.design)

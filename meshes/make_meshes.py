@@ -34,6 +34,11 @@ def base() -> Trimesh:
         rib.copy().apply_transform(trimesh.transformations.rotation_matrix(k * math.pi / 2, (0, 0, 1)))
         for k in (0, 2)
     ]
+    return join(foot, column, *ribs, *seat())
+
+
+def seat() -> tuple[Trimesh, ...]:
+    """What an arm stands on: deck, slewing bearing, and the rear bracket of the azimuth cylinder."""
     deck = plate("z", (-0.12, -0.10), (-0.27, 0.0, 0.045), (0.03, -0.05, 0.06), (0.03, 0.05, 0.06))
     bearing = tube("z", (0.0, 0.0), (-0.11, -0.056), 0.078, 0.040)
     bracket = join(
@@ -42,7 +47,42 @@ def base() -> Trimesh:
         box((-0.299, -0.022, -0.11), (-0.279, 0.022, -0.004)),
         rod("z", (-0.25, 0.0), (-0.06, 0.002), 0.010),
     )
-    return join(foot, column, *ribs, deck, bearing, bolts("z", (-0.102, -0.094), 0.088, 0.006, 8), bracket)
+    return deck, bearing, bolts("z", (-0.102, -0.094), 0.088, 0.006, 8), bracket
+
+
+def carrier_tracks() -> Trimesh:
+    """Crawler of the carrier, about as large as a Brokk 40's; the frame lies on the floor below both arms."""
+    track = plate("y", (0.19, 0.30), (0.13, -0.85, 0.13), (0.13, -0.05, 0.13))
+    grouser = [box((-0.85 + 0.1 * k, 0.185, 0.0), (-0.83 + 0.1 * k, 0.305, 0.262)) for k in range(9)]
+    wheels = [rod("y", (0.13, x), (0.18, 0.31), 0.085) for x in (-0.85, -0.05)]
+    chassis = box((-0.80, -0.21, 0.10), (-0.10, 0.21, 0.33))
+    ring = rod("z", (-0.45, 0.0), (0.32, 0.37), 0.20)
+    return join(both(join(track, *grouser, *wheels)), chassis, ring)
+
+
+def carrier_turret() -> Trimesh:
+    """Turret with the motor's cover, and the column that carries the beam."""
+    body = trimesh.convex.convex_hull(
+        [(x, y, z) for y in (-0.24, 0.24) for x, z in ((-0.92, 0.375), (-0.95, 0.60), (-0.80, 0.68))]
+        + [(x, y, z) for y in (-0.24, 0.24) for x, z in ((-0.40, 0.68), (-0.30, 0.52), (-0.30, 0.375))]
+    )
+    slots = [box((-0.96, -0.16, 0.45 + 0.04 * k), (-0.90, 0.16, 0.47 + 0.04 * k)) for k in range(4)]
+    column = trimesh.convex.convex_hull(
+        [
+            (x, y, z)
+            for y in (-0.10, 0.10)
+            for x, z in ((-0.36, 0.38), (-0.36, 0.56), (0.05, 0.60), (0.05, 0.52))
+        ]
+    )
+    return join(cut(body, *slots), column)
+
+
+def carrier_beam() -> Trimesh:
+    """Beam across the column, with the seats of both arms."""
+    cross = box((-0.07, -0.42, 0.58), (0.07, 0.42, 0.685))
+    ends = both(plate("x", (-0.08, 0.08), (-0.41, 0.632, 0.03), (-0.43, 0.632, 0.03)))
+    arm = join(*seat()).apply_translation((0.0, -0.32, 0.8))
+    return join(cross, ends, both(arm))
 
 
 def link1() -> Trimesh:
@@ -210,6 +250,9 @@ PARTS: tuple[Callable[[], Trimesh], ...] = (
     link6,
     jaw_left,
     jaw_right,
+    carrier_tracks,
+    carrier_turret,
+    carrier_beam,
 )
 
 

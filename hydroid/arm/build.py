@@ -68,7 +68,7 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
     body = spec.worldbody.add_body(name="base", pos=arm.base.at)
     if arm.base.mesh is not None:
         read_mesh(folder / arm.base.mesh)  # it may be open: it is only shown
-        _add_mesh(spec, body, arm.base.mesh, "steel")
+        add_mesh(spec, body, arm.base.mesh, "steel")
     for link, joint in zip(arm.links, arm.joints, strict=True):
         child = body.add_body(name=link.name, pos=joint.at)
         _add_joint(spec, child, joint)
@@ -81,8 +81,9 @@ def build_model(arm: Arm, mesh_folder: Path | None = None) -> mujoco.MjSpec:
         body = child
     for name in arm.poses:
         spec.add_key(name=name, qpos=arm.pose(name))
-    _exclude_contacts(spec)
-    _place_scene(spec, arm)
+    exclude_contacts(spec)
+    base = np.array(arm.base.at)
+    place_scene(spec, base, base + np.sum([joint.at for joint in arm.joints], axis=0))
     return spec
 
 
@@ -115,19 +116,19 @@ def _add_part(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: Link, folder: Pat
     body.ipos = centre
     body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
     if part.mesh is not None:
-        _add_mesh(spec, body, part.mesh, material)
+        add_mesh(spec, body, part.mesh, material)
     elif part.shape is not None:
         _add_shape(body, part.shape, material)
 
 
-def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, mesh: str, material: str) -> None:
-    """Show the mesh, and collide with the capsule that MuJoCo fits to it."""
+def add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, mesh: str, material: str) -> None:
+    """Show the mesh, and collide with its convex hull."""
     name = Path(mesh).with_suffix("").as_posix()
     if spec.mesh(name) is None:
         spec.add_mesh(name=name, file=mesh)
     look = {"meshname": name, "material": material, "mass": 0}
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, group=VISUAL_GROUP, contype=0, conaffinity=0, **look)
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, group=COLLISION_GROUP, **look)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, group=COLLISION_GROUP, **look)
 
 
 def _add_shape(body: mujoco.MjsBody, shape: Box | Cylinder, material: str) -> None:
@@ -166,10 +167,11 @@ def _add_cylinder(
         cylinder.wrap_site(name)
 
 
-def _place_scene(spec: mujoco.MjSpec, arm: Arm) -> None:
-    """Put lights and cameras around the middle of the stretched arm, as far away as it reaches."""
-    base = np.array(arm.base.at)
-    tip = base + np.sum([joint.at for joint in arm.joints], axis=0)
+def place_scene(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
+    """Put lights and cameras around the middle of the stretched arm, as far away as it reaches.
+
+    `base` and `tip` are its ends in the world [m], shape (3,).
+    """
     centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
     with mujoco_errors(spec.modelname):
         whole = spec.compile().stat
@@ -184,8 +186,8 @@ def _place_scene(spec: mujoco.MjSpec, arm: Arm) -> None:
     spec.stat.center, spec.stat.extent = centre, reach
 
 
-def _exclude_contacts(spec: mujoco.MjSpec) -> None:
-    """Let no named pose start in contact: what touches there is close by design, or its capsule is wide."""
+def exclude_contacts(spec: mujoco.MjSpec) -> None:
+    """Let no named pose start in contact: what touches there is close by design, or its hull is wide."""
     pairs: set[tuple[int, int]] = set()
     with mujoco_errors(spec.modelname):
         model = spec.compile()

@@ -26,10 +26,13 @@ RANGE_FACTORS = (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
 SPEED_FACTORS = (0.7, 0.5, 0.35, 0.2, 0.0)
 """factors tried in turn on a level that makes a joint too fast"""
 
+LATELY = 20
+"""samples before two bodies come too near in which a joint that turned is held to be the cause"""
+
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """One joint's command: `level[i]` [%] from sample `start[i]` to the next; start[0] is 0."""
+    """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
 
     start: Ints
     level: Array
@@ -42,11 +45,19 @@ class Experiment:
     pose: Array
     inputs: Mapping[int, Input]
 
-    def log(self, samples: int, period: float) -> Log:
+    def log(self, settings: FitSettings) -> Log:
         """Return commands without motion: every angle stays in the start pose."""
+        samples, period, slew = (
+            experiment_samples(settings),
+            settings.log.period_s,
+            settings.design.slew_pct_s,
+        )
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
-            command[:, joint] = np.repeat(signal.level, np.diff(np.append(signal.start, samples)))
+            held = np.diff(np.append(signal.start, samples))
+            command[signal.start[0] :, joint] = np.repeat(signal.level, held)
+            if slew is not None:
+                command[:, joint] = limited(command[:, joint], signal.start, slew * period)
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
@@ -64,6 +75,17 @@ class Experiment:
         """Return the experiment with all commands times a factor."""
         inputs = {j: replace(i, level=np.round(factor * i.level, 1)) for j, i in self.inputs.items()}
         return replace(self, inputs=inputs)
+
+
+def limited(command: Array, start: Ints, step: float) -> Array:
+    """Return a command [%], shape (T,), that is constant between `start`s, with at most `step` per sample."""
+    slow, value = command.copy(), 0.0
+    for first, end in zip(start, np.append(start[1:], len(command)), strict=True):
+        way = command[first] - value
+        ramp = np.minimum(step * np.arange(1, end - first + 1), abs(way))
+        slow[first:end] = value + np.sign(way) * ramp
+        value = slow[end - 1]
+    return slow
 
 
 def experiment_samples(settings: FitSettings) -> int:
@@ -85,7 +107,7 @@ class RandomExperiments:
         ranges = np.radians([joint.range for joint in arm.joints])
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * np.ptp(ranges, axis=1))
         self._lower, self._upper = ranges[:, 0] + inward, ranges[:, 1] - inward
-        self._samples = experiment_samples(settings)
+        self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / settings.log.period_s)
         self._dwell = tuple(max(1, round(t / settings.log.period_s)) for t in limits.dwell_s)
 
     def draw(self) -> Experiment:
@@ -108,7 +130,7 @@ class RandomExperiments:
         return experiment
 
     def _input(self) -> Input:
-        starts = [0]
+        starts = [self._rest]
         while (begin := starts[-1] + int(self._rng.integers(self._dwell[0], self._dwell[1] + 1))) < (
             self._samples - self._dwell[0]
         ):
@@ -185,7 +207,7 @@ def _start_poses(settings: FitSettings) -> Array:
 
 
 class Violation(NamedTuple):
-    """The first sample at which a joint (0-based) leaves its range, or is too fast."""
+    """The first sample at which a joint (0-based) leaves its range, is too fast, or drives bodies together."""
 
     sample: int
     joint: int
@@ -204,6 +226,15 @@ def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> 
         return None
     sample, joint = map(int, at[0])
     return Violation(sample, joint, not out[sample, joint])
+
+
+def meeting(angle: Array, sample: int) -> Violation:
+    """Return the violation of bodies that come too near at a sample: of the joint that turned most lately.
+
+    `angle` is the motion [rad], shape (T, J); joint angles far out on the arm count as much as the others.
+    """
+    turned = np.ptp(angle[max(0, sample - LATELY) : sample + 1], axis=0)
+    return Violation(sample, int(np.argmax(turned)), False)
 
 
 def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[int, int]]) -> Experiment:

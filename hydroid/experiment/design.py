@@ -55,12 +55,13 @@ class Design:
     @property
     def log(self) -> Log:
         """The commands to run, every angle in the start pose."""
-        return self.best.experiment.log(len(self.best.angle), self.period)
+        angle = np.broadcast_to(self.best.experiment.pose, self.best.log.angle.shape)
+        return replace(self.best.log, angle=angle)
 
     @property
     def predicted(self) -> Log:
         """The commands with the motion that the present estimate predicts."""
-        return replace(self.log, angle=self.best.angle)
+        return self.best.log
 
     @property
     def random_deviations(self) -> Array:
@@ -109,7 +110,7 @@ def design(
         raise SettingsError(
             f"none of {drawn} random experiments keeps the limits in simulation",
             where="design",
-            hint="allow more speed, less margin, a smaller command, or other poses",
+            hint="allow more speed, less margin or clearance, a smaller command, or other poses",
         )
     precision = Precision.of(known, np.mean([t.information for t in random], axis=0))
 

@@ -4,18 +4,26 @@ Information is in relative changes of the free parameters, x = d theta / theta: 
 standard deviation of 0.1 means 10 %.
 
 Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
-Collisions of the arm with itself or with its surroundings are not checked.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from hydroid.arm.machine import load_machine
 from hydroid.arm.model import load_model
-from hydroid.experiment.commands import Experiment, experiment_samples, repaired, violation
+from hydroid.experiment.commands import (
+    Experiment,
+    Violation,
+    experiment_samples,
+    meeting,
+    repaired,
+    violation,
+)
+from hydroid.log import Log
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem, make_simulation
@@ -118,12 +126,12 @@ class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
     experiment: its commands. information: about relative changes of the free parameters, shape (F, F).
-    angle: simulated [rad], shape (T, J).
+    log: its commands with the simulated angles.
     """
 
     experiment: Experiment
     information: Array
-    angle: Array
+    log: Log
 
 
 class ExperimentSimulator:
@@ -135,8 +143,11 @@ class ExperimentSimulator:
             simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
             settings = settings.model_copy(update={"simulation": simulation})
         self._settings, self._outputs = settings, [j - 1 for j in settings.outputs]
-        self._samples, self._period = experiment_samples(settings), settings.log.period_s
-        self._noise = sensor_noise(settings.design, self._samples, self._period)
+        self._period = settings.log.period_s
+        self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)
+        arm, self._machine = settings.arm, None
+        if settings.design.clearance_m is not None:
+            self._machine = load_machine(arm, pair=arm.pair is not None)
         stage = Stage(settings)
         # one-sided differences take a quarter of the simulations of `jacobian` and agree to 0.1 %
         moved = theta + STEP * np.diag(relative_scale(stage.parameters, theta))[stage.parameters.free]
@@ -149,8 +160,8 @@ class ExperimentSimulator:
         gained = self.information(kept[0])
         return None if gained is None else Trial(kept[0], gained, kept[1])
 
-    def within_limits(self, experiment: Experiment) -> tuple[Experiment, Array] | None:
-        """Reverse or reduce levels until the experiment keeps the limits; return it and its motion.
+    def within_limits(self, experiment: Experiment) -> tuple[Experiment, Log] | None:
+        """Reverse or reduce levels until the experiment keeps the limits; return it and its predicted log.
 
         None where it still breaks them, or its simulation diverges.
         """
@@ -160,12 +171,22 @@ class ExperimentSimulator:
             if angle is None:
                 return None
             first = violation(angle[0], self._period, self._settings.arm, self._settings.design)
+            first = first or self._too_near(angle[0])
             if first is None:
-                return experiment, angle[0]
+                return experiment, replace(experiment.log(self._settings), angle=angle[0])
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first, changes)
         return None
+
+    def _too_near(self, angle: Array) -> Violation | None:
+        """Where a motion [rad], shape (T, J), first brings bodies nearer to each other than the margin."""
+        machine, margin = self._machine, self._settings.design.clearance_m
+        if machine is None or margin is None:
+            return None
+        rest = self._settings.arm.pose(self._settings.start_pose)
+        found = machine.checker.first_below(machine.joined({machine.sides[0]: angle}, rest), margin)
+        return None if found is None else meeting(angle, found[0])
 
     def information(self, experiment: Experiment) -> Array | None:
         """Return the information of an experiment as it is, shape (F, F); None where it diverges."""
@@ -177,7 +198,7 @@ class ExperimentSimulator:
 
     def _simulate(self, experiment: Experiment, count: int) -> Array | None:
         """All joints' angles [rad], (count, T, J), of the first candidates; None where one diverged."""
-        log = experiment.log(self._samples, self._period)
+        log = experiment.log(self._settings)
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)

@@ -22,7 +22,7 @@ from hydroid.settings.linkage import (
     four_bar,
 )
 from hydroid.settings.load import Settings, load
-from hydroid.settings.parts import Base, FixedPart, Link, Name, PayloadPlace
+from hydroid.settings.parts import Base, FixedPart, Link, Name, Pair, PayloadPlace
 from hydroid.settings.pivots import place_pivots
 
 
@@ -70,6 +70,8 @@ class Arm(Settings):
     """the joints, from the base outwards"""
     payload: PayloadPlace | None = None
     """where the gripper holds a payload; null: logs have no payloads"""
+    pair: Pair | None = None
+    """two of these arms on one carrier; null: it stands alone"""
     poses: dict[Name, tuple[float, ...]]
     """named poses: the angle of each joint, by name [deg]"""
 
@@ -152,7 +154,9 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     path = find_config(name, beside, kind="arm")
     arm = load(path, Arm)
     folder = path.resolve().parent
-    places = {"model": (folder / arm.model).resolve(), "meshes": (folder / arm.meshes).resolve()}
+    places: dict[str, Any] = {name: (folder / getattr(arm, name)).resolve() for name in ("model", "meshes")}
+    if arm.pair is not None:
+        places["pair"] = arm.pair.model_copy(update={"model": (folder / arm.pair.model).resolve()})
     return arm.model_copy(update=places)
 
 

@@ -19,12 +19,19 @@ class DesignSettings(Settings):
     poses"""
     command_pct: Annotated[float, Field(gt=0, le=100)] = 100.0
     """largest command [%]"""
+    rest_s: NotNegative = 1.0
+    """time without a command at the beginning [s]; a fit takes its start pose from it"""
+    slew_pct_s: Positive | None = 500.0
+    """fastest change of a command [%/s]; null: it jumps"""
     dwell_s: tuple[Positive, Positive] = (1.0, 5.0)
     """shortest and longest time between two changes of a command [s]; the shortest limits the bandwidth"""
     speed_deg_s: Positive = 30.0
     """largest joint speed in the simulated experiment [deg/s]"""
     margin_deg: NotNegative = 5.0
     """smallest distance of the simulated motion from the ends of the joints' ranges [deg]"""
+    clearance_m: Positive | None = 0.05
+    """smallest distance of the simulated arm from itself, from the floor and, where the arm's file has a pair,
+    from the carrier and the other arm, which rests in start_pose [m]; null: collisions are not checked"""
     criterion: Literal["D", "E"] = "E"
     """E: make the least precise combination of parameters as precise as possible; D: all on average"""
     noise_deg: Positive = 0.1
@@ -42,6 +49,8 @@ class DesignSettings(Settings):
     def _ordered(self) -> "DesignSettings":
         if not self.dwell_s[0] <= self.dwell_s[1] <= self.duration_s:
             raise ValueError("dwell_s must be [shortest, longest], not longer than duration_s")
+        if self.rest_s + self.dwell_s[0] > self.duration_s:
+            raise ValueError("rest_s leaves no time for a command within duration_s")
         if self.joints is not None and len(set(self.joints)) < len(self.joints):
             raise ValueError("joints: a joint is listed twice")
         return self

@@ -3,11 +3,12 @@
 Every frame has its origin in the body's joint and is parallel to the world's at joint angles 0.
 """
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from hydroid.settings.linkage import Vector
 from hydroid.settings.load import Positive, Settings
@@ -127,3 +128,21 @@ class PayloadPlace(Settings):
     """name of the link that carries the payload"""
     at: Vector
     """position of its centre of mass in the frame of that link [m]"""
+
+
+class Pair(Settings):
+    """A machine with two of these arms, which mirror each other in the plane y = 0, on one carrier."""
+
+    model: Annotated[Path, Strict(False)]
+    """the MJCF of the machine, written by `hydroid build-model`; relative to this file"""
+    carrier: tuple[str, ...] = ()
+    """STL files of the carrier in the folder of the meshes, in the world's frame; each collides as its convex
+    hull"""
+    at: Vector
+    """position of the right arm's base in the world [m]; the left one stands at the same place with -y"""
+
+    @model_validator(mode="after")
+    def _apart(self) -> "Pair":
+        if self.at[1] >= 0:
+            raise ValueError("at: y must be negative, on the right of a machine that looks along x")
+        return self

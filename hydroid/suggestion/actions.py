@@ -203,9 +203,9 @@ def _designing(problem: Problem, uncertainty: Uncertainty) -> FitSettings:
     ]
     level, time = max(angles)
     settings = problem.settings
-    design = settings.design.model_copy(
-        update={"noise_deg": float(np.degrees(level)), "noise_correlation_s": time}
-    )
+    # what the best of a few could measure; hydroid design then looks for one free of collisions
+    changes = {"noise_deg": float(np.degrees(level)), "noise_correlation_s": time, "clearance_m": None}
+    design = settings.design.model_copy(update=changes)
     return settings.model_copy(update={"design": design})
 
 

@@ -38,7 +38,7 @@ def designed() -> tuple[FitSettings, Design]:
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
     """Whether `simulate` gives the predicted motion, within the limits."""
     run = simulate_log(settings, result.log, TRUTH, "truth")
-    assert np.abs(run.angle - result.best.angle).max() < 1e-9
+    assert np.abs(run.angle - result.best.log.angle).max() < 1e-9
     assert np.abs(run.command).max() <= settings.design.command_pct
     return violation(run.angle, result.period, settings.arm, settings.design) is None
 

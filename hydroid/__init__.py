@@ -15,6 +15,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hydroid.api.arms import collisions as collisions
+    from hydroid.api.arms import read_arms as read_arms
+    from hydroid.api.arms import simulate_arms as simulate_arms
     from hydroid.api.convert import Conversion as Conversion
     from hydroid.api.convert import convert as convert
     from hydroid.api.fit import FitResult as FitResult
@@ -59,6 +62,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _NAMES = {
+    "hydroid.api.arms": "collisions read_arms simulate_arms",
     "hydroid.api.convert": "Conversion convert",
     "hydroid.api.fit": "FitResult fit",
     "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",

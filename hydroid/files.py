@@ -81,6 +81,19 @@ def _write(path: Path, data: bytes, keep: Path | None) -> None:
             os.unlink(temporary)
 
 
+def copy_file(source: Path, target: Path) -> None:
+    """Copy a file, whole or not at all.
+
+    Raises:
+        RunError: it cannot be read, or the copy cannot be written.
+    """
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise RunError(f"cannot be read ({error.strerror})", where=str(source)) from None
+    write_atomic(target, content)
+
+
 def remove_parts(folder: Path) -> None:
     """Remove unfinished files that killed processes left; no other process may write to the folder."""
     for part in folder.rglob(f".*{PART}"):

@@ -9,13 +9,15 @@ import yaml
 
 from hydroid.assets import find_config
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
-from hydroid.files import is_file, write_atomic
+from hydroid.files import copy_file, is_file, write_atomic
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
 CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
 """the files of a folder that `load_identified` reads, beside the estimate"""
+PAIR = "model/pair.xml"
+"""where `hydroid build-model` would write the machine of two arms"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +119,14 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     """Write the settings and the arm to a folder whose model is MODEL, so that it can be read anywhere.
 
     Raises:
-        RunError: the folder cannot be written.
+        RunError: the folder cannot be written, or a mesh of the carrier of two arms cannot be read.
     """
-    meshes = (Path(MODEL).parent / "meshes").as_posix()
+    meshes, pair = (Path(MODEL).parent / "meshes").as_posix(), settings.arm.pair
     arm = settings.arm.model_dump(mode="json") | {"model": MODEL, "meshes": meshes}
+    if pair is not None:
+        arm["pair"]["model"] = PAIR
+        for mesh in pair.carrier:
+            copy_file(settings.arm.meshes / mesh, folder / meshes / mesh)
     for name, content in ((ARM, arm), (CONFIG, portable(settings))):
         write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 

@@ -53,7 +53,7 @@ def seat() -> tuple[Trimesh, ...]:
 def carrier_tracks() -> Trimesh:
     """Crawler of the carrier, about as large as a Brokk 40's; the frame lies on the floor below both arms."""
     track = plate("y", (0.19, 0.30), (0.13, -0.85, 0.13), (0.13, -0.05, 0.13))
-    grouser = [box((-0.85 + 0.1 * k, 0.185, 0.0), (-0.83 + 0.1 * k, 0.305, 0.262)) for k in range(9)]
+    grouser = [box((-0.84 + 0.13 * k, 0.185, 0.0), (-0.81 + 0.13 * k, 0.305, 0.262)) for k in range(7)]
     wheels = [rod("y", (0.13, x), (0.18, 0.31), 0.085) for x in (-0.85, -0.05)]
     chassis = box((-0.80, -0.21, 0.10), (-0.10, 0.21, 0.33))
     ring = rod("z", (-0.45, 0.0), (0.32, 0.37), 0.20)

@@ -70,10 +70,10 @@ def build_model(
     Args:
         arm: the arm's YAML file, or the name of a shipped one.
         meshes: folder of the meshes; by default as the arm's file says.
-        out: the MJCF to write; by default as the arm's file says.
+        out: the MJCF to write; by default as the arm's file says, with the machine of two arms if it has one.
 
     Returns:
-        The file.
+        The arm's file.
 
     Raises:
         SettingsError: no such arm. MeshError: a mesh is missing or has no volume.
@@ -85,4 +85,9 @@ def build_model(
     from hydroid.arm.build import write_model
 
     write_model(settings, target)
+    if settings.pair is not None and out is None:
+        from hydroid.arm.model import load_model
+        from hydroid.arm.pair import write_pair
+
+        write_pair(load_model(target, settings), settings)
     return target

@@ -1,8 +1,8 @@
 """Which bodies of an arm meet along a trajectory, and how near they come otherwise.
 
 Bodies collide with the shapes that the MJCF makes collide; a mesh counts as its convex hull. Distances are
-MuJoCo's (`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against one
-that the model excludes: `hydroid build-model` excludes bodies that touch in a named pose of the arm's file.
+MuJoCo's (`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against
+one that the model excludes. `hydroid build-model` excludes bodies that touch in a named pose of the arm.
 
 Most distances need no computing. When the joints turn by dq, no point of a body moves farther than the sum of
 |dq_j| times its greatest distance from joint j; so a known distance is a lower bound for some time
@@ -87,9 +87,11 @@ class CollisionChecker:
 
     @property
     def excluded(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of bodies that the model excludes."""
-        names = [self._model.body(b).name for b in range(self._model.nbody)]
-        return tuple((names[s >> 16], names[s & 0xFFFF]) for s in self._model.exclude_signature.tolist())
+        """Pairs of bodies that the model excludes and that could collide otherwise."""
+        m = self._model
+        solid = set(m.geom_bodyid[(m.geom_contype | m.geom_conaffinity) > 0].tolist())
+        pairs = [(s >> 16, s & 0xFFFF) for s in m.exclude_signature.tolist()]
+        return tuple((m.body(a).name, m.body(b).name) for a, b in pairs if {a, b} <= solid)
 
     def clearance(self, time: Array, angle: Array) -> Clearance:
         """Return how near bodies come along a trajectory.

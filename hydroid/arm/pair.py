@@ -13,7 +13,6 @@ import numpy as np
 
 from hydroid.arm.build import SCENE, add_mesh, exclude_contacts, place_scene
 from hydroid.arm.mesh import read_mesh
-from hydroid.arm.model import mujoco_errors
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 from hydroid.settings.arm import Arm

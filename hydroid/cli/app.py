@@ -53,6 +53,7 @@ COMMANDS = (
     ("look", look.check, "find faults in logs", "LOG.csv"),
     ("look", look.convert, "write a log of any format as plain CSV", "LOG.mat --out LOG.csv"),
     ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
+    ("look", look.collisions, "find bodies that meet along a trajectory", "LOG.csv --arm right"),
     ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),
     ("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech"),
     ("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd"),

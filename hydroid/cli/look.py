@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Folder, Logs, NominalEstimate, Output, Repair, Set, overrides
+from hydroid.cli.options import Arm, Config, Folder, Logs, NominalEstimate, Output, Repair, Set, overrides
 from hydroid.cli.output import show
 
 if TYPE_CHECKING:
     from hydroid.api.look import Check, LogCheck
+    from hydroid.arm.collision import Clearance
     from hydroid.identified import IdentifiedModel
     from hydroid.log import Finding
 
@@ -105,6 +106,33 @@ def view(
         show(output, lambda: {"out": str(gif)}, [str(gif)])
 
 
+def collisions(
+    trajectory: Annotated[
+        Path, typer.Argument(metavar="TRAJECTORY.csv", help="Joint angles over time, such as a log.")
+    ],
+    output: Output,
+    config: Config = "fit-mech",
+    setting: Set = None,
+    arm: Arm = None,
+    out: Folder = Path("runs/collisions"),
+    repair: Repair = False,
+) -> None:
+    """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise.
+
+    Checks the arm against itself, its base and the floor; with --arm also against the carrier and the other
+    arm. The exit status is 0 if nothing meets, 1 if bodies meet, and 2 if the input cannot be used.
+    """
+    from hydroid.api.arms import collisions
+    from hydroid.api.look import load_settings
+
+    settings = load_settings(config, overrides(setting))
+    study = collisions(trajectory, settings, out, arm=arm, repair=repair)
+    result, lines = study.result, [*study.page.tables.values(), study.page.lead]
+    show(output, lambda: _clearance(result), [*lines, str(out / "collisions.html")])
+    if result.meetings:
+        raise typer.Exit(1)
+
+
 def plot_actuator(
     estimate: NominalEstimate,
     output: Output,
@@ -162,6 +190,28 @@ def _plain(result: "LogCheck") -> dict[str, Any]:
 def _finding(finding: "Finding") -> dict[str, str]:
     names = ("level", "kind", "what", "where", "hint")
     return {name: getattr(finding, name) for name in names}
+
+
+def _clearance(result: "Clearance") -> dict[str, Any]:
+    nearest = result.smallest
+    return {
+        "free": not result.meetings,
+        "clearance_m": float(result.distance[nearest]),
+        "clearance_at_s": float(result.time[nearest]),
+        "clearance_between": list(result.nearest[nearest]),
+        "collisions": [
+            {
+                "bodies": [meeting.first, meeting.second],
+                "from_s": meeting.begins,
+                "to_s": meeting.ends,
+                "depth_m": meeting.depth,
+                "deepest_at_s": meeting.deepest,
+            }
+            for meeting in result.meetings
+        ],
+        "checked_pairs": result.checked,
+        "excluded": [list(pair) for pair in result.excluded],
+    }
 
 
 def _driven(result: "LogCheck") -> list[int]:

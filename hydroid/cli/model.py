@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from hydroid.cli.options import Estimate, Output, Repair, overrides
+from hydroid.cli.options import Arm, Estimate, Output, Repair, overrides
 from hydroid.cli.output import show
 
 
@@ -34,10 +34,11 @@ def simulate(
         Path | None,
         typer.Option(metavar="CSV", help="Also write pressures, flows, spool position and force (stage 2)."),
     ] = None,
+    arm: Arm = None,
     repair: Repair = False,
 ) -> None:
     """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit."""
-    from hydroid.api.look import read_commands
+    from hydroid.api.arms import read_arms, simulate_arms
     from hydroid.api.model import simulate
     from hydroid.errors import SettingsError
     from hydroid.identified import load_identified
@@ -46,8 +47,14 @@ def simulate(
     if target.resolve() == commands.resolve():
         raise SettingsError("would overwrite the commands", where=f"--out {target}", hint="name another file")
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
-    start = read_commands(commands, model.settings, pose, repair=repair)
-    log = simulate(model, start, target, noise_deg=noise_deg, seed=seed, trace=trace)
+    logs = read_arms(commands, model.settings, arm, pose=pose, repair=repair)
+    if arm is None:
+        (start,) = logs.values()
+        log = simulate(model, start, target, noise_deg=noise_deg, seed=seed, trace=trace)
+    elif trace is not None:
+        raise SettingsError("is of one arm that stands alone", where="--trace", hint="leave --arm out")
+    else:
+        (log, *_) = simulate_arms(model, logs, target, noise_deg=noise_deg, seed=seed).values()
     content = {"out": str(target), "samples": len(log.time), "duration_s": float(log.duration)}
     show(output, lambda: content | {"trace": trace and str(trace)}, [str(target)])
 

@@ -52,6 +52,16 @@ Repair = Annotated[
     ),
 ]
 
+Arm = Annotated[
+    str | None,
+    typer.Option(
+        "--arm",
+        metavar="right|left|both",
+        help="Take the machine of two arms from the arm's file, and say which of them move. Columns that "
+        "begin with right_ and left_ are each arm's own; others are those of every arm that moves.",
+    ),
+]
+
 
 @dataclass(kw_only=True)
 class Output:

@@ -67,8 +67,9 @@ def design(
     """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
     SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
-    design.margin_deg, design.command_pct) are checked only in simulation with the present estimate; the
-    real arm may exceed them. Collisions are not checked.
+    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate; the
+    real arm may exceed them. Collisions are checked with the shapes of the model, which knows no hoses and
+    nothing that stands around the machine.
 
     Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
     settings define the compared joints, the free parameters and the limits.

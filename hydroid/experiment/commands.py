@@ -207,7 +207,7 @@ def _start_poses(settings: FitSettings) -> Array:
 
 
 class Violation(NamedTuple):
-    """The first sample at which a joint (0-based) leaves its range, is too fast, or drives bodies together."""
+    """The first sample at which a joint (0-based) leaves its range, is too fast, or makes bodies meet."""
 
     sample: int
     joint: int

@@ -144,7 +144,8 @@ def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[L
         findings.append(
             recording.finding("note", what, "commands held, angles interpolated", kind="resampled")
         )
-    if not log.driven.any():
+    commands = any(signal.kind == "command" for signal in recording.signals)
+    if commands and not log.driven.any():
         findings.append(
             recording.finding("warning", "no joint is driven", "check log.command", kind="undriven")
         )
@@ -168,6 +169,22 @@ def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = Fals
             measured.
         RunError: the file cannot be written.
     """
+    write_logs(path, [(log, settings)], exact=exact)
+
+
+def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bool = False) -> None:
+    """Write logs of the same time side by side into one file, each with its settings, as `write_log` does."""
+    columns: dict[str, list[str]] = {}
+    for log, settings in logs:
+        columns |= _columns(path, log, settings, exact)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(columns)
+    text.writelines(",".join(row) + "\n" for row in zip(*columns.values(), strict=True))
+    write_atomic(path, text.getvalue())
+
+
+def _columns(path: Path, log: Log, settings: LogSettings, exact: bool) -> dict[str, list[str]]:
+    """Return the cells by the names of their columns, T each."""
     signals = map_signals(settings, np.full((log.joints, 2), np.inf))
     if log.pressure is None:
         signals = [signal for signal in signals if signal.kind != "pressure"]
@@ -182,16 +199,12 @@ def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = Fals
             hint = f"set log.joints.{signal.joint}.angle: null"
             raise LogError(f"joint {signal.joint} has no angle to write", where=str(path), hint=hint)
     command = hold(log.time, log.command, log.time + settings.delay_s, log.period)
-    values = [_values(signal, log, command) for signal in signals]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow([signal.name for signal in signals])
-    if exact:
-        cells = [_exact(signal, column) for signal, column in zip(signals, values, strict=True)]
-        text.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
-    else:
-        numbers = [(v - signal.offset) / signal.gain for signal, v in zip(signals, values, strict=True)]
-        np.savetxt(text, np.stack(numbers, axis=1), fmt=DIGITS, delimiter=",")
-    write_atomic(path, text.getvalue())
+    cells: dict[str, list[str]] = {}
+    for signal in signals:
+        values = _values(signal, log, command)
+        numbers = (values - signal.offset) / signal.gain
+        cells[signal.name] = _exact(signal, values) if exact else [DIGITS % number for number in numbers]
+    return cells
 
 
 def _values(signal: Signal, log: Log, command: Floats) -> Floats:

@@ -21,11 +21,21 @@ from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, flag_of
 _DASHED = (0, (5, 3))
 _SHOWN = 0.15
 """parts of the weakest direction below this share of the largest are not named"""
-SAFETY = (
+_LIMITS = (
     "The limits were checked only in simulation, at the present estimate. The machine moves differently as "
-    "far as it differs from the model. Collisions were not checked. Watch the first run with a hand on the "
-    "emergency stop."
+    "far as it differs from the model."
 )
+_COLLISIONS = (
+    "Collisions were checked with the shapes of the model, which knows no hoses, no cylinders and nothing "
+    "that stands around the machine."
+)
+
+
+def safety(settings: DesignSettings) -> str:
+    """Return what the limits are worth."""
+    unchecked = "Collisions were not checked: design.clearance_m is null."
+    collisions = unchecked if settings.clearance_m is None else _COLLISIONS
+    return f"{_LIMITS} {collisions} Watch the first run with a hand on the emergency stop."
 
 
 def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mapping[str, float]) -> Page:
@@ -37,7 +47,7 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
     precise = "Predicted relative standard deviations, from ±100 % without any log."
     section = Section(
         "Prediction",
-        points=(SAFETY,),
+        points=(safety(settings),),
         tables={"design": table},
         plots=(
             Plot("motion", moving, partial(motion, design.predicted, arm.joint_names, limits)),
@@ -78,7 +88,7 @@ def _design_note(settings: DesignSettings, design: Design) -> str:
         f"Noise {settings.noise_deg:g} deg{correlation}; before: every parameter ±100 % unless logs say more;"
         f" random: median of {len(design.random)} experiments of the same length and limits. Weakest "
         f"direction{lost}: {number(100 * before)} % before, {number(100 * design.random_weakest)} % random, "
-        f"{number(100 * weakest)} % designed; it is {parts}. {SAFETY}"
+        f"{number(100 * weakest)} % designed; it is {parts}. {safety(settings)}"
     )
 
 

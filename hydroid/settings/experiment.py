@@ -30,8 +30,8 @@ class DesignSettings(Settings):
     margin_deg: NotNegative = 5.0
     """smallest distance of the simulated motion from the ends of the joints' ranges [deg]"""
     clearance_m: Positive | None = 0.05
-    """smallest distance of the simulated arm from itself, from the floor and, where the arm's file has a pair,
-    from the carrier and the other arm, which rests in start_pose [m]; null: collisions are not checked"""
+    """smallest distance of the simulated arm from itself and from the floor; where the arm's file has a pair,
+    also from the carrier and the other arm, at rest in start_pose [m]; null: collisions are not checked"""
     criterion: Literal["D", "E"] = "E"
     """E: make the least precise combination of parameters as precise as possible; D: all on average"""
     noise_deg: Positive = 0.1

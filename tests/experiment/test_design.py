@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hydroid import load_settings
+from hydroid.arm.machine import load_machine
 from hydroid.errors import SettingsError
-from hydroid.experiment.commands import violation
+from hydroid.experiment.commands import limited, violation
 from hydroid.experiment.design import Design, design
 from hydroid.experiment.information import ExperimentSimulator, Precision, log_information, sensor_noise
 from hydroid.prediction import simulate_log
@@ -36,11 +37,50 @@ def designed() -> tuple[FitSettings, Design]:
 
 
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
-    """Whether `simulate` gives the predicted motion, within the limits."""
-    run = simulate_log(settings, result.log, TRUTH, "truth")
+    """Whether `simulate` gives the predicted motion, within the limits, after a rest, and without jumps."""
+    run, limits = simulate_log(settings, result.log, TRUTH, "truth"), settings.design
+    rest = round(limits.rest_s / result.period)
+    assert not run.command[:rest].any()
+    assert limits.slew_pct_s is not None
+    change = np.abs(np.diff(run.command, axis=0, prepend=0.0)).max()
+    assert 0 < change <= limits.slew_pct_s * result.period + 1e-9
+    assert limits.clearance_m is not None
+    assert clearance(settings, run.angle).min() >= limits.clearance_m
     assert np.abs(run.angle - result.best.log.angle).max() < 1e-9
     assert np.abs(run.command).max() <= settings.design.command_pct
     return violation(run.angle, result.period, settings.arm, settings.design) is None
+
+
+def clearance(settings: FitSettings, angle: np.ndarray) -> np.ndarray:
+    """Distance [m] of the right arm from itself, the floor, the carrier and the left arm, shape (T,)."""
+    machine = load_machine(settings.arm, pair=True)
+    motion = machine.joined({"right": angle}, settings.arm.pose(settings.start_pose))
+    return machine.checker.clearance(np.arange(len(angle), dtype=float), motion).distance
+
+
+def test_experiments_keep_clear_where_others_collide():
+    """Of random experiments from random poses some collide, unless they are checked."""
+    smallest: list[list[float]] = []
+    for margin in (0.05, None):
+        settings = configured(clearance_m=margin, candidates=8, improvements=0, duration_s=4)
+        tried = design(settings, THETA, [], 1).random
+        smallest.append([clearance(settings, trial.log.angle).min() for trial in tried])
+    checked, unchecked = smallest
+    assert min(checked) >= 0.05
+    assert min(unchecked) < 0
+    assert len(checked) >= 3
+
+
+def test_a_limited_command_rises_at_its_rate_and_arrives():
+    start = np.array([10, 40])
+    jumps = np.zeros(60)
+    jumps[10:40], jumps[40:] = 50.0, -20.0
+    slow = limited(jumps, start, 5.0)
+    assert np.abs(np.diff(slow)).max() == pytest.approx(5.0)
+    assert slow[:10] == pytest.approx(np.zeros(10))
+    assert (slow[10], slow[19], slow[39], slow[53], slow[59]) == pytest.approx((5, 50, 50, -20, -20))
+    # it goes on from where it is when it had no time to arrive
+    assert limited(jumps, start, 1.0)[[39, 40]] == pytest.approx([30, 29])
 
 
 def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSettings, Design]):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hydroid import fit, load_settings, read_logs
+from hydroid.arm.machine import load_machine
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel, identified
@@ -306,3 +307,16 @@ def test_a_payload_pulls_the_arm_down():
         empty.step(command)
         loaded.step(command)
     assert loaded.angle[1] < empty.angle[1]
+
+
+def test_a_saved_plant_keeps_its_pair(tmp_path: Path):
+    plant = Plant(model())
+    plant.save(tmp_path / "saved")
+    arm = load_plant(tmp_path / "saved").identified.settings.arm
+    assert arm.meshes.is_relative_to(tmp_path)
+    there, here = (
+        load_machine(arm, pair=True).model,
+        load_machine(plant.identified.settings.arm, pair=True).model,
+    )
+    np.testing.assert_allclose(there.body_mass, here.body_mass)
+    assert there.nmesh == here.nmesh

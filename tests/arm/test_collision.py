@@ -1,0 +1,119 @@
+"""Distances between bodies, held against plain MuJoCo at every sample, and against balls on sticks."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from hydroid.arm.collision import CollisionChecker
+from hydroid.arm.machine import Machine, load_machine
+from hydroid.errors import ModelError
+from hydroid.settings.arm import Arm
+
+SWINGS = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1"/>
+    <body name="first" pos="0 0 2"><joint axis="0 -1 0"/><geom size="0.1" pos="1 0 0" mass="1"/></body>
+    <body name="second" pos="3 0 2"><joint axis="0 -1 0"/><geom size="0.1" pos="-1 0 0" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+"""two balls on sticks of 1 m, whose hinges are 3 m apart and 2 m above the floor"""
+
+
+@pytest.fixture(scope="module")
+def machine(arm: Arm) -> Machine:
+    return load_machine(arm, pair=True)
+
+
+def sweep(arm: Arm, samples: int, seed: int = 0) -> np.ndarray:
+    """From the study pose to ever larger sines through the joints' ranges [rad], shape (samples, 14)."""
+    rng = np.random.default_rng(seed)
+    low, high = np.tile(np.maximum(arm.lower, -3), 2), np.tile(np.minimum(arm.upper, 3), 2)
+    part = np.linspace(0, 1, samples)[:, None]
+    turned = np.sin(20 * part * rng.uniform(0.5, 2.0, 14) + rng.uniform(0, 6, 14))
+    study = np.tile(arm.pose("study"), 2)
+    return study + part * (0.5 * (low + high) + 0.5 * (high - low) * turned - study)
+
+
+def closest(model: mujoco.MjModel, angle: np.ndarray) -> np.ndarray:
+    """The smallest distance [m] at each sample, by looking at every pair of shapes, shape (T,)."""
+    data, found = mujoco.MjData(model), []
+    solid = np.flatnonzero(model.geom_contype)
+    excluded = {(model.body(s >> 16).name, model.body(s & 0xFFFF).name) for s in model.exclude_signature}
+
+    def held(g: int, h: int) -> bool:
+        a, b = (model.body(model.geom_bodyid[k]) for k in (g, h))
+        weld = [int(model.body_weldid[body.id]) for body in (a, b)]
+        above = [int(model.body_weldid[model.body_parentid[w]]) for w in weld]
+        joined = all(weld) and (weld[0] == above[1] or weld[1] == above[0])
+        return weld[0] != weld[1] and not joined and (a.name, b.name) not in excluded
+
+    pairs = [(g, h) for i, g in enumerate(solid) for h in solid[i + 1 :] if held(g, h)]
+    for pose in angle:
+        data.qpos[:] = pose
+        mujoco.mj_forward(model, data)
+        found.append(min(mujoco.mj_geomDistance(model, data, g, h, 10.0, None) for g, h in pairs))
+    return np.array(found)
+
+
+def test_the_smallest_distance_is_that_of_all_pairs(machine: Machine, arm: Arm):
+    """No pair is wrongly left out because its distance was known to be larger."""
+    angle = sweep(arm, 150)
+    time = 0.01 * np.arange(len(angle))
+    expected = closest(machine.model, angle)
+    assert expected.min() < -0.05 < 0.05 < expected.max()
+    clearance = machine.checker.clearance(time, angle)
+    assert clearance.distance == pytest.approx(expected, abs=1e-6)
+    for margin in (0.0, 0.03, 0.08):
+        below = np.flatnonzero(expected < margin)
+        found = machine.checker.first_below(angle, margin)
+        assert (found is None) == (not len(below))
+        assert found is None or found[0] == below[0]
+
+
+def test_two_balls_meet_when_and_as_deep_as_geometry_says():
+    model = mujoco.MjModel.from_xml_string(SWINGS)
+    angle = np.radians(np.column_stack([np.linspace(180, 0, 181), np.full(181, 180.0)]))
+    time = np.arange(181) / 10
+    # the first ball comes over the top; the second one looks away from it
+    free = CollisionChecker(model).clearance(time, angle)
+    assert not free.meetings
+    assert free.distance.min() == pytest.approx(1.9)  # the height of a ball at its lowest, less its radius
+    towards = angle * [1.0, 0.0]
+    centre = np.array([1.0, 0.0])
+    ball = np.column_stack([np.cos(towards[:, 0]), np.sin(towards[:, 0])])
+    apart = np.linalg.norm(ball - (np.array([3.0, 0.0]) - centre), axis=1) - 0.2
+    met = CollisionChecker(model).clearance(time, towards)
+    assert met.distance == pytest.approx(np.minimum(apart, 1.9), abs=1e-9)
+    assert met.nearest[-1] == ("first", "second")
+
+
+def test_depth_and_time_of_a_meeting():
+    text = SWINGS.replace('pos="3 0 2"', 'pos="2.1 0 2"')
+    model = mujoco.MjModel.from_xml_string(text)
+    time = np.linspace(0.0, 2.0, 201)
+    angle = np.column_stack([0.4 * (1 - time), np.zeros(201)])  # past the other ball, 0.1 m from it
+    (meeting,) = CollisionChecker(model).clearance(time, angle).meetings
+    assert (meeting.first, meeting.second) == ("first", "second")
+    assert meeting.deepest == pytest.approx(1.0)
+    assert meeting.depth == pytest.approx(0.1)
+    near = np.hypot(np.cos(angle[:, 0]) - 1.1, np.sin(angle[:, 0])) < 0.2
+    assert (meeting.begins, meeting.ends) == pytest.approx(tuple(time[near][[0, -1]]))
+    assert CollisionChecker(model).first_below(angle, 0.0) == (int(np.argmax(near)), ("first", "second"))
+
+
+def test_a_model_without_shapes_is_refused():
+    model = mujoco.MjModel.from_xml_string(SWINGS.replace("<geom", '<geom contype="0" conaffinity="0"'))
+    with pytest.raises(ModelError, match="no two of its bodies can collide"):
+        CollisionChecker(model, "swings")
+
+
+def test_nothing_meets_in_a_named_pose(machine: Machine, arm: Arm):
+    poses = np.array([np.tile(arm.pose(name), 2) for name in arm.poses])
+    clearance = machine.checker.clearance(np.arange(len(poses), dtype=float), poses)
+    assert not clearance.meetings
+    assert {frozenset(pair) for pair in clearance.excluded} == {
+        frozenset({"carrier", "right_link1"}),
+        frozenset({"carrier", "left_link1"}),
+    }

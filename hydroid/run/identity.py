@@ -88,7 +88,8 @@ def refuse_other_run(
         raise RunError(what, where=str(folder), hint=hint)
     if settings.arm.model.resolve() == (folder / MODEL).resolve():
         return
-    arms = (arm.model_dump(mode="json", exclude={"model", "meshes"}) for arm in (before.arm, settings.arm))
+    elsewhere = {"model", "meshes", "pair"}  # where files are, and what stands beside the arm
+    arms = (arm.model_dump(mode="json", exclude=elsewhere) for arm in (before.arm, settings.arm))
     for key, old, new in _differences(*arms):
         hint = f"continue it with its own arm, or {other}"
         raise RunError(f"holds a run of an arm with {key} = {old}, now {new}", where=str(folder), hint=hint)

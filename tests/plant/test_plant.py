@@ -198,9 +198,9 @@ def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
         command = [0, 70.0, 0, 0, -30.0, 0, 0]
         np.testing.assert_array_equal(again.step(command), plant.step(command))
     arm = plant.identified.settings.arm
-    assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == {
-        part.mesh for part in (*arm.parts, arm.base)
-    }
+    assert arm.pair is not None
+    meshes = {*(part.mesh for part in (*arm.parts, arm.base)), *arm.pair.carrier}
+    assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == meshes
 
 
 @pytest.mark.parametrize("joints", [[2], [2, 5]])

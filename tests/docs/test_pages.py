@@ -14,7 +14,7 @@ from hydroid.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-RUN = ("quick_start", "first_log", "recording", "algorithms", "python")
+RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "two_arms")
 """pages whose `sh` and `python` blocks are run, in this order; other blocks are only shown"""
 COMMANDS = get_command(app).commands  # pyright: ignore
 

@@ -30,7 +30,7 @@ def read_arms(
     """Read the commands of an arm that stands alone, or of those arms of a pair that move.
 
     Args:
-        log: a CSV file or a log. Columns that begin with right_ and left_ are those of the two arms; without
+        log: a CSV file or a log. Columns that begin with `right_` and `left_` are those of the two arms; without
             them every arm that moves has the same commands, so that both move as mirror images.
         settings: which map its columns.
         arm: right, left or both: the arms of the pair that move; None: the arm stands alone.

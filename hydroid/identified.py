@@ -122,7 +122,7 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
         RunError: the folder cannot be written, or a mesh of the carrier of two arms cannot be read.
     """
     meshes, pair = (Path(MODEL).parent / "meshes").as_posix(), settings.arm.pair
-    arm = settings.arm.model_dump(mode="json") | {"model": MODEL, "meshes": meshes}
+    arm: dict[str, Any] = settings.arm.model_dump(mode="json") | {"model": MODEL, "meshes": meshes}
     if pair is not None:
         arm["pair"]["model"] = PAIR
         for mesh in pair.carrier:

@@ -30,8 +30,8 @@ def read_arms(
     """Read the commands of an arm that stands alone, or of those arms of a pair that move.
 
     Args:
-        log: a CSV file or a log. Columns that begin with `right_` and `left_` are those of the two arms; without
-            them every arm that moves has the same commands, so that both move as mirror images.
+        log: a CSV file or a log. Columns that begin with `right_` and `left_` are those of the two arms.
+            Without them every arm that moves has the same commands: both move as mirror images.
         settings: which map its columns.
         arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
         pose: as in `read_commands`.
@@ -167,4 +167,4 @@ def _names_arms(path: Path, settings: FitSettings) -> bool:
     from hydroid.log import open_table
 
     prefixes = tuple(f"{side}_" for side in SIDES)
-    return any(name.startswith(prefixes) for name in open_table(path, (settings.log.time.column,)).names)
+    return any(name.startswith(prefixes) for name in open_table(path, settings.log).names)

@@ -38,11 +38,15 @@ SPANS = {
     "flow_limit": (0.1, 1000.0),
     "pump_flow": (0.1, 1000.0),
     "pump_droop": (0.0, 200.0),
+    "pump_idle": (0.05, 1.0),
+    "pump_delay": (0.0, 5.0),
+    "pump_rise": (0.0, 5.0),
     "bulk_modulus": (500.0, 20000.0),
     "dry_friction": (0.0, 1e5),
     "delay": (0.0, 2.0),
     "dead_band": (0.0, 90.0),
     "sensor_lag": (0.0, 1.0),
+    "sensor_scale": (0.8, 1.25),
 }
 """values that real actuators have, of the quantities that `hydroid suggest` asks about where they are not
 free; of those with two sides it asks about both together and about each"""

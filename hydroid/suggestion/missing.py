@@ -1,6 +1,7 @@
 """What the model lacks: each term that a fit holds is tested, and what freeing it would really gain."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,7 +10,7 @@ import numpy as np
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
-from hydroid.suggestion.freeing import Freed, Freeing
+from hydroid.suggestion.freeing import LIMITS, Freed, Freeing
 from hydroid.suggestion.score import Explained, Score, holm
 from hydroid.suggestion.terms import ExtendedModel, Term
 from hydroid.uncertainty.covariance import Uncertainty
@@ -20,7 +21,7 @@ MIN_GAIN = 0.05
 """part of the rms error that freeing a term must save"""
 PROMISING = 0.5 * MIN_GAIN
 """part that the linear model must promise for it to be tried"""
-MOST_TRIED = {True: 4, False: 3}
+MOST_TRIED = {True: 6, False: 3}
 """terms that are tried, the most promising first, where thorough or not; of one quantity only one: a side,
 or both"""
 FIRST = 1e-3
@@ -110,38 +111,51 @@ def missing_terms(
     progress("terms", 0, len(model.terms))
     explained = Explained.by(problem, uncertainty)
     directions = _directions(model, explained)
-    chances = {
-        i: d.score.chance(one_sided=model.terms[i].lowest_change == 0.0) for i, d in directions.items()
-    }
-    significant = dict(zip(chances, holm(list(chances.values()), LEVEL), strict=True))
-    promise = {i: d.score.part for i, d in directions.items() if significant[i] and d.score.part >= PROMISING}
+    chances = {i: _chance(model.terms[i], d.score) for i, d in directions.items()}
     freeing = Freeing(problem, uncertainty, model)
     rms = freeing.without().rms if thorough else float(problem.rms(model.residual[None])[0])
     freed: dict[int, Freed] = {}
-    for i in _to_try(model.terms, promise)[: MOST_TRIED[thorough]]:
+    for i in _to_try(model.terms, directions, _significant(chances))[: MOST_TRIED[thorough]]:
         progress(f"freeing {model.terms[i].name}", len(freed), MOST_TRIED[thorough])
         freed[i] = freeing.freed(i, directions[i].change, directions[i].effect, refine=thorough)
+        # what is left then is the noise: far from a derivative's range the step does not show it
+        after = freed[i].residual
+        chances[i] = _chance(model.terms[i], explained.score(after - model.residual, after))
+    significant = _significant(chances)
     tests: list[TermTest] = []
     for i, term in enumerate(model.terms):
-        found = freed.get(i, Freed(rms, term.value))
+        found = freed.get(i)
+        lowest, value = (rms, term.value) if found is None or found.rms >= rms else (found.rms, found.value)
         if i not in directions:
             verdict = Verdict.INVISIBLE
-        elif found.rms < (1 - MIN_GAIN) * rms:
+        elif i in significant and lowest < (1 - MIN_GAIN) * rms:
             verdict = Verdict.FREE
         else:
-            verdict = Verdict.UNTRIED if i in promise and i not in freed else Verdict.LEAVE
-        gains = found if found.rms < rms else Freed(rms, term.value)
+            promises = i in significant and i not in freed and directions[i].score.part >= PROMISING
+            verdict = Verdict.UNTRIED if promises else Verdict.LEAVE
         statistic = directions[i].score.statistic if i in directions else 0.0
-        tests.append(TermTest(term, verdict, statistic, chances.get(i, 1.0), gains.rms, gains.value))
+        tests.append(TermTest(term, verdict, statistic, chances.get(i, 1.0), lowest, value))
     tests.sort(key=lambda t: (list(Verdict).index(t.verdict), t.rms, t.chance))
     return MissingTerms(tuple(tests), rms)
 
 
-def _to_try(terms: Sequence[Term], promise: Mapping[int, float]) -> list[int]:
-    """Return the most promising term of each quantity of each joint, the best first."""
+def _significant(chances: Mapping[int, float]) -> set[int]:
+    """Return the terms that are significant among all (S. Holm, 1979)."""
+    return {i for i, holds in zip(chances, holm(list(chances.values()), LEVEL), strict=True) if holds}
+
+
+def _to_try(
+    terms: Sequence[Term], directions: Mapping[int, _Direction], significant: Collection[int]
+) -> list[int]:
+    """Return the most promising term of each quantity of each joint: significant ones first, then limits."""
+
+    def rank(i: int) -> tuple[bool, bool, float]:
+        return i not in significant, math.isfinite(terms[i].value), -directions[i].score.part
+
     best: dict[object, int] = {}
-    for i in sorted(promise, key=lambda i: -promise[i]):
-        best.setdefault(terms[i].kind, i)
+    for i in sorted(directions, key=rank):
+        if directions[i].score.part >= PROMISING or math.isinf(terms[i].value):
+            best.setdefault(terms[i].kind, i)
     return list(best.values())
 
 
@@ -167,7 +181,17 @@ def _directions(model: ExtendedModel, explained: Explained) -> dict[int, _Direct
     found = {
         i: _Direction(change, effect, explained.score(effect)) for i, (change, effect) in effects.items()
     }
-    return {i: d for i, d in found.items() if d.score.strength >= VISIBLE * d.change}
+    return {
+        i: d
+        for i, d in found.items()
+        if d.score.strength >= VISIBLE * d.change or math.isinf(model.terms[i].value)
+    }
+
+
+def _chance(term: Term, score: Score) -> float:
+    """Probability of a score if the model lacks nothing; for the best of several limits, of any of these."""
+    chance = score.chance(one_sided=term.lowest_change == 0.0)
+    return min(len(LIMITS) * chance, 1.0) if math.isinf(term.value) else chance
 
 
 def _next(small: float, large: float, change: float, size: float) -> float:

@@ -89,8 +89,11 @@ class Explained:
         rows = [channel.rows for channel in channels]
         return Explained(effects[values > 0], residual, noise_of, rows, at.prior_weight)
 
-    def score(self, change: Array) -> Score:
-        """Return the score of a change of the residuals, shape (R,)."""
+    def score(self, change: Array, after: Array | None = None) -> Score:
+        """Return the score of a change of the residuals, shape (R,).
+
+        `after`, shape (R,), is the residual of a fit with the change, if one was made; it then is the noise.
+        """
         row = np.concatenate([change, np.zeros(self.residual.size - change.size)])
         row -= self.effects.T @ (self.effects @ row)
         length = float(row @ row)
@@ -98,7 +101,7 @@ class Explained:
             return Score(0.0, 0.0, 0.0, 0.0, 1.0)
         gain = -float(row @ self.residual)
         left = (self.residual + gain / length * row)[: change.size]
-        variance, freedom = self._variance(row, self.noise_of(left))
+        variance, freedom = self._variance(row, self.noise_of(left if after is None else after))
         deviation = float(np.sqrt(variance))
         before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
         saved = 1.0 - float(np.linalg.norm(left)) / before

@@ -61,8 +61,8 @@ def test_every_quantity_that_is_switched_off_by_default_is_tested():
     settings = load_settings("fit-hyd")
     off = [n for n in QUANTITIES if getattr(settings.hydraulics, n, 1.0) in (0.0, None)]
     tested = {target for name in SPANS for target in TARGETS[name]}
-    # what acts only together with a pump's flow limit or at a stop, and what is 0 in nature
-    assert set(off) - tested <= {"pump_delay", "pump_rise", "trapped_pressure", "vapour_pressure"}
+    # what acts only at a stop, and what is 0 in nature
+    assert set(off) - tested <= {"trapped_pressure", "vapour_pressure"}
 
 
 def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):

@@ -1,13 +1,14 @@
 """Do the intervals hold? 95 % intervals of 200 simulated logs with known truth, white and slow noise.
 
     python benchmarks/interval_coverage.py [--logs 200] [--seconds 20 75] [--correlation-times 0 0.15 1 4]
-                                           [--noisy-start]
+                                           [--noisy-start] [--free-start]
 
 Shoulder and elbow are driven and measured, the other joints locked; K, D, S (shared by both), M2 and M6 are
 free, M1, M3, M4 and M5 held as if weighed: from these angles all five are determined. The noise of 0.1 deg
 is white, or a first-order autoregression of a correlation time; each fit estimates it from its own residual.
 The refinement starts at the truth times random factors within 5 %: this is a study of the intervals, not of
-the search. The first sample is the start pose and has no noise, unless --noisy-start. "width" is the mean
+the search. The first sample is the start pose and has no noise, unless --noisy-start; with
+--free-start the fits leave it open. "width" is the mean
 width of the intervals, divided by that of 95 % intervals for the true noise. "bound" is the Cramér-Rao bound
 of the true noise at the true parameters.
 """
@@ -73,9 +74,9 @@ def clean_log(settings: FitSettings, seconds: float) -> Log:
     return simulate_log(settings, drive, TRUTH, "truth")
 
 
-def study(correlation_time: float, logs: int, seconds: float, *, start: bool) -> None:
+def study(correlation_time: float, logs: int, seconds: float, *, start: bool, open_start: bool) -> None:
     """Fit every log, and print how often each parameter's interval holds the truth."""
-    settings = load_settings("article-mech", CHANGES)
+    settings = load_settings("article-mech", CHANGES | {"free_start": "auto" if open_start else False})
     clean = clean_log(settings, seconds)
     phi = float(np.exp(-clean.period / correlation_time)) if correlation_time else 0.0
     problem = Problem(settings, [clean])
@@ -125,10 +126,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, nargs="+", default=[20.0, 75.0])
     parser.add_argument("--correlation-times", type=float, nargs="+", default=[0.0, 0.15, 1.0, 4.0])
     parser.add_argument("--noisy-start", action="store_true")
+    parser.add_argument("--free-start", action="store_true")
     arguments = parser.parse_args()
     for seconds in arguments.seconds:
         for correlation_time in arguments.correlation_times:
-            study(correlation_time, arguments.logs, seconds, start=arguments.noisy_start)
+            study(
+                correlation_time,
+                arguments.logs,
+                seconds,
+                start=arguments.noisy_start,
+                open_start=arguments.free_start,
+            )
 
 
 if __name__ == "__main__":

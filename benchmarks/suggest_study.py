@@ -3,12 +3,12 @@
     python benchmarks/suggest_study.py [--logs 20] [--seconds 15] [--only delay none]
 
 Stage 2 of the shoulder: areas and openings of both sides, the damping and the third link's mass are free,
-with the priors of configs/fit-hyd.yaml, and all else is held at the truth. Each log is simulated with one term
-present (or none), with commands and a start pose of its own, a second of rest, and 0.1 deg of white noise. The
-model without the term is fitted to it and tested. The refinement starts within 5 % of the truth: this is a
-study of the test, not of the search. The sizes of the terms are ours. The flow limit is a part of the largest
-flow in the log without it (FLOW_PART): a limit that no flow reaches changes nothing. A term is named where the
-verdict is to free it, on one side or both. It is first where nothing ranks before it.
+with the priors of configs/fit-hyd.yaml, and all else is held at the truth. Each log is simulated with one
+term present (or none), with commands and a start pose of its own, a second of rest, and 0.1 deg of white
+noise. The model without the term is fitted to it and tested. The refinement starts within 5 % of the truth:
+this is a study of the test, not of the search. The sizes of the terms are ours. The flow limit is a part of
+the largest flow in the log without it (FLOW_PART): a limit that no flow reaches changes nothing. A term is
+named where the verdict is to free it, on one side or both. It is first where nothing ranks before it.
 """
 
 import argparse

@@ -60,12 +60,14 @@ class Refinement:
 class _Descent:
     """A refinement under way: least squares with the priors weighed by one estimate of the noise.
 
-    weight: residual that a prior's standard deviation counts [rad]. rounds: noise estimates so far.
+    weight: residual that a prior's standard deviation counts [rad]. anchor: point of the unit box at which
+    the effect of open start angles was taken, shape (p,). rounds: estimates of both so far.
     evaluations, iterations, cost_before: of the rounds before this one, and of the first start.
     """
 
     state: State
     weight: float
+    anchor: Array
     rounds: int
     evaluations: int
     iterations: int
@@ -77,7 +79,8 @@ class _Descent:
 
     @staticmethod
     def from_arrays(arrays: Arrays) -> "_Descent":
-        own = {n.removeprefix("descent."): v.item() for n, v in arrays.items() if n.startswith("descent.")}
+        kept = {n.removeprefix("descent."): v for n, v in arrays.items() if n.startswith("descent.")}
+        own: dict[str, Any] = {n: v if v.ndim else v.item() for n, v in kept.items()}
         return _Descent(State.from_arrays(arrays), **own)
 
     def result(self) -> Refinement:
@@ -98,7 +101,8 @@ def refine(
     """Improve an estimate by bounded least squares.
 
     Priors join as residuals of (value - prior) / sd times what one standard deviation counts beside the logs'
-    noise (`prior_weight`). The noise is taken at the start, and again at the result, until it settles.
+    noise (`prior_weight`). The noise, and the effect of open start angles, are taken at the start and again
+    at the result, until the noise settles.
 
     Args:
         problem: the problem.
@@ -118,9 +122,11 @@ def refine(
         values["ending"] = Ending[values["ending"]]
         return Refinement(**values)
     descent = _begin(problem, theta) if stored is None else _Descent.from_arrays(stored)
+    opened = _opened(problem, descent)
     saved, last = time.monotonic(), descent
     try:
-        while (after := _next(problem, descent, settings)) is not None:
+        while (after := _next(opened, descent, settings)) is not None:
+            opened = opened if after.rounds == descent.rounds else _opened(problem, after)
             descent = after
             error = problem.rms(descent.state.residual[None, : problem.measured.size])[0]
             progress(descent.evaluations + descent.state.evaluations, float(error))
@@ -139,17 +145,21 @@ def refine(
 
 
 def _begin(problem: Problem, theta: Array) -> _Descent:
-    row = problem.residuals(theta[None])[0]
-    weight = _weight(problem, row)
     unit = problem.parameters.to_unit(theta[None])[0]
+    row = problem.with_open_start(theta).residuals(theta[None])[0]
+    weight = _weight(problem, row)
     state = start(unit, _with_priors(problem, row[None], unit[None], weight)[0])
-    return _Descent(state, weight, 1, 0, 0, state.cost)
+    return _Descent(state, weight, unit, 1, 0, 0, state.cost)
+
+
+def _opened(problem: Problem, descent: _Descent) -> Problem:
+    return problem.with_open_start(problem.parameters.from_unit(descent.anchor[None])[0])
 
 
 def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> _Descent | None:
     """The refinement one step on; None where it has ended."""
     state, weight = descent.state, descent.weight
-    first = descent.rounds == 1 and len(problem.priors) > 0
+    first = descent.rounds == 1 and (len(problem.priors) > 0 or problem.leaves_start_open)
     if state.ending is None:
 
         def residuals(unit: Array) -> Array:
@@ -163,12 +173,16 @@ def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> 
     again = _weight(problem, row)
     if descent.rounds == ROUNDS or not (first or abs(again - weight) > SETTLED * weight):
         return None
-    # the next round starts from a row that is known, at no simulation
+    # the next round starts from a row that is known, at no simulation, unless a start angle is open
+    if problem.leaves_start_open:
+        theta = problem.parameters.from_unit(state.point[None])
+        row = problem.with_open_start(theta[0]).residuals(theta)[0]
     state = start(state.point, _with_priors(problem, row[None], state.point[None], again)[0])
     return replace(
         descent,
         state=replace(state, evaluations=0, cycle_evaluations=0),
         weight=again,
+        anchor=state.point,
         rounds=descent.rounds + 1,
         evaluations=descent.evaluations + descent.state.evaluations,
         iterations=descent.iterations + descent.state.iterations,

@@ -65,13 +65,32 @@ class Log:
         return self._at_rest(self.angle)
 
     @property
+    def start_samples(self) -> Floats:
+        """Independent samples whose mean `start` is as precise as, shape (J,): few if the rest drifts."""
+        resting = self._resting(self.angle)
+        if len(resting) < 3:
+            return np.full(self.joints, float(len(resting)))
+        off = resting - self._at_rest(self.angle)
+        square = np.sum(off**2, axis=0)
+        with np.errstate(invalid="ignore"):
+            last = np.where(square > 0, np.sum(off[1:] * off[:-1], axis=0) / square, 0.0)
+        return len(resting) * (1 - np.clip(last, 0, 1)) / (1 + np.clip(last, 0, 1))
+
+    def moved(self, joint: int, angle: float) -> "Log":
+        """Return the recording with all angles of one joint (number, from 1) turned by an angle [rad]."""
+        return replace(self, angle=self.angle + angle * (np.arange(self.joints) == joint - 1))
+
+    @property
     def start_pressure(self) -> Floats | None:
         """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
         return None if self.pressure is None else self._at_rest(self.pressure)
 
     def _at_rest(self, signal: Floats) -> Floats:
-        resting = signal[: min(self._rest, round(LONGEST_REST / self.period)) + 1]
+        resting = self._resting(signal)
         return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal values to the last bit
+
+    def _resting(self, signal: Floats) -> Floats:
+        return signal[: min(self._rest, round(LONGEST_REST / self.period)) + 1]
 
     @property
     def _rest(self) -> int:

@@ -1,7 +1,7 @@
 """Channels: the signals that are compared, one of one log each, and their places in a row of residuals."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,7 +37,7 @@ class Channel:
     weight: float
     rows: slice
 
-    def residual(self, responses: Sequence[Response]) -> Array:
+    def residual(self, responses: Sequence[Response] | Mapping[int, Response]) -> Array:
         """Return the weighted output error y - y_hat of (17) [rad], shape (n, T)."""
         response = responses[self.log]
         if self.quantity == "angle":

@@ -5,6 +5,7 @@ simulated by threads of this process, or on workers (`Spread`); no bit of a resu
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
+from hydroid.problem.free_start import OpenStart, open_joints, open_start
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.stage import Stage
@@ -62,6 +64,7 @@ class Problem:
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
         measured: all channels in a row, times their weights, shape (R,).
+        open_starts: what open start angles can explain, taken out of the residuals (`with_open_start`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
@@ -70,13 +73,15 @@ class Problem:
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
+        self._spec = spec
+        self.open_starts: tuple[OpenStart, ...] = ()
         self.stage = Stage(settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
         self.parameters = self.stage.parameters
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
-        pressures = [compared_pressures(log, settings) for log in logs]
+        self._pressures = pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [
             make_simulation(spec, log, outputs, settings, joints)
             for log, joints in zip(logs, pressures, strict=True)
@@ -100,7 +105,41 @@ class Problem:
         settings = self.settings.model_copy(
             update={"parameters": self.settings.parameters | dict(parameters)}
         )
-        return Problem(settings, self.logs, self._spread)
+        extended = Problem(settings, self.logs, self._spread)
+        extended.open_starts = self.open_starts
+        return extended
+
+    @property
+    def leaves_start_open(self) -> bool:
+        """Whether the start angle of any log is open."""
+        return any(self._open_joints(log) for log in self.logs)
+
+    def with_open_start(self, theta: Array) -> "Problem":
+        """Return the problem whose residuals hold for any start angle that its logs leave open.
+
+        Their effect is that at theta, shape (P,), from two simulations for each. It is the same problem where
+        all logs show where they start.
+        """
+        if not self.leaves_start_open:
+            return self
+        opened, candidates = copy(self), self.stage.candidates(theta[None])
+        found: list[OpenStart | None] = []
+        for i, log in enumerate(self.logs):
+            own = [channel for channel in self.channels if channel.log == i]
+
+            def residuals(joint: int, shift: float, i: int = i, own: list[Channel] = own) -> Array:
+                log = self.logs[i].moved(joint, shift)
+                one = make_simulation(self._spec, log, self.outputs, self.settings, self._pressures[i])
+                response = {i: one.simulate(candidates)}
+                return np.concatenate([channel.residual(response)[0] for channel in own])
+
+            rows, joints = slice(own[0].rows.start, own[-1].rows.stop), self._open_joints(log)
+            found.append(open_start(rows, joints, residuals) if joints else None)
+        opened.open_starts = tuple(each for each in found if each is not None)
+        return opened
+
+    def _open_joints(self, log: Log) -> list[int]:
+        return open_joints(log, list(self.settings.outputs), self.settings.free_start)
 
     def first(self, seconds: float) -> "Problem":
         """Return the problem of the first seconds after each log's first command, one segment per channel."""
@@ -171,10 +210,17 @@ class Problem:
         return values
 
     def residuals(self, theta: Array) -> Array:
-        """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged."""
+        """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged.
+
+        What open start angles can explain is taken out (`with_open_start`).
+        """
         if self._spread is None:
-            return self.output_errors(theta)
-        return self._spread(self._on_worker, "output_errors", theta, len(self.measured))
+            rows = self.output_errors(theta)
+        else:
+            rows = self._spread(self._on_worker, "output_errors", theta, len(self.measured))
+        for start in self.open_starts:
+            start.close(rows)
+        return rows
 
     def output_errors(self, theta: Array) -> Array:
         """The residuals of theta, shape (n, P), simulated in this process."""

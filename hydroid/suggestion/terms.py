@@ -154,7 +154,9 @@ class ExtendedModel:
             for part, target in zip(parts[-1], targets, strict=False):
                 if not term.named:
                     added[part] = term.settings.model_copy(update={"quantity": target}), term.value
-        self._problem = problem.extended({name: settings for name, (settings, _) in added.items()})
+        self._problem = problem.with_open_start(theta).extended(
+            {name: settings for name, (settings, _) in added.items()}
+        )
         names = self._problem.parameters.names
         self._base = np.array([*theta, *(value for _, value in added.values())])
         self._columns = [[names.index(name) for name in part] for part in parts]

@@ -189,7 +189,7 @@ def _redrawn(problem: Problem, uncertainty: Uncertainty, count: int, rng: np.ran
 
 
 def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
-    weight = uncertainty.jacobian.prior_weight
+    weight, problem = uncertainty.jacobian.prior_weight, problem.with_open_start(uncertainty.theta)
     return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
 
 

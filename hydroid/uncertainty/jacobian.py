@@ -66,6 +66,7 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     Differences are central, or one-sided and of second order at a bound. Each is taken with two steps; where
     these disagree the wider one counts, and `doubt` is their difference.
     """
+    problem = problem.with_open_start(theta)
     scale, free = relative_scale(problem.parameters, theta), problem.parameters.free
     residual = problem.residuals(theta[None])[0]
     fine, wide = (

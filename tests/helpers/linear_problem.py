@@ -40,6 +40,9 @@ class Linear:
         )
         self.weight = np.repeat(weights, np.diff(edges))
 
+    def with_open_start(self, theta):
+        return self
+
     def residuals(self, theta):
         self.simulated += len(theta)
         return self.weight * (self.measured - theta / self.unit @ self.columns)

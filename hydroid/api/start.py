@@ -16,6 +16,7 @@ def init(
     arm: str | Path | None = None,
     logs: Sequence[str | Path] = (),
     *,
+    joints: Sequence[str] = (),
     tip: str | None = None,
 ) -> "Project":
     """Write a project that runs: arm file, model, settings of both stages, a picture of the arm, next steps.
@@ -25,19 +26,22 @@ def init(
 
     Args:
         folder: where; what is there is not overwritten.
-        arm: its URDF or MJCF; None: a template of boxes to be filled in.
+        arm: its URDF or MJCF, or an arm's YAML file; None: a template of boxes to be filled in.
         logs: the columns are guessed from the first. Of several, the next steps keep the last to validate on.
+        joints: names of the arm's joints as the log counts them, where its columns have numbers in another
+            order than the arm.
         tip: name of the link at which the arm ends, where the file's joints branch; None: the branch that the
             log names, or the longest.
 
     Raises:
-        SettingsError: a file of the project is there already.
+        SettingsError: a file of the project is there already, or no joint has one of the names.
         ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot.
         RunError: the folder cannot be written.
     """
     for path in (*logs, *([] if arm is None else [arm])):
         if not is_file(Path(path)):
             raise SettingsError("no such file", where=str(path))
-    from hydroid.project import write_project
+    from hydroid.project import Sources, write_project
 
-    return write_project(Path(folder), None if arm is None else Path(arm), [Path(log) for log in logs], tip)
+    robot = None if arm is None else Path(arm)
+    return write_project(Path(folder), Sources(robot, tuple(map(Path, logs)), tuple(joints), tip))

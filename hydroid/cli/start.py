@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from hydroid.cli.options import Output
+from hydroid.cli.options import Output, names
 from hydroid.cli.output import show
 
 
@@ -14,11 +14,22 @@ def init(
     output: Output,
     arm: Annotated[
         Path | None,
-        typer.Option(metavar="robot.urdf", help="URDF or MJCF of the arm [default: a template of boxes]."),
+        typer.Option(
+            metavar="robot.urdf",
+            help="URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].",
+        ),
     ] = None,
     log: Annotated[
         list[Path] | None,
         typer.Option(metavar="LOG", help="A log; its columns are guessed. Repeat it for several logs."),
+    ] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="The arm's joints as the log counts them, where its columns have numbers [default: in the "
+            "arm's order].",
+        ),
     ] = None,
     tip: Annotated[
         str | None,
@@ -35,7 +46,7 @@ def init(
     """
     from hydroid.api.start import init
 
-    project = init(folder, arm, log or [], tip=tip)
+    project = init(folder, arm, log or [], joints=names(joints or ""), tip=tip)
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit-mech.yaml and fit-hyd.yaml:"
     for heading, group in (("The arm:", project.notes), (guessed, project.columns)):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import yaml
@@ -13,7 +14,9 @@ from hydroid.settings.linkage import LinearActuator
 
 LONGEST_STEP = 0.025
 """of MuJoCo [s], in a log of fewer samples"""
-RESPONSE = 0.03
+DEAD = 0.8
+"""part of the command below which a joint seems to stand that its dead band is"""
+RESPONSE = 0.05
 """of a valve and its oil without any delay [s]"""
 
 MECH = """\
@@ -22,7 +25,7 @@ MECH = """\
 # The hydraulics are a gain: torque [N·m] = K [N·m/%] · command [%]. A damper D and a spring S at each joint
 # stand for what the oil and the friction do. Every setting: docs/settings.md.
 stage: mech
-arm: arm.yaml
+arm: {arm}
 outputs: {outputs}             # joints whose angles are compared
 
 {log}
@@ -34,9 +37,9 @@ parameters:
 {parameters}
   M: {{quantity: mass, each: true, within: 2}}              # kg, M_LINK of every link
 
-# Least squares from the nominal values and from two random starts.
+# Least squares from the nominal values; more `starts` are random.
 objective: {{norm: 2, segments: {{equal: 4}}}}
-search: {{algorithm: multistart, seed: 1, multistart: {{starts: 3}}}}
+search: {{algorithm: multistart, seed: 1, multistart: {{starts: 1, iterations: 50}}}}
 """
 HYD = """\
 # Stage 2: hydroid fit-hyd LOG --mech RUN --config {file}
@@ -44,7 +47,7 @@ HYD = """\
 # The whole chain: command, valve, oil, cylinder. The masses of stage 1 hold. Every setting:
 # docs/settings.md. More terms that a machine may need: configs/fit-hyd-machine.yaml of hydroid.
 stage: hyd
-arm: arm.yaml
+arm: {arm}
 outputs: {outputs}             # joints whose angles are compared
 
 {log}
@@ -52,8 +55,7 @@ outputs: {outputs}             # joints whose angles are compared
 # What is taken to be known of all joints; these are also nominal values of parameters below.
 hydraulics:
   supply_pressure: 150             # bar    read it off the gauge
-  dead_band: 5                     # %      of command, in which nothing moves
-  onset_a: 0                       # V      no jump behind it
+  onset_a: 0                       # V      no jump behind the dead band
   onset_b: 0
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
 
@@ -64,8 +66,6 @@ parameters:
   M: {{quantity: mass, each: true, within: 2}}              # kg     stage 1's hold (with --mech)
   open_A: {{quantity: opening_a, each: true, within: 4}}    # mm²    valve opening at full command
   open_B: {{quantity: opening_b, each: true, within: 4}}
-  dead_A: {{quantity: dead_band_a, each: true, sd: 10, bounds: [0, 70]}}        # %
-  dead_B: {{quantity: dead_band_b, each: true, sd: 10, bounds: [0, 70]}}
   lag: {{quantity: plunger_damping, each: true, within: 10}}                    # N·s/m  2000 N·s/m are 1 s
   # friction: {{quantity: dry_friction, each: true, bounds: [0, 5000], start: 100}}   # N; N·m of a rotary one
   # exponent: {{quantity: opening_exponent, each: true, within: 2}}       # 1: the opening follows the command
@@ -86,8 +86,16 @@ NO_LOG = """\
 """
 
 
-def mech_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: str) -> str:
-    """Return the settings of stage 1; `file` is their name as a command takes it."""
+@dataclass(frozen=True)
+class Names:
+    """The settings' file as a command takes it, and the arm's file as the settings name it."""
+
+    file: str
+    arm: str
+
+
+def mech_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], names: Names) -> str:
+    """Return the settings of stage 1."""
     lines: list[str] = []
     for joint in _outputs(arm, layout):
         name, size = arm.joint_names[joint - 1], sizes[joint - 1]
@@ -97,16 +105,18 @@ def mech_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file:
             _row("D", "damping", name, f"nominal: {short(size.damping)}, within: 10"),
             _row("S", "stiffness", name, f"bounds: [{low}, {high}], start: {start}"),
         ]
-    return MECH.format(parameters="\n".join(lines), **_common(arm, layout, file))
+    return MECH.format(parameters="\n".join(lines), **_common(arm, layout, names))
 
 
-def hyd_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: str) -> str:
+def hyd_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], names: Names) -> str:
     """Return the settings of stage 2."""
     lines, volumes = list[str](), list[float]()
     for joint in _outputs(arm, layout):
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
-        lag = 0.0 if layout is None else layout.lags.get(joint, 0.0)
-        delay = min(max(lag - RESPONSE, 0.0), 0.9)
+        motion = layout.motions.get(joint) if layout else None
+        delay = min(max(motion.lag - RESPONSE, 0.0), 0.9) if motion else 0.0
+        band = DEAD * min(max(motion.dead_band, 5.0), 70.0) if motion else 5.0
+        dead = f"nominal: {short(band)}, sd: 10, bounds: [0, 75]"
         if isinstance(own.actuator, LinearActuator):
             lines.append(_row("area_A", "area_a", name, "within: 1.5"))
             lines.append(_row("area_B", "area_b", name, "within: 1.5"))
@@ -116,8 +126,10 @@ def hyd_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         lines += [
             _row("D", "damping", name, f"nominal: {short(0.1 * size.damping)}, within: 10"),
             _row("delay", "delay", name, f"bounds: [0, 1], start: {delay:.2f}") + "    # s",
+            _row("dead_A", "dead_band_a", name, dead) + "    # %",
+            _row("dead_B", "dead_band_b", name, dead),
         ]
-    common = _common(arm, layout, file)
+    common = _common(arm, layout, names)
     return HYD.format(parameters="\n".join(lines), volume=short(min(volumes, default=50.0)), **common)
 
 
@@ -136,9 +148,10 @@ def _outputs(arm: Arm, layout: Layout | None) -> Sequence[int]:
     return range(1, len(arm.joints) + 1) if layout is None else layout.outputs
 
 
-def _common(arm: Arm, layout: Layout | None, file: str) -> dict[str, Any]:
-    names = ", ".join(arm.joint_names[joint - 1] for joint in _outputs(arm, layout))
-    return {"file": file, "outputs": f"[{names}]", "log": _log(arm, layout), "others": _others(layout)}
+def _common(arm: Arm, layout: Layout | None, names: Names) -> dict[str, Any]:
+    outputs = flow([arm.joint_names[joint - 1] for joint in _outputs(arm, layout)])
+    log, others = _log(arm, layout), _others(layout)
+    return {"file": names.file, "arm": flow(names.arm), "outputs": outputs, "log": log, "others": others}
 
 
 def _log(arm: Arm, layout: Layout | None) -> str:
@@ -150,9 +163,9 @@ def _log(arm: Arm, layout: Layout | None) -> str:
         *(f"# - {reason}" for reason in layout.reasons),
         *([f"# - not used: {', '.join(layout.unused)}"] if layout.unused else []),
         "log:",
-        *(f"  {key}: {_flow(value)}" for key, value in section.items() if key != "joints"),
+        *(f"  {key}: {flow(value)}" for key, value in section.items() if key != "joints"),
         "  joints:",
-        *(f"    {arm.joint_names[joint - 1]}: {_flow(entry)}" for joint, entry in section["joints"].items()),
+        *(f"    {arm.joint_names[joint - 1]}: {flow(entry)}" for joint, entry in section["joints"].items()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -166,6 +179,7 @@ def _others(layout: Layout | None) -> str:
     return f"{text}    # joints without a command: locked, passive or measured (they follow the log)\n"
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
+    """Write a value as YAML, on one line."""
     text = yaml.safe_dump(value, default_flow_style=True, width=10_000, allow_unicode=True, sort_keys=False)
     return text.removesuffix("...\n").strip()

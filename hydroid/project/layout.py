@@ -1,25 +1,23 @@
 """What a log holds: its columns, and how the joints move in it."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hydroid.errors import LogError
-from hydroid.log import Log, Table, check_log, guess_columns, suggest_delay
+from hydroid.errors import LogError, SettingsError
+from hydroid.log import Log, Table, check_log, guess_columns
+from hydroid.project.motion import Motion, find_motion
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
 
-FAST = 95
-"""percentile of the speeds in a log that counts as what its valves let through"""
 STILL_DEG = 1.0
 """travel below which a joint without a command counts as standing still"""
-SMOOTHING_S = 0.1
-"""over which a speed is taken"""
 
 
 @dataclass(frozen=True)
@@ -31,8 +29,7 @@ class Layout:
         outputs: joints with a command and an angle, numbered from 1.
         reasons: a line for each column, and for what was found in the numbers.
         unused: names of the other columns.
-        speeds: of the joints that move, by number [rad/s].
-        lags: of the joints behind their commands, by number [s].
+        motions: how the measured joints move, by number.
         followed: whether a joint without a command moves.
     """
 
@@ -40,43 +37,52 @@ class Layout:
     outputs: tuple[int, ...]
     reasons: tuple[str, ...]
     unused: tuple[str, ...] = ()
-    speeds: Mapping[int, float] = field(default_factory=dict[int, float])
-    lags: Mapping[int, float] = field(default_factory=dict[int, float])
+    motions: Mapping[int, Motion] = field(default_factory=dict[int, Motion])
     followed: bool = False
 
 
-def find_layout(table: Table, arm: Arm) -> Layout:
+def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle, and see how fast joints are.
+
+    Args:
+        table: the log.
+        arm: whose joints it is about.
+        order: names of the joints as the log counts them; by default those of the arm.
 
     Raises:
         LogError: no column looks like a time, or no joint has an angle.
+        SettingsError: a name in `order` that no joint has.
     """
-    guess = guess_columns(table, arm.joint_names)
-    section, reasons = guess.log, [*guess.reasons]
+    for name in order:
+        if name not in arm.joint_names:
+            hint = f"the arm's joints: {', '.join(arm.joint_names)}"
+            raise SettingsError(f"no joint {name!r}", where="--joints", hint=hint)
+    guess = guess_columns(table, order or arm.joint_names)
+    section = guess.log
+    reasons = [re.sub(r"joint \d+ \((\w+)\)", r"\1", reason) for reason in guess.reasons]
     entries: dict[int, Any] = section["joints"]
+    if order:
+        entries = {arm.joint_names.index(order[k - 1]) + 1: entry for k, entry in entries.items()}
+        section["joints"] = entries = dict(sorted(entries.items()))
     if not any(entry["angle"] for entry in entries.values()):
         hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
         raise LogError("has no column that looks like an angle", where=table.source, hint=hint)
     log = _read(table.source, section, arm, reasons)
-    speeds, lags, followed = dict[int, float](), dict[int, float](), False
+    motions, followed = dict[int, Motion](), False
     for joint, entry in entries.items() if log is not None else ():
         assert log is not None
-        name = arm.joint_names[joint - 1]
         if entry["angle"] is None:
             continue
         reasons += _outside(log, joint, arm)
-        speeds[joint] = _speed(log, joint)
+        motions[joint] = motion = find_motion(log, joint)
+        reasons += motion.remarks(arm.joint_names, joint)
         if entry["command"] is None:
-            followed |= float(np.degrees(np.ptp(log.angle[:, joint - 1]))) > STILL_DEG
-        elif (delay := suggest_delay(log, joint)) is not None:
-            lags[joint] = delay.lag
-            if delay.sign < 0:
-                entry["command"] = turned(entry["command"])
-                reasons.append(f"{name} moves against its command: the sign of the command is turned round")
+            followed |= motion.travel_deg > STILL_DEG
+        elif motion.sign < 0:
+            entry["command"] = turned(entry["command"])
     driven = tuple(j for j, e in entries.items() if e["command"] is not None and e["angle"] is not None)
     outputs = driven or tuple(j for j, e in entries.items() if e["angle"] is not None)
-    moving = {joint: speed for joint, speed in speeds.items() if speed > math.radians(0.1)}
-    return Layout(section, outputs, tuple(reasons), guess.unused, moving, lags, followed)
+    return Layout(section, outputs, tuple(reasons), guess.unused, motions, followed)
 
 
 def turned(command: dict[str, Any]) -> dict[str, Any]:
@@ -108,12 +114,3 @@ def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
         f"{math.degrees(high):.1f} deg, but the arm's file allows {limits}: give the angle an offset or a "
         "scale of -1, or change the range"
     ]
-
-
-def _speed(log: Log, joint: int) -> float:
-    """How fast a joint moves when it moves [rad/s]."""
-    apart = max(round(SMOOTHING_S / log.period), 1)
-    angle = log.angle[:, joint - 1]
-    if len(angle) <= apart:
-        return 0.0
-    return float(np.percentile(np.abs(angle[apart:] - angle[:-apart]), FAST)) / (apart * log.period)

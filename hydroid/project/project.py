@@ -15,15 +15,16 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table
 from hydroid.project.arm_file import MESHES, arm_text, template_text
-from hydroid.project.fit_files import hyd_text, mech_text
+from hydroid.project.fit_files import Names, hyd_text, mech_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
 from hydroid.report.arm_figure import arm_figure
 from hydroid.report.style import rendered, style
 from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import load
+from hydroid.settings.load import validate
 
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
 MECH, HYD, STEPS = "fit-mech.yaml", "fit-hyd.yaml", "next-steps.md"
@@ -51,46 +52,59 @@ class Project:
     commands: tuple[str, ...]
 
 
-def write_project(
-    folder: Path, robot: Path | None = None, logs: Sequence[Path] = (), tip: str | None = None
-) -> Project:
+@dataclass(frozen=True)
+class Sources:
+    """What a project is made from.
+
+    Attributes:
+        robot: URDF, MJCF or YAML file of the arm; None: a template of boxes.
+        logs: the first tells the columns; the last of several is kept to validate on.
+        joints: names of the arm's joints as the log counts them; by default in the arm's order.
+        tip: link at which the arm ends; None: the tip that fits the log, or the longest branch.
+    """
+
+    robot: Path | None = None
+    logs: tuple[Path, ...] = ()
+    joints: tuple[str, ...] = ()
+    tip: str | None = None
+
+
+def write_project(folder: Path, sources: Sources) -> Project:
     """Write a project to a folder, new or with other things in it.
 
-    Args:
-        folder: where.
-        robot: URDF or MJCF of the arm; None: a template of boxes.
-        logs: the first tells the columns; the last of several is kept to validate on.
-        tip: link at which the arm ends; None: the tip that fits the log, or the longest branch.
-
     Raises:
-        SettingsError: a file of the project is there already.
+        SettingsError: a file of the project is there already, or no joint has one of the given names.
         ModelError, MeshError, LogError: the robot or the first log cannot be used.
         RunError: the folder cannot be written.
     """
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if taken:
         raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint="name another folder")
+    logs, robot = sources.logs, sources.robot
     table = open_table(logs[0]) if logs else None
-    imported = import_arm(robot, table.names if table else (), tip) if robot is not None else None
+    own = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
+    imported = None
+    if robot is not None and not own:
+        imported = import_arm(robot, table.names if table else (), sources.tip)
     with _stage(folder) as stage:
         if imported is not None:
             imported = _write_meshes(imported, stage / MESHES)
-        arm = _write_arm(stage, folder, imported, robot)
-        layout = find_layout(table, arm) if table is not None else None
-        sizes = joint_sizes(arm, layout.speeds if layout else {})
-        arm = _write_arm(stage, folder, imported, robot, sizes)
-        write_model(arm, stage / MODEL)
+        files = _ArmFiles(folder, stage, imported, robot)
+        arm = files.write()
+        layout = find_layout(table, arm, sources.joints) if table is not None else None
+        sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
+        arm = files.write(sizes)
         with style():
             write_atomic(stage / PICTURE, rendered(arm_figure(arm))[0])
-        write_atomic(stage / MECH, mech_text(arm, layout, sizes, str(folder / MECH)))
-        write_atomic(stage / HYD, hyd_text(arm, layout, sizes, str(folder / HYD)))
-        for name in (MECH, HYD):
-            load(stage / name, FitSettings)  # what is written can be read
+        for name, text in ((MECH, mech_text), (HYD, hyd_text)):
+            write_atomic(stage / name, text(arm, layout, sizes, Names(str(folder / name), files.reference)))
+            values = read_yaml(stage / name)[0] | {"arm": arm}
+            validate(values, FitSettings, name)  # what is written can be read
         steps = next_steps(folder, logs)
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
         write_atomic(stage / STEPS, steps_page(arm.name, folder, steps, notes, reasons))
-        files = _move(stage, folder)
-    return Project(folder, files, notes, reasons, layout.unused if layout else (), steps)
+        written = _move(stage, folder)
+    return Project(folder, written, notes, reasons, layout.unused if layout else (), steps)
 
 
 @contextmanager
@@ -121,19 +135,35 @@ def _write_meshes(imported: ImportedArm, folder: Path) -> ImportedArm:
     return replace(imported, base=base, links=tuple(links), notes=tuple(notes))
 
 
-def _write_arm(
-    stage: Path,
-    folder: Path,
-    imported: ImportedArm | None,
-    robot: Path | None,
-    sizes: Sequence[JointSize] = (),
-) -> Arm:
-    if imported is None or robot is None:
-        text = template_text(str(folder / ARM))
-    else:
-        text = arm_text(imported, sizes, f"{imported.name}, from {robot.name}", str(folder / ARM))
-    write_atomic(stage / ARM, text)
-    return load_arm(stage / ARM)
+@dataclass(frozen=True)
+class _ArmFiles:
+    """The arm's file and model: written to the stage, or those that the user has."""
+
+    folder: Path
+    stage: Path
+    imported: ImportedArm | None
+    robot: Path | None
+
+    @property
+    def reference(self) -> str:
+        """The arm's file, seen from the project."""
+        if self.imported is not None or self.robot is None:
+            return ARM
+        return Path(os.path.relpath(self.robot.resolve(), self.folder.resolve())).as_posix()
+
+    def write(self, sizes: Sequence[JointSize] = ()) -> Arm:
+        """Write both, actuators of the given sizes included, and return the arm."""
+        file = str(self.folder / ARM)
+        if self.robot is None:
+            text = template_text(file)
+        elif self.imported is not None:
+            text = arm_text(self.imported, sizes, f"{self.imported.name}, from {self.robot.name}", file)
+        else:
+            return load_arm(self.robot)
+        write_atomic(self.stage / ARM, text)
+        arm = load_arm(self.stage / ARM)
+        write_model(arm, self.stage / MODEL)
+        return arm
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:

@@ -20,6 +20,8 @@ LIFT = 2.5
 """torque of a joint at the pump's pressure, over the largest that gravity asks of it"""
 SPEED = 0.5
 """of a joint that no log shows moving [rad/s]"""
+SLOWEST = 0.01
+"""of a joint that a log shows standing [rad/s]"""
 ACCELERATION = 1.0
 """that a joint without weight must give at least [rad/s²]"""
 POSES = 300
@@ -79,4 +81,5 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
         mujoco.mj_fullM(model, data, inertia)
         asked = np.maximum(LIFT * abs(data.qfrc_bias), ACCELERATION * np.diag(inertia))
         torque = np.maximum(torque, asked)
-    return tuple(JointSize(float(t), speeds.get(j, SPEED)) for j, t in enumerate(torque, 1))
+    slow = {joint: max(speed, SLOWEST) for joint, speed in speeds.items()}
+    return tuple(JointSize(float(t), slow.get(j, SPEED)) for j, t in enumerate(torque, 1))

@@ -19,7 +19,7 @@ def moves(joints: int, seconds: float, period: float, seed: int) -> np.ndarray:
     for joint in range(joints):
         at, sign = round(1.0 / period), 1.0
         while at < samples:
-            length = round(rng.uniform(0.8, 2.0) / period)
+            length = round(rng.uniform(0.4, 0.9) / period)
             command[at : at + length, joint] = sign * rng.uniform(25, 95)
             at, sign = at + length + round(rng.uniform(0.3, 1.0) / period), -sign
     return command

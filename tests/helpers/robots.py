@@ -16,6 +16,7 @@ JOINT = """
     {limit}
   </joint>"""
 LIMIT = '<limit lower="{}" upper="{}" effort="1e5" velocity="1"/>'
+WIDE = LIMIT.format(-3, 3)
 SIZES = {"house": (1.0, 0.8, 0.6), "boom": (2.0, 0.2, 0.3), "stick": (1.5, 0.15, 0.2)}
 """length, width and height of the links' boxes [m]"""
 MASSES = {"house": 800.0, "boom": 200.0, "stick": 90.0}
@@ -49,7 +50,7 @@ PARTS = {
     "house": link("house"),
     "boom": link("boom"),
     "stick": link("stick"),
-    "swing_joint": joint("swing_joint", "track", "house", at="0 0 0.8", axis="0 0 1"),
+    "swing_joint": joint("swing_joint", "track", "house", at="0 0 0.8", axis="0 0 1", limit=WIDE),
     "boom_joint": joint("boom_joint", "house", "boom", at="0.5 0 0.3", limit=LIMIT.format(-0.5, 1.2)),
     "stick_joint": joint("stick_joint", "boom", "stick", at="2 0 0", limit=LIMIT.format(-2.2, -0.2)),
     "more": "",

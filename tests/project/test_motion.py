@@ -1,0 +1,45 @@
+"""What a log says of a joint's motion, on motions whose answer is known."""
+
+import numpy as np
+import pytest
+
+from hydroid.log import Log
+from hydroid.project.motion import find_motion
+
+PERIOD = 0.02
+
+
+def log_of(dead=0.0, lag=0.0, sign=1.0, speed=0.5):
+    """A joint whose speed [rad/s] follows its command above a dead band [%], after a lag [s]."""
+    rng = np.random.default_rng(0)
+    command = np.repeat(rng.uniform(-100, 100, 100), 40)
+    command[:50] = 0
+    late = round(lag / PERIOD)
+    above = np.sign(command) * np.maximum(np.abs(command) - dead, 0) / (100 - dead)
+    turn = np.concatenate([np.zeros(late), above])[: len(command)]
+    angle = sign * speed * PERIOD * np.concatenate([[0], np.cumsum(turn)[:-1]])
+    time = PERIOD * np.arange(len(command))
+    return Log("a", time, command[:, None], angle[:, None], PERIOD)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_sign_and_lag_are_found(lag, sign):
+    motion = find_motion(log_of(lag=lag, sign=sign), 1)
+    assert motion.sign == sign
+    assert motion.lag == pytest.approx(lag, abs=0.06)
+
+
+@pytest.mark.parametrize("dead", [0.0, 20.0, 50.0])
+def test_a_dead_band_is_found(dead):
+    assert find_motion(log_of(dead=dead, lag=0.1), 1).dead_band == pytest.approx(dead + 5, abs=6)
+
+
+def test_the_speed_is_that_of_fast_motion():
+    assert 0.4 < find_motion(log_of(), 1).speed < 0.5
+
+
+def test_a_joint_without_a_command_has_no_sign():
+    log = log_of()
+    still = Log("a", log.time, 0 * log.command, log.angle, PERIOD)
+    assert find_motion(still, 1).sign == 0

@@ -17,7 +17,7 @@ def moves(joints: int, seconds: float, period: float, seed: int) -> np.ndarray:
     rng, samples = np.random.default_rng(seed), round(seconds / period) + 1
     command = np.zeros((samples, joints))
     for joint in range(joints):
-        at, sign = round(1.0 / period), 1.0
+        at, sign = round(rng.uniform(1.0, 2.0) / period), 1.0 - 2.0 * (joint % 2)
         while at < samples:
             length = round(rng.uniform(0.4, 0.9) / period)
             command[at : at + length, joint] = sign * rng.uniform(25, 95)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from hydroid.api.plan import suggest as suggest
     from hydroid.api.quantity import QuantityResult as QuantityResult
     from hydroid.api.quantity import quantity as quantity
+    from hydroid.api.report import report as report
     from hydroid.api.stages import FitOptions as FitOptions
     from hydroid.api.stages import FitRuns as FitRuns
     from hydroid.api.stages import collect as collect
@@ -65,6 +66,7 @@ _NAMES = {
     "hydroid.api.arms": "collisions read_arms simulate_arms",
     "hydroid.api.convert": "Conversion convert",
     "hydroid.api.fit": "FitResult fit",
+    "hydroid.api.report": "report",
     "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",
     "hydroid.api.judge": "identifiability sensitivity surface validate",
     "hydroid.api.look": "Check LogCheck check load_settings plot_actuator read_commands read_logs view",

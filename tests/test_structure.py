@@ -22,7 +22,7 @@ LAYERS = [
     {"fitting", "experiment"},
     {"suggestion"},
     {"run"},
-    {"report"},
+    {"reporting"},
     {"project"},
     {"viewer"},
     {"api"},

@@ -127,8 +127,8 @@ def fit(
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "Fit":
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.report.fit_report import fit_page
-    from hydroid.report.page import write_page
+    from hydroid.reporting.fit_report import fit_page
+    from hydroid.reporting.page import write_page
     from hydroid.suggestion.suggest import suggestions
 
     checkpoint = folder.begin_or_continue(problem.settings, problem.logs)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from hydroid.log import Log
     from hydroid.parameters import Array
     from hydroid.problem.problem import Problem
-    from hydroid.report.uncertainty_report import UncertaintyStudy
-    from hydroid.report.validation_report import Validation
+    from hydroid.reporting.uncertainty_report import UncertaintyStudy
+    from hydroid.reporting.validation_report import Validation
     from hydroid.uncertainty.sweep import Surface, Sweep
 
 
@@ -59,7 +59,8 @@ def validate(
     from hydroid.fitting.validation import error_indices
     from hydroid.prediction import predict
     from hydroid.quantities.band import prediction_bands
-    from hydroid.report.validation_report import Validation, validation_page
+    from hydroid.reporting.validation_report import Validation, validation_page
+    from hydroid.run.identity import was_fitted
 
     results: list[Validation] = []
     folds: list[IdentifiedModel] = []
@@ -75,7 +76,8 @@ def validate(
                 for column, joint in enumerate(outputs)
             }
             bands = prediction_bands(model, log, response)
-            results.append(Validation(model.name, log, response, indices, bands))
+            seen = False if leave_one_out else was_fitted(Path(original.source).parent, log)
+            results.append(Validation(model.name, log, response, indices, bands, seen))
     return Study(results, validation_page(results, folds)).write(out)
 
 
@@ -85,7 +87,7 @@ def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: in
     from hydroid.fitting.refinement import refine
     from hydroid.problem.problem import Problem
     from hydroid.quantities.delta import precision
-    from hydroid.report.page import log_names
+    from hydroid.reporting.page import log_names
     from hydroid.run.summary import noise_levels, parameter_estimates
     from hydroid.settings.search import RefinementSettings
     from hydroid.uncertainty.covariance import uncertainty
@@ -135,7 +137,7 @@ def identifiability(
     """
     from hydroid.fitting.refinement import refine
     from hydroid.problem.problem import Problem
-    from hydroid.report.uncertainty_report import uncertainty_page
+    from hydroid.reporting.uncertainty_report import uncertainty_page
     from hydroid.settings.search import RefinementSettings
     from hydroid.uncertainty import intervals
 
@@ -165,7 +167,7 @@ def _analysed(
     asked: tuple[Sequence[str], tuple[int, int], Progress],
 ) -> "UncertaintyStudy":
     """Return the study of an estimate: `asked` are profiles, refits with their seed, and the progress."""
-    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.reporting.uncertainty_report import UncertaintyStudy
     from hydroid.uncertainty import covariance, directions, intervals
 
     profile, (refits, seed), progress = asked
@@ -200,7 +202,7 @@ def sensitivity(
         RunError: the folder cannot be written.
     """
     from hydroid.problem.problem import Problem
-    from hydroid.report.sensitivity_report import sensitivity_page
+    from hydroid.reporting.sensitivity_report import sensitivity_page
     from hydroid.uncertainty.sweep import sweep
 
     model = open_model(model)
@@ -239,7 +241,7 @@ def surface(
         if len(pair) != 2:
             raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
     from hydroid.problem.problem import Problem
-    from hydroid.report.objectives import surface_page
+    from hydroid.reporting.objectives import surface_page
     from hydroid.uncertainty import sweep as sweeps
 
     model = open_model(model)

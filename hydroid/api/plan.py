@@ -47,7 +47,7 @@ def suggest(
         RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
     """
     from hydroid.problem.problem import Problem
-    from hydroid.report.suggestion_report import suggestion_page
+    from hydroid.reporting.suggestion_report import suggestion_page
     from hydroid.suggestion.suggest import suggestions
     from hydroid.uncertainty.covariance import uncertainty
 
@@ -102,7 +102,7 @@ def design(
         RunError: the folder cannot be written.
     """
     from hydroid.experiment import design as experiment
-    from hydroid.report.design_report import design_page
+    from hydroid.reporting.design_report import design_page
 
     model = open_model(model)
     settings = model.settings

@@ -17,7 +17,7 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     from hydroid.fitting.fit import Watcher as Progress
     from hydroid.problem.problem import Spread
-    from hydroid.report.page import Page
+    from hydroid.reporting.page import Page
     from hydroid.run.collection import Collection
 
 
@@ -129,11 +129,11 @@ def collect(runs: Sequence[str | Path], out: str | Path = "runs/collected") -> "
     Raises:
         RunError: no run is left, runs differ in more than their seeds, or `out` cannot be written.
     """
-    from hydroid.report.spread import spread_page
+    from hydroid.reporting.spread import spread_page
     from hydroid.run.collection import read_runs
 
     collection = read_runs([str(run) for run in runs], Path(out))
-    return Study(collection, spread_page(collection.parameters, collection.runs)).write(out)
+    return Study(collection, spread_page(collection.settings, collection.runs)).write(out)
 
 
 def _fit_files(
@@ -194,14 +194,14 @@ def _workers(settings: FitSettings, options: FitOptions) -> "AbstractContextMana
 
 
 def _spread(out: Path, results: Sequence[FitResult]) -> "Page":
-    from hydroid.report.page import write_page
-    from hydroid.report.spread import run_result, spread_page
+    from hydroid.reporting.page import write_page
+    from hydroid.reporting.spread import run_result, spread_page
 
     parameters = results[0].problem.parameters
     runs = [
         run_result(r.folder or out, r.problem.settings.search.seed, r.fit, parameters.names) for r in results
     ]
-    page = spread_page(parameters, runs)
+    page = spread_page(results[0].problem.settings, runs)
     write_page(page, out)
     return page
 

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from hydroid.cli import fit, judge, look, model, options, plan, start, stopping
+from hydroid.cli import fit, judge, look, model, options, plan, report, start, stopping
 
 STOPPED = 130
 """exit status of a command that Ctrl-C or a signal stopped, as in shells"""
@@ -62,6 +62,7 @@ COMMANDS = (
     ("judge", judge.identifiability, "find what the logs determine", "LOG.csv --fit runs/hyd --profile F1"),
     ("judge", judge.sensitivity, "draw the effect of each parameter", "LOG.csv --fit runs/mech"),
     ("judge", judge.surface, "draw the error over two parameters", "LOG.csv --fit runs/mech --over K,D"),
+    ("judge", report.report, "draw reports anew, several side by side", "runs/hyd runs/validation"),
     ("plan", plan.suggest, "find what the model lacks, and what to do next", "--fit runs/hyd"),
     ("plan", plan.design, "design the next experiment", "LOG.csv --fit runs/mech --duration 30"),
     ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),

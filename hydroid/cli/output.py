@@ -12,7 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from hydroid.errors import HydroidError
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 FLAGS = {
     "search.algorithm": "--algorithm",

@@ -57,10 +57,15 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Collection:
-    """The parameters of all runs, and the runs in the order of their seeds."""
+    """The settings of all runs but for their seeds, and the runs in the order of these."""
 
-    parameters: ParameterSet
+    settings: FitSettings
     runs: tuple[RunResult, ...]
+
+    @property
+    def parameters(self) -> ParameterSet:
+        """Of all runs."""
+        return self.settings.parameter_set()
 
     @property
     def best(self) -> RunResult:
@@ -104,7 +109,7 @@ def read_runs(names: Sequence[str], out: Path) -> Collection:
         kept = once.setdefault(result.seed, result)
         if kept is not result:
             _log.warning("left out: %s: has seed %d, as %s has", result.path, result.seed, kept.path)
-    return Collection(runs[0].settings.parameter_set(), tuple(once.values()))
+    return Collection(runs[0].settings, tuple(once.values()))
 
 
 def _folders(names: Sequence[str]) -> list[Path]:

@@ -24,15 +24,13 @@ from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import RefinementCheckpoints, read_checkpoint, write_checkpoint
-from hydroid.run.identity import identity, model_hash, own_hashes, refuse_other_run
+from hydroid.run.identity import DESCRIPTION, identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
 from hydroid.run.summary import summarise
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
-DESCRIPTION = "run.json"
-"""name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 CHANGING = ("status", "seconds")
 """its entries that change while the run goes on"""
 

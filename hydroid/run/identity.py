@@ -1,6 +1,7 @@
 """What makes a run that run: settings, arm, logs and versions; and refusing to continue another one."""
 
 import hashlib
+import json
 import platform
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -17,6 +18,8 @@ from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 
+DESCRIPTION = "run.json"
+"""name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
 """settings on which no result depends"""
 
@@ -29,8 +32,17 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
         "numpy": version("numpy"),
         "python": platform.python_version(),
         "seed": settings.search.seed,
-        "logs": {log.source: _log_hash(log) for log in logs},
+        "logs": {log.source: log_hash(log) for log in logs},
     }
+
+
+def was_fitted(run: Path, log: Log) -> bool | None:
+    """Return whether the run in a folder was fitted to a log; None where the folder holds no run."""
+    try:
+        known = json.loads((run / DESCRIPTION).read_text(encoding="utf-8"))["logs"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    return log_hash(log) in known.values() if isinstance(known, dict) else None
 
 
 def _other_logs(before: dict[str, str], now: dict[str, str]) -> str:
@@ -116,8 +128,8 @@ def file_hash(*files: Path) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def _log_hash(log: Log) -> str:
-    """Of the log's file, or of its samples where it has none."""
+def log_hash(log: Log) -> str:
+    """Return the hash of the log's file, or of its samples where it has none."""
     if is_file(Path(log.source)):
         return file_hash(Path(log.source))
     return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()

@@ -99,14 +99,14 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
     )
     mean, square = np.trace(expected, axis1=1, axis2=2), np.sum(expected**2, axis=(1, 2))
     relative, freedom = np.full((2, len(inside)), np.nan)
-    freedom[inside] = mean**2 / square
-    relative[inside] = np.where(
-        lost.any(axis=0), np.inf, uncertainty.relative[inside] * np.sqrt(found / mean)
-    )
+    with np.errstate(invalid="ignore", divide="ignore"):  # 0 / 0 of a parameter without effect: not known
+        freedom[inside] = mean**2 / square
+        ratio = found / mean
+    relative[inside] = np.where(lost.any(axis=0), np.inf, uncertainty.relative[inside] * np.sqrt(ratio))
     relative[~np.isfinite(uncertainty.relative)] = np.nan
     half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
     chances = np.ones(len(inside))
-    chances[inside] = chi2.sf(freedom[inside] * found / mean, freedom[inside])
+    chances[inside] = chi2.sf(freedom[inside] * ratio, freedom[inside])
     differing = [
         name
         for name, chance, known in zip(problem.parameters.names, chances, np.isfinite(relative), strict=True)

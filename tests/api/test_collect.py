@@ -17,8 +17,8 @@ from hydroid.cli.app import app
 from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.report.page import write_page
-from hydroid.report.spread import final_spread, run_result, spread_page
+from hydroid.reporting.page import write_page
+from hydroid.reporting.spread import final_spread, run_result, spread_page
 
 SMALL = {
     "search.algorithm": "ga",
@@ -41,7 +41,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory):
     results = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "hydroid.report.page.write_page", lambda *_: []
+            "hydroid.reporting.page.write_page", lambda *_: []
         )  # figures take longer than all else here
         for seed in SEEDS:
             seeded = load_settings("article-mech", SMALL | {"search.seed": seed})
@@ -76,7 +76,7 @@ def test_collected_runs_make_the_tables_of_runs_made_together(fitted, runs, tmp_
     study = hydroid.collect([str(path) for path in runs], tmp_path / "out")
     parameters = fitted[1][0].problem.parameters
     fits = [run_result(r.folder, r.problem.settings.search.seed, r.fit, parameters.names) for r in fitted[1]]
-    page = spread_page(parameters, fits)
+    page = spread_page(fitted[1][0].problem.settings, fits)
     write_page(page, tmp_path / "together")
     ours, theirs = final_spread(study.page), final_spread(page)
     assert ours.header == theirs.header

@@ -13,7 +13,7 @@ from hydroid.experiment.design import Design, design
 from hydroid.experiment.information import ExperimentSimulator, Precision, log_information, sensor_noise
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.design_report import design_table
+from hydroid.reporting.design_report import design_table
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings

@@ -10,7 +10,7 @@ from hydroid.fitting.validation import error_indices
 from hydroid.log import Log
 from hydroid.prediction import predict, simulate_log
 from hydroid.quantities.band import prediction_bands
-from hydroid.report.validation_report import Validation, validation_page
+from hydroid.reporting.validation_report import Validation, validation_page
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 CHANGES = {

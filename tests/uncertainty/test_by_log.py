@@ -7,7 +7,7 @@ from arch.bootstrap import CircularBlockBootstrap
 from linear_problem import AR1, DEG, THETA, Linear, ar1, least_squares, slow
 from scipy.stats import t as student
 
-from hydroid.report.by_log_report import by_log_table, by_log_warning
+from hydroid.reporting.by_log_report import by_log_table, by_log_warning
 from hydroid.uncertainty.by_log import by_log
 from hydroid.uncertainty.covariance import uncertainty
 from hydroid.uncertainty.intervals import bootstrap

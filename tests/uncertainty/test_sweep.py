@@ -11,9 +11,9 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.objectives import contours
-from hydroid.report.page import write_page
-from hydroid.report.sensitivity_report import sensitivity_page
+from hydroid.reporting.objectives import contours
+from hydroid.reporting.page import write_page
+from hydroid.reporting.sensitivity_report import sensitivity_page
 from hydroid.uncertainty.sweep import SWEEP_POINTS, Sweep, surface, sweep
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}

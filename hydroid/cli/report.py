@@ -1,0 +1,27 @@
+"""`hydroid report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hydroid.cli.options import Folder, Output
+from hydroid.cli.output import show
+
+
+def report(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Folders of finished runs or studies.")
+    ],
+    output: Output,
+    out: Folder = Path("runs/report"),
+) -> None:
+    """Draw the report of a finished run or study anew, or several side by side on one page.
+
+    Nothing is simulated, and no log is needed. One report is replaced where it lies; several are compared on
+    a page in the folder --out: verdicts, errors, parameters, and responses to the same logs.
+    """
+    from hydroid.api.report import report
+
+    page = report(folders, out)
+    show(output, lambda: {"out": str(page)}, [str(page)])

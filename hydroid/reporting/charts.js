@@ -1,0 +1,242 @@
+// Unpacks the page's data, draws its charts with Bokeh and makes tabs work. No request is made.
+"use strict";
+(() => {
+  const page = document.documentElement;
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const touch = matchMedia("(pointer: coarse)").matches;
+  const drawn = new Map(); // host element -> {figures, x ranges, visible labels}
+
+  async function unpack(id) {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  const color = (name) => getComputedStyle(page).getPropertyValue(`--${name}`).trim();
+  const numbers = (values) => (values ?? []).map((v) => v ?? NaN);
+  const dashes = { dashed: [6, 4], dotted: [2, 3] };
+  const sizes = { circle: "circle", diamond: "diamond", square: "square", dash: "dash" };
+
+  // [low, high] of all marks that are shown along an axis, with a margin
+  function extent(panel, axis, shown) {
+    let low = Infinity, high = -Infinity;
+    const log = panel[`log_${axis}`];
+    for (const mark of panel.marks) {
+      if (mark.label && shown.get(mark.label) === false) continue;
+      if (mark.kind === "spans" || (mark.kind === "rule" && axis === "x")) continue;
+      const others = axis === "y" ? ["y", ...(mark.kind === "band" ? ["end"] : [])]
+        : ["x", ...(mark.kind === "bars" ? ["end"] : [])];
+      for (const name of others) for (const v of mark[name] ?? [])
+        if (v !== null && (!log || v > 0)) { low = Math.min(low, v); high = Math.max(high, v); }
+    }
+    if (!(low <= high)) return log ? [0.1, 1] : [0, 1];
+    if (log) return [low / 1.4, high * 1.4];
+    const linear = axis === "x" && panel.marks.some((m) => m.kind === "line" || m.kind === "step");
+    const margin = linear ? 0 : (0.07 * (high - low) || 0.05 * Math.abs(high) || 1);
+    return [low - margin, high + margin];
+  }
+
+  function addMark(figure, mark, shown) {
+    const paint = color(mark.color), alpha = mark.alpha;
+    const x = numbers(mark.x), y = numbers(mark.y), end = numbers(mark.end);
+    const line = { line_color: paint, line_alpha: alpha, line_width: mark.width, line_dash: dashes[mark.look] ?? [] };
+    let made = [];
+    if (mark.kind === "line") made = [figure.line({ x, y, ...line })];
+    else if (mark.kind === "step") made = [figure.step({ x, y, mode: "after", ...line })];
+    else if (mark.kind === "points")
+      made = [figure.scatter({ x, y, marker: sizes[mark.look] ?? "circle", size: mark.width, fill_color: paint,
+        fill_alpha: alpha, line_color: mark.look === "dash" ? paint : color("paper"), angle: mark.look === "dash" ? Math.PI / 2 : 0 })];
+    else if (mark.kind === "band")
+      made = [figure.varea({ x, y1: y, y2: end, fill_color: paint, fill_alpha: alpha })];
+    else if (mark.kind === "bars")
+      made = [figure.segment({ x0: x, x1: end, y0: y, y1: y, ...line })];
+    else {
+      const models = mark.kind === "rule"
+        ? (y.length ? y : x).map((at) => new Bokeh.Span({ location: at, dimension: y.length ? "width" : "height", level: "underlay", ...line }))
+        : x.map((low, i) => new Bokeh.BoxAnnotation({ left: low, right: end[i], fill_color: paint, fill_alpha: alpha, line_color: null, level: "underlay" }));
+      models.forEach((model) => figure.add_layout(model));
+      made = models;
+    }
+    for (const one of made) {
+      one.visible = !mark.label || shown.get(mark.label) !== false;
+      if (mark.label) one.tags = [mark.label];
+    }
+    if (["line", "step", "points"].includes(mark.kind) && mark.label && made.length && !touch)
+      figure.add_tools(new Bokeh.HoverTool({ renderers: made, mode: mark.kind === "points" ? "mouse" : "vline", line_policy: "nearest", tooltips: [["", mark.label], ["x", "@x{0.[0000]}"], ["y", "@y{0.[0000]}"]] }));
+    return made;
+  }
+
+  function axisLook(figure) {
+    const ink = color("ink"), soft = color("soft"), line = color("line");
+    for (const axis of [...figure.xaxes, ...figure.yaxes])
+      Object.assign(axis, { axis_line_color: line, major_tick_line_color: line, minor_tick_line_color: null,
+        major_label_text_color: soft, axis_label_text_color: soft, axis_label_text_font_style: "normal",
+        axis_label_text_font_size: "13px", major_label_text_font_size: "12px" });
+    for (const grid of figure.center.filter((one) => one.grid_line_color !== undefined))
+      Object.assign(grid, { grid_line_color: line, grid_line_alpha: 0.6 });
+    Object.assign(figure, { background_fill_color: null, border_fill_color: null, outline_line_color: null });
+    if (figure.title) Object.assign(figure.title, { text_color: ink, text_font_size: "14px", offset: 0 });
+  }
+
+  function addPanel(panel, shared, shown, narrow) {
+    const xs = panel.x_limits ?? extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
+    const x_range = shared ?? new Bokeh.Range1d({ start: xs[0], end: xs[1] });
+    const n = panel.names.length;
+    const y_range = new Bokeh.Range1d(n ? { start: n - 0.4, end: -0.6 } : { start: ys[0], end: ys[1] });
+    const figure = Bokeh.Plotting.figure({
+      height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
+      x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
+      x_axis_label: panel.x || null, y_axis_label: panel.y || null, title: panel.title || null,
+      min_border_left: n ? 0 : 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
+    });
+    if (n) {
+      const axis = figure.yaxes[0];
+      axis.ticker = new Bokeh.FixedTicker({ ticks: panel.names.map((_, i) => i) });
+      axis.major_label_overrides = new Map(panel.names.map((name, i) => [i, name]));
+    }
+    if (narrow) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
+    axisLook(figure);
+    const made = panel.marks.flatMap((mark) => addMark(figure, mark, shown));
+    return { panel, figure, made, x_range, y_range, home: xs };
+  }
+
+  async function draw(host, chart) {
+    const before = drawn.get(host);
+    before?.document.clear();
+    const shown = before?.shown ?? new Map(chart.panels.flatMap((p) => p.marks).filter((m) => m.label).map((m) => [m.label, !m.off]));
+    const cells = host.querySelector(".panels");
+    cells.replaceChildren();
+    cells.style.setProperty("--columns", chart.columns);
+    const narrow = host.clientWidth < 560;
+    let shared = null;
+    const panels = chart.panels.filter((panel) => panel.marks.length).map((panel) => {
+      const one = addPanel(panel, shared, shown, narrow);
+      if (chart.linked) {
+        if (!shared) {
+          const all = chart.panels.map((p) => p.x_limits ?? extent(p, "x", shown));
+          one.home = [Math.min(...all.map((e) => e[0])), Math.max(...all.map((e) => e[1]))];
+          one.x_range.setv({ start: one.home[0], end: one.home[1] });
+        }
+        shared = one.x_range;
+      }
+      return one;
+    });
+    const elements = panels.map((one) => {
+      const cell = cells.appendChild(document.createElement("div")), element = document.createElement("div");
+      cell.className = "panel";
+      element.style.minHeight = `${one.panel.height}px`;
+      if (chart.apart) {
+        const keys = cell.appendChild(document.createElement("div"));
+        keys.className = "controls";
+        keys.append(...legend([one], shown));
+      }
+      return cell.appendChild(element);
+    });
+    const width = elements[0].clientWidth;
+    cells.style.setProperty("--drawn", width);
+    const bokeh = new Bokeh.Document();
+    panels.forEach((one) => bokeh.add_root(one.figure));
+    await Bokeh.embed.add_document_standalone(bokeh, cells, elements);
+    drawn.set(host, { document: bokeh, panels, shown, chart });
+    host.classList.toggle("drawn-dark", dark.matches);
+    host.querySelector(":scope > .controls").replaceChildren(
+      ...(chart.apart ? [] : legend(panels, shown)), ...(host.dataset.zoom ? [zoomButtons(panels)] : []));
+  }
+
+  // one button per label, that shows or hides its marks in some panels
+  function legend(panels, shown) {
+    const used = new Map(panels.flatMap((p) => p.panel.marks).filter((m) => m.label).map((m) => [m.label, m]));
+    const keys = [...used.values()].map((mark) => {
+      const button = document.createElement("button"), sign = document.createElement("span");
+      button.type = "button";
+      button.className = "key";
+      button.setAttribute("aria-pressed", shown.get(mark.label));
+      sign.className = `sign ${mark.kind} ${mark.look}`;
+      sign.style.setProperty("--paint", `var(--${mark.color})`);
+      sign.style.opacity = ["band", "spans"].includes(mark.kind) ? Math.max(mark.alpha, 0.35) : mark.alpha;
+      button.append(sign, mark.label);
+      button.onclick = () => {
+        const on = !shown.get(mark.label);
+        shown.set(mark.label, on);
+        button.setAttribute("aria-pressed", on);
+        for (const p of panels) {
+          p.made.filter((one) => one.tags?.[0] === mark.label).forEach((one) => { one.visible = on; });
+          if (p.panel.y_limits || p.panel.names.length) continue;
+          const [start, end] = extent(p.panel, "y", shown);
+          p.y_range.setv({ start, end });
+        }
+      };
+      return button;
+    });
+    return keys.length > 1 ? keys : [];
+  }
+
+  function zoomButtons(panels) {
+    const ranges = [...new Map(panels.map((p) => [p.x_range, p])).values()];
+    const about = (factor) => (a, b) => { const c = (a + b) / 2, h = factor * (b - a) / 2; return [c - h, c + h]; };
+    const step = (share) => (a, b) => [a + share * (b - a), b + share * (b - a)];
+    const zoom = document.createElement("span");
+    zoom.className = "zoom";
+    for (const [text, name, change] of [["+", "zoom in", about(0.5)], ["−", "zoom out", about(2)], ["◀", "move left", step(-0.25)],
+      ["▶", "move right", step(0.25)], ["↺", "show all", (_a, _b, home) => home]]) {
+      const button = document.createElement("button");
+      button.type = "button"; button.textContent = text; button.title = name;
+      button.setAttribute("aria-label", name);
+      button.onclick = () => ranges.forEach((p) => {
+        const [start, end] = change(p.x_range.start, p.x_range.end, p.home);
+        p.x_range.setv({ start, end });
+      });
+      zoom.append(button);
+    }
+    return zoom;
+  }
+
+  const idle = () => new Promise((done) => setTimeout(done, 0));
+  let charts = [];
+  async function drawVisible(again = false) {
+    for (const host of document.querySelectorAll(".chart[data-chart]"))
+      if (host.offsetParent !== null && (again || !drawn.has(host))) { await draw(host, charts[host.dataset.chart]); await idle(); }
+  }
+
+  function tabs(list) {
+    const all = [...list.querySelectorAll("[role=tab]")];
+    const choose = (tab) => {
+      for (const one of all) {
+        const on = one === tab;
+        one.setAttribute("aria-selected", on);
+        one.tabIndex = on ? 0 : -1;
+        document.getElementById(one.getAttribute("aria-controls")).hidden = !on;
+      }
+      drawVisible();
+    };
+    all.forEach((tab, i) => {
+      tab.onclick = () => choose(tab);
+      tab.onkeydown = (event) => {
+        const to = { ArrowRight: i + 1, ArrowLeft: i - 1, Home: 0, End: all.length - 1 }[event.key];
+        if (to === undefined) return;
+        event.preventDefault();
+        const next = all[(to + all.length) % all.length];
+        choose(next); next.focus();
+      };
+    });
+  }
+
+  async function start() {
+    document.querySelectorAll("[role=tablist]").forEach(tabs);
+    const content = JSON.parse(await unpack("content"));
+    for (const image of document.querySelectorAll("img[data-image]"))
+      image.src = "data:image/svg+xml," + encodeURIComponent(content.images[image.dataset.image]);
+    charts = content.charts;
+    if (charts.length) {
+      const library = await unpack("library");
+      const script = document.createElement("script");
+      script.textContent = library;
+      document.head.append(script);
+      Bokeh.set_log_level?.("error");
+      await drawVisible();
+      document.querySelectorAll("details").forEach((one) => one.addEventListener("toggle", () => one.open && drawVisible()));
+      dark.addEventListener("change", () => drawVisible(true));
+    }
+    page.dataset.ready = "yes";
+  }
+  addEventListener("DOMContentLoaded", start);
+})();

@@ -1,0 +1,351 @@
+"""The report of a fit: prediction and convergence, parameters, what the logs determine, the search."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from math import degrees
+from typing import Any
+
+import numpy as np
+
+from hydroid.errors import SettingsError
+from hydroid.estimate import finite
+from hydroid.fitting.fit import Fit
+from hydroid.fitting.search import HISTORY
+from hydroid.fitting.validation import ErrorIndices, error_indices, pooled_indices
+from hydroid.parameters import Array
+from hydroid.problem.problem import Problem
+from hydroid.reporting.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
+from hydroid.reporting.by_log_report import by_log_warning
+from hydroid.reporting.estimates import estimates as draw_estimates
+from hydroid.reporting.names import plain_name
+from hydroid.reporting.next_steps import fit_steps
+from hydroid.reporting.objectives import learning, pareto
+from hydroid.reporting.page import FILE, PAGE, Page, Plot, Section, Step, Tab, log_names
+from hydroid.reporting.parameter_bars import fit_bars
+from hydroid.reporting.phrases import (
+    ALGORITHMS,
+    STAGES,
+    direction_phrases,
+    estimate_label,
+    estimate_meanings,
+    fit_summary,
+    fit_warnings,
+    in_reader_units,
+    norm_label,
+    parameter_advice,
+    prior_phrase,
+    rank_phrase,
+    status_phrase,
+)
+from hydroid.reporting.quantities_report import curves_csv, lost_quantities, quantity_section
+from hydroid.reporting.responses import joint_responses, response_data, response_tabs
+from hydroid.reporting.suggestion_report import action_effect, action_name, suggestion_sections
+from hydroid.reporting.table import Cell, Given, Table, number, numbers_csv, unless_nan
+from hydroid.reporting.uncertainty_report import determined_sections
+from hydroid.reporting.verdict import fit_verdict
+from hydroid.suggestion.suggest import Suggestions
+from hydroid.uncertainty.by_log import by_log
+
+INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
+INDICES_NOTE = (
+    "fit: 100 % for a perfect response, 0 % for a response that is always the mean of the measured angle. A "
+    "dash (–): the joint does not move."
+)
+_FILES = (
+    "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
+    "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
+)
+_CITATION = (
+    "A. Montazeri, C. West, S. Monk and C. J. Taylor, Dynamic modelling and parameter estimation of a "
+    "hydraulic robot manipulator using a multi-objective genetic algorithm, 2017. To cite hydroid: "
+    "CITATION.cff."
+)
+_ESTIMATES = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
+_LEARNING = "Best candidate so far, and the median of each population."
+_PARETO = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
+_SINGLE = (
+    "The search minimises the error over the whole record and does not look for the Pareto set. Shown are "
+    "those candidates of its last population to which no other is better in every segment."
+)
+_SEVERAL = "Among these candidates, a better fit of one segment goes with a worse fit of another."
+
+
+def fit_page(
+    identity: Mapping[str, Any], problem: Problem, fit: Fit, suggested: Suggestions | None = None
+) -> Page:
+    """Return the page of a fit; `identity` holds the run's versions and log hashes."""
+    found = joint_responses(problem, fit)
+    outputs = len(problem.outputs)
+    names = [
+        "response" if len(found) == 1 else f"response_{i // outputs + 1}_joint_{r.joint}"
+        for i, r in enumerate(found)
+    ]
+    responses = dict(zip(names, found, strict=True))
+    last = problem.freed() if fit.final == "joint" else problem
+    sections = (
+        fit_steps(problem, fit, suggested),
+        Section(
+            "Prediction of the fitted logs",
+            tabs=response_tabs(responses),
+            more={"errors": objective_table(problem, fit)},
+        ),
+        *_known(last, fit),
+        _unknown(last, fit, suggested),
+        *_actuators(last, fit),
+        *_folded(last, fit, suggested),
+        Section("Reproduce", facts=_facts(identity, problem)),
+    )
+    versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
+    title = f"Fit of {problem.settings.arm.name}, stage {STAGES[problem.settings.stage][:1]}"
+    return Page(
+        "report",
+        title,
+        fit_summary(fit),
+        sections,
+        (*fit_warnings(last, fit), *by_log_warning(by_log(last, fit.uncertainty))),
+        versions,
+        _data(problem, fit) | response_data(responses),
+        fit_verdict(last, fit),
+        fit_numbers(last, fit),
+    )
+
+
+def fit_numbers(problem: Problem, fit: Fit) -> dict[str, Any]:
+    """Return what a comparison of pages needs: each parameter with unit, value, interval and bounds."""
+    known = fit.uncertainty
+    columns = problem.parameters.parameters, fit.best.theta.tolist(), known.interval.tolist()
+    parameters = {
+        p.name: {
+            "unit": p.unit,
+            "value": value,
+            "interval": [finite(end) for end in ends],
+            "bounds": [p.lower, p.upper],
+            "log": p.log,
+            "meaning": plain_name(problem.settings.parameters[p.name]),
+        }
+        for p, value, ends in zip(*columns, strict=True)
+        if p.lower < p.upper and p.fixed is None
+    }
+    return {"kind": "fit", "rms_deg": finite(degrees(fit.best.rms)), "parameters": parameters}
+
+
+def _known(problem: Problem, fit: Fit) -> tuple[Section, ...]:
+    """What follows from all parameters together, and each parameter between its bounds."""
+    words = (
+        "Bar: from the lower to the upper bound. Orange line: the estimate, with its 95 % interval. Grey: "
+        "the interval of its prior. Blue dots: other estimates of the search. The intervals are only right "
+        "if the model is right."
+    )
+    drawn = Plot("estimates", _ESTIMATES, partial(draw_estimates, problem, fit), where=FILE)
+    return (
+        quantity_section(problem, fit.quantities),
+        Section(
+            "Parameters",
+            f"{rank_phrase(fit.identifiability)} {words}",
+            bars=fit_bars(problem, fit),
+            plots=(drawn,),
+            more={"parameters": parameter_table(problem, fit)},
+        ),
+    )
+
+
+def _unknown(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Section:
+    """What the logs leave open, and the actions that would settle it."""
+    points = (
+        *parameter_advice(problem, fit),
+        *(f"{phrase}." for phrase in direction_phrases(problem, fit.identifiability)),
+        *lost_quantities(fit.quantities),
+    )
+    steps: tuple[Step, ...] = ()
+    if points and suggested is not None:
+        steps = tuple(Step(f"{action_name(problem, a)}.", f"{action_effect(a)}.") for a in suggested.actions)
+    text = "" if points else "Nothing: the logs determine every free parameter."
+    more = " What would settle it stands below, the best first." if steps else ""
+    return Section("What is not known", f"{text}{more}".strip(), points, steps=steps)
+
+
+def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:
+    """The curves of each compared joint's actuator, with their bands."""
+    if problem.settings.stage != "hyd":
+        return ()
+    stage, arm = problem.stage, problem.settings.arm
+    candidate = stage.candidates(fit.best.theta[None])
+    tabs: list[Tab] = []
+    for joint in problem.settings.outputs:
+        try:
+            actuator = joint_actuator(arm, candidate, joint, "the estimate")
+        except SettingsError:
+            continue  # no force-stroke curve runs through its two points: it diverged
+        records = partial(_records, problem, joint)
+        known = KnownActuator(fit.quantities.precision, records)
+        plot = replace(
+            actuator_plot(replace(actuator, known=known)), name=f"actuator_joint_{joint}", where=PAGE
+        )
+        tabs.append(Tab(actuator.title, (plot,)))
+    text = "What its parameters mean at rest, from the command to the torque at the joint."
+    return (Section("The actuator", text, tabs=tuple(tabs)),) if tabs else ()
+
+
+def _records(problem: Problem, joint: int, theta: Array) -> Any:
+    return joint_records(problem.settings.arm, problem.stage.candidates(theta), joint)
+
+
+def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None) -> tuple[Section, ...]:
+    objective = problem.settings.objective
+    lacks, residual, actions = (
+        suggestion_sections(problem, suggested) if suggested is not None else (None, None, None)
+    )
+    text = _SEVERAL if _has_segment_objectives(problem, fit) else _SINGLE
+    hidden = (
+        lacks,
+        actions,
+        *determined_sections(problem, fit.uncertainty, fit.identifiability),
+        Section(
+            "How the search went",
+            facts=_effort(problem, fit),
+            plots=(Plot("learning", _LEARNING, partial(learning, fit, objective), where=PAGE),),
+        ),
+        Section("Pareto set", text, plots=(Plot("pareto", _PARETO, partial(pareto, fit, objective)),)),
+    )
+    folded = tuple(replace(section, folded=True) for section in hidden if section is not None)
+    if residual is None:
+        return folded
+    tabs = tuple(Tab(t.name, tuple(replace(p, where=PAGE) for p in t.plots)) for t in residual.tabs)
+    return (replace(residual, tabs=tabs), *folded)
+
+
+def parameter_table(problem: Problem, fit: Fit) -> Table:
+    """Return one row per parameter: bounds, every estimate, interval, share of the data, effect, flag."""
+    names = list(fit.estimates)
+    labels = [estimate_label(fit, name) for name in names]
+    rows: list[tuple[Cell, ...]] = []
+    for i, parameter in enumerate(problem.parameters.parameters):
+        bounds = (parameter.lower, parameter.upper) if parameter.lower < parameter.upper else (None, None)
+        if given := problem.settings.parameters[parameter.name].bounds:
+            bounds = (Given(given[0]), Given(given[1]))
+        values = (float(fit.estimates[name].theta[i]) for name in names)
+        status = fit.uncertainty.status[i]
+        ends = (unless_nan(end) for end in fit.uncertainty.interval[i])
+        share = 100 * status.share if fit.uncertainty.free[i] else None
+        judged = *ends, share, unless_nan(degrees(fit.effects[i]))
+        phrase = status_phrase(status)
+        rows.append((parameter.name, parameter.unit, *bounds, *values, *judged, phrase))
+    header = ("name", "unit", "lower", "upper", *labels, "from", "to", "data [%]", "effect [deg]", "flag")
+    final = estimate_label(fit, fit.final)
+    others = [label for label in labels[1:] if label != final]
+    optional = (
+        *others,
+        "effect [deg]",
+        "data [%]",
+        *(labels[:1] if labels[0] != final else ()),
+        "lower",
+        "upper",
+    )
+    note = (
+        f"{estimate_meanings(fit)} from, to: 95 % interval of {final}. "
+        "The noise is taken from the residuals. The interval is only right if the model is right. A dash "
+        "(–): it has no limit, or the parameter is at a bound or fixed. data: part of the information on the "
+        "parameter that the logs gave; its prior gave the rest. effect: rms change of the output when the "
+        "parameter changes by 1 %."
+    )
+    return Table("Parameters", header, tuple(rows), note, optional)
+
+
+def objective_table(problem: Problem, fit: Fit) -> Table:
+    """Return the output error of each estimate on the fitted logs, and the norm that the search minimised."""
+    responses = joint_responses(problem, fit)
+    several = len(responses) > 1
+    objective = problem.settings.objective
+    rows: list[tuple[Cell, ...]] = []
+    for name, estimate in fit.estimates.items():
+        label = estimate_label(fit, name)
+        overall = float(in_reader_units(objective, np.array(estimate.overall)))
+        pairs = [(response.measured, response.simulated[label]) for response in responses]
+        for response, pair in zip(responses, pairs, strict=True):
+            indices = index_cells(error_indices(*pair))
+            rows.append((label, response.log, response.joint, *indices, None if several else overall))
+        if several:
+            rows.append((label, "all", None, *index_cells(pooled_indices(pairs)), overall))
+    pooled = " all: every joint about its own mean." if several else ""
+    note = f"{INDICES_NOTE}{pooled} objective: {norm_label(objective)} over the whole record."
+    column = "objective [-]" if objective.relative else "objective [deg]"
+    header = ("estimate", "log", "joint", *INDICES, column)
+    return Table("Output error on the fitted logs", header, tuple(rows), note, (INDICES[0], column))
+
+
+def index_cells(indices: ErrorIndices) -> tuple[float, ...]:
+    """Return the cells of INDICES."""
+    return (degrees(indices.mean_absolute), degrees(indices.rms), degrees(indices.largest), indices.fit)
+
+
+def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, str], ...]:
+    settings = problem.settings
+    hashes = list(identity.get("logs", {}).values())
+    logs: list[tuple[str, str]] = []
+    for i, (log, name) in enumerate(zip(problem.logs, log_names(problem.logs), strict=True)):
+        seconds, samples = len(log.time) * log.period, len(log.time)
+        digest = f", SHA-256 {hashes[i][:12]}…" if i < len(hashes) else ""
+        label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
+        logs.append((label, f"{name}, {number(seconds)} s, {samples} samples{digest}"))
+    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    return (
+        ("command", f"hydroid fit-{settings.stage} {given} --config RUN/config.yaml --out AGAIN"),
+        ("same bits", "with the same versions: RUN/config.yaml holds all settings, the seed among them"),
+        ("arm", f"{settings.arm.name}; its geometry is not estimated but read from arm.yaml"),
+        ("stage", STAGES[settings.stage]),
+        *logs,
+        *((f"payload in {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
+        *((f"prior {name}", prior_phrase(prior)) for name, prior in settings.priors.items()),
+        ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
+        ("joints without command and comparison", settings.simulation.other_joints),
+        ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
+        ("search", ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
+        ("seed", str(settings.search.seed)),
+        ("files", _FILES),
+        ("method", _CITATION),
+    )
+
+
+def _has_segment_objectives(problem: Problem, fit: Fit) -> bool:
+    """Say whether the search minimised each segment; of a library's algorithm the estimates tell it."""
+    algorithm = problem.settings.search.algorithm
+    return "average" in fit.estimates if algorithm == "pymoo" else algorithm == "nsga2"
+
+
+def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
+    facts: list[tuple[str, str]] = []
+    if len(fit.history):
+        multistart = problem.settings.search.algorithm == "multistart"
+        rounds, evaluations, simulated, diverged = (int(v) for v in fit.history[-1, :4])
+        repeated = "; the others repeat earlier ones" if evaluations > simulated else ""
+        ranked = "; they rank behind all others" if diverged else ""
+        facts += [
+            ("starts", str(rounds))
+            if multistart
+            else ("populations", f"{rounds}: the first one and {rounds - 1} generations"),
+            ("candidates", f"{evaluations:,}, of which {simulated:,} were simulated{repeated}"),
+            ("diverged", f"{diverged:,} of {simulated:,} simulated candidates{ranked}"),
+        ]
+    for name, one in fit.refinements.items():
+        effort = f"{one.iterations} iterations, {one.evaluations:,} simulations"
+        facts.append((f"least squares: {name}", f"{effort}; {one.ending.value}"))
+    return tuple(facts)
+
+
+def _data(problem: Problem, fit: Fit) -> dict[str, str]:
+    """Return the history and the Pareto set with every bit, in the search's units: rad unless relative."""
+    counts = len(HISTORY) - 2
+    rows = tuple((*(int(v) for v in row[:counts]), *(float(v) for v in row[counts:])) for row in fit.history)
+    theta, evaluation = fit.front
+    unit = "" if problem.settings.objective.relative else "_rad"
+    segments = (f"segment_{s}{unit}" for s in range(1, evaluation.segments.shape[1] + 1))
+    header = (*problem.parameters.names, *segments, f"overall{unit}")
+    front = np.column_stack([theta, evaluation.segments, evaluation.overall])
+    curves = curves_csv(fit.quantities.curves)
+    return {
+        "history.csv": Table("", HISTORY, rows).csv(),
+        "pareto.csv": numbers_csv(header, front),
+        "tables/curves.csv": curves,
+    }

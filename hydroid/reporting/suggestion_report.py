@@ -1,0 +1,329 @@
+"""Suggestions: what the model lacks, what the residual shows, what to do next; a page, and sections."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hydroid.estimate import finite
+from hydroid.problem.problem import Problem
+from hydroid.reporting.page import Page, Section, Step, log_names
+from hydroid.reporting.page import Verdict as Strip
+from hydroid.reporting.phrases import listed
+from hydroid.reporting.residual_chart import UNITS, residual_tabs
+from hydroid.reporting.table import Cell, Table, number, plain
+from hydroid.suggestion.actions import STATED_SD, WEIGHED_SD, Action, ActionKind
+from hydroid.suggestion.missing import LEVEL, MIN_GAIN, MissingTerms, TermTest, Verdict
+from hydroid.suggestion.residuals import LONG_S, Binned, Regressor, ResidualCheck
+from hydroid.suggestion.suggest import Suggestions
+from hydroid.suggestion.terms import Term
+from hydroid.uncertainty.flags import WEAK_ABOVE
+
+_VERDICTS = {
+    Verdict.FREE: "free it",
+    Verdict.UNTRIED: "others first",
+    Verdict.LEAVE: "no gain: leave it",
+    Verdict.INVISIBLE: "the logs cannot tell it from the free parameters",
+}
+MOST_STEPS = 3
+"""steps that a page names first"""
+_AROUND = 5.0
+"""proposed bounds reach from the proposed value divided by this to the value times this"""
+
+
+def suggestion_page(problem: Problem, result: Suggestions, source: str) -> Page:
+    """Return the page of all suggestions; its tables are `missing_terms`, `next_actions` and `residuals`."""
+    lead = missing_phrase(result.missing)
+    steps = tuple(suggested_steps(problem, result)[:MOST_STEPS])
+    first = (Section("Do next", steps=steps),) if steps else ()
+    verdict = Strip(lead, f"At {source}, where the error is {math.degrees(result.missing.rms):.2g}° rms.")
+    sections = (*first, *suggestion_sections(problem, result))
+    return Page("suggestions", f"What to change next, at {source}", lead, sections, verdict=verdict)
+
+
+def suggested_steps(problem: Problem, result: Suggestions) -> list[Step]:
+    """Return the quantity to free, and the actions, the best first."""
+    steps = [
+        Step(
+            f"Free {test.term.name}: add to the settings file parameters: {{{setting_line(test)}}}",
+            f"The rms error is predicted to fall {fall_phrase(result.missing, test)}.",
+        )
+        for test in result.missing.free[:1]
+    ]
+    return steps + [
+        Step(f"{action_name(problem, action)}.", f"Predicted: {action_effect(action)}.")
+        for action in result.actions
+    ]
+
+
+def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section, ...]:
+    """Return the three sections."""
+    seen = residual_phrases(problem, result.residuals)
+    more = "" if result.thorough else " hydroid suggest also tests logs, sensors and experiments."
+    actions = action_phrases(problem, result.actions)
+    return (
+        Section(
+            "What the model lacks",
+            missing_phrase(result.missing),
+            points=term_phrases(problem, result),
+            tables={"missing_terms": missing_table(result.missing)},
+        ),
+        Section(
+            "What the residual shows",
+            "" if seen else "Nothing beyond the noise.",
+            points=seen,
+            tables={"residuals": residual_table(problem, result.residuals)},
+            tabs=residual_tabs(problem, result.residuals),
+        ),
+        Section(
+            "What each action would bring",
+            f"The predicted effect of each action on what is known, the best first.{more}"
+            if actions
+            else f"No action of those tested would help much.{more}",
+            points=actions,
+            tables={"next_actions": action_table(result.actions)} if actions else {},
+        ),
+    )
+
+
+def missing_phrase(missing: MissingTerms) -> str:
+    """Say in a sentence what the model lacks."""
+    if not missing.tests:
+        return "Every quantity that could be tested is free already."
+    if not missing.free:
+        return f"Tested: {len(missing.tests)} quantities that the fit holds. None would lower the error much."
+    first = missing.free[0]
+    return f"Freeing {first.term.name} would lower the rms error {fall_phrase(missing, first)}: free it."
+
+
+def term_phrases(problem: Problem, result: Suggestions) -> tuple[str, ...]:
+    """Say how to free the best term, and what about the others."""
+    free = result.missing.free
+    if not free:
+        return ()
+    first, others = free[0], [test.term.name for test in free[1:]]
+    said = [f"Add to the settings file: parameters: {{{setting_line(first)}}}"]
+    if others:
+        said.append(
+            f"{listed(others)} would also lower the error, but may describe the same error. Free one "
+            "quantity, fit again, and ask again."
+        )
+    if not result.thorough:
+        said.append("The error with a quantity freed is that of one step. hydroid suggest refines it.")
+    return tuple(said)
+
+
+def fall_phrase(missing: MissingTerms, test: TermTest) -> str:
+    """Say from which rms error to which freeing a quantity leads."""
+    return f"from {number(math.degrees(missing.rms))} to {number(math.degrees(test.rms))} deg"
+
+
+def setting_line(test: TermTest) -> str:
+    """Return the parameter that frees a term, as a line of YAML without braces around it."""
+    p, (low, high) = test.term.settings, proposed_bounds(test)
+    where = f"link: {p.link}" if p.link else f"joints: [{', '.join(map(str, p.joints or ()))}]"
+    where = "" if p.link is None and p.joints is None else f"{where}, "
+    return f"{test.term.name}: {{quantity: {p.quantity}, {where}bounds: [{plain(low)}, {plain(high)}]}}"
+
+
+def proposed_bounds(test: TermTest) -> tuple[float, float]:
+    """Return bounds around the value that the test found, with the present value inside."""
+    low, high = test.term.span
+    held = test.value if math.isinf(test.term.value) else test.term.value
+    least = 0.0 if low == 0 else min(test.value / _AROUND, held)
+    most = max(_AROUND * test.value, held)
+    return _rounded(max(least, low)), _rounded(min(most, high))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def missing_table(missing: MissingTerms) -> Table:
+    """Return one row per tested quantity."""
+    rows: list[tuple[Cell, ...]] = []
+    for test in missing.tests:
+        term, settings = test.term, test.term.settings
+        seen = test.verdict is not Verdict.INVISIBLE
+        tried = seen and test.value != term.value
+        rows.append(
+            (
+                term.name,
+                settings.unit,
+                _held(term),
+                float(test.value) if tried else None,
+                math.degrees(test.rms) if tried else None,
+                test.statistic if seen else None,
+                _VERDICTS[test.verdict],
+            )
+        )
+    header = ("quantity", "unit", "held at", "freed", "rms [deg]", "score", "verdict")
+    note = (
+        f"rms without any of them: {number(math.degrees(missing.rms))} deg. score: how clearly the residual "
+        "shows the effect, in standard deviations; what the free parameters can do as well is left out. "
+        f"'{_VERDICTS[Verdict.FREE]}' needs two things: chance would name any of these quantities in "
+        f"{100 * LEVEL:.0f} % of fits at most, and in simulation the rms error falls by "
+        f"{100 * MIN_GAIN:.0f} % at least."
+    )
+    return Table("Quantities that the fit holds", header, tuple(rows), note, ("unit", "score"))
+
+
+def _held(term: Term) -> Cell:
+    return "no limit" if math.isinf(term.value) else float(term.value)
+
+
+def residual_phrases(problem: Problem, checks: Sequence[ResidualCheck]) -> tuple[str, ...]:
+    """Say what each residual shows, where it shows anything."""
+    several = len(checks) > 1
+    names = log_names(problem.logs)
+    said: list[str] = []
+    for check in checks:
+        place = f"Joint {check.joint} in {names[check.log]}: " if several else ""
+        for what, binned in check.binned.items():
+            if (clear := binned.clearest(check.rms)) is not None:
+                said.append(_capital(f"{place}{_dependence(what, binned, clear)}"))
+        if check.correlation_s > LONG_S:
+            said.append(
+                _capital(
+                    f"{place}the error keeps its sign for about {number(check.correlation_s)} s. The noise "
+                    "of a sensor is faster: most of this is an error of the model."
+                )
+            )
+        if check.at_stop.any():
+            seconds = float(check.at_stop.sum()) * problem.logs[check.log].period
+            error = float(np.sqrt(np.mean(check.residual[check.at_stop] ** 2)))
+            said.append(
+                _capital(
+                    f"{place}the joint stands at its stop for {number(seconds)} s, with an rms error of "
+                    f"{number(math.degrees(error))} deg there."
+                )
+            )
+    return tuple(said)
+
+
+def _dependence(what: Regressor, binned: Binned, b: int) -> str:
+    factor = 1.0 if what is Regressor.COMMAND else math.degrees(1.0)
+    low, high = factor * binned.edges[b], factor * binned.edges[b + 1]
+    mean = math.degrees(float(binned.mean[b]))
+    side = "larger" if mean > 0 else "smaller"
+    return (
+        f"the measured angle is {number(abs(mean))} deg {side} than the simulated one on average where the "
+        f"{what.value} is {low:.3g} to {high:.3g} {UNITS[what]}."
+    ).replace("-", "−")
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def residual_table(problem: Problem, checks: Sequence[ResidualCheck]) -> Table:
+    """Return one row per compared angle."""
+    names = log_names(problem.logs)
+    rows = tuple(
+        (
+            names[check.log],
+            check.joint,
+            math.degrees(check.rms),
+            check.correlation_s,
+            float(check.at_stop.sum()) * problem.logs[check.log].period,
+        )
+        for check in checks
+    )
+    header = ("log", "joint", "rms [deg]", "correlation time [s]", "at a stop [s]")
+    return Table("Residuals", header, rows)
+
+
+def action_phrases(problem: Problem, actions: Sequence[Action]) -> tuple[str, ...]:
+    """Say what each action is and what it would do."""
+    return tuple(f"{action_name(problem, action)}: {action_effect(action)}." for action in actions)
+
+
+def action_name(problem: Problem, action: Action) -> str:
+    """Name an action in the imperative."""
+    match action.kind:
+        case ActionKind.WEIGH:
+            link = problem.settings.parameters[action.subject].link
+            return f"Weigh {link} to ±{100 * WEIGHED_SD:.0f} % ({action.subject})"
+        case ActionKind.STATE:
+            return f"State {action.subject} to ±{100 * STATED_SD:.0f} %, from a data sheet or a measurement"
+        case ActionKind.MEASURE_JOINT:
+            return f"Compare the angle of joint {action.subject} too"
+        case ActionKind.MEASURE_PRESSURES:
+            return "Log the chamber pressures and compare them"
+        case ActionKind.CONSTANT_COMMANDS:
+            return f"Add a log of constant commands of {action.subject} % in both directions"
+        case ActionKind.PAYLOAD:
+            return f"Repeat the logs with {action.subject} kg in the gripper"
+        case ActionKind.EXPERIMENT:
+            return f"Run the designed experiment of {action.subject} s (hydroid design)"
+
+
+def action_effect(action: Action) -> str:
+    """Say what an action would do."""
+    before, after = action.known
+    share = f"{after} of {action.total} parameters are then known to {100 * WEAK_ABOVE:.0f} %"
+    change = f"{share}, as before" if before == after else f"{share}, {before} before"
+    low, high = (f"{100 * d:.2g} %" for d in action.deviations)
+    return f"{change}; {action.parameter} improves most, from ±{low} to ±{high}"
+
+
+def action_table(actions: Sequence[Action]) -> Table:
+    """Return one row per action."""
+    rows = tuple(
+        (a.kind.value, a.subject, a.known[0], a.known[1], a.parameter, *(100 * d for d in a.deviations))
+        for a in actions
+    )
+    header = ("action", "of", "known before", "known after", "improves most", "from ± [%]", "to ± [%]")
+    note = (
+        f"known: number of parameters whose relative standard deviation is at most {100 * WEAK_ABOVE:.0f} %. "
+        "Predicted at the estimate, with the noise that the residuals show, from ±100 % without any log."
+    )
+    return Table("Predicted effect of each action", header, rows, note)
+
+
+def suggestion_content(result: Suggestions) -> dict[str, Any]:
+    """Return all suggestions as plain values for JSON (docs/json.md)."""
+    missing = [
+        {
+            "name": test.term.name,
+            "verdict": test.verdict.value,
+            "unit": test.term.settings.unit,
+            "held": finite(test.term.value),
+            "freed": finite(test.value),
+            "rms_deg": math.degrees(test.rms),
+            "score": test.statistic,
+            "chance": test.chance,
+            "parameter": test.term.settings.model_dump(mode="json", exclude_defaults=True)
+            | {"bounds": proposed_bounds(test)}
+            if test.verdict is Verdict.FREE
+            else None,
+        }
+        for test in result.missing.tests
+    ]
+    residuals = [
+        {
+            "log": check.log,
+            "joint": check.joint,
+            "rms_deg": math.degrees(check.rms),
+            "correlation_s": check.correlation_s,
+            "at_stop_s": float(check.at_stop.sum() * np.median(np.diff(check.time))),
+            "depends_on": [w.value for w, b in check.binned.items() if b.clearest(check.rms) is not None],
+        }
+        for check in result.residuals
+    ]
+    actions = [
+        {
+            "action": action.kind.value,
+            "of": action.subject,
+            "known_before": action.known[0],
+            "known_after": action.known[1],
+            "total": action.total,
+            "parameter": action.parameter,
+            "before_percent": 100 * action.deviations[0],
+            "after_percent": 100 * action.deviations[1],
+        }
+        for action in result.actions
+    ]
+    rms = math.degrees(result.missing.rms)
+    return {"rms_deg": rms, "missing": missing, "residuals": residuals, "actions": actions}

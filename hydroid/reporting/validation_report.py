@@ -1,0 +1,246 @@
+"""The report of a validation: how well several fits predict several logs."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+
+from hydroid.estimate import finite
+from hydroid.fitting.validation import ErrorIndices
+from hydroid.identified import IdentifiedModel
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.quantities.band import Band
+from hydroid.reporting.fit_report import INDICES, INDICES_NOTE, index_cells
+from hydroid.reporting.page import Light, Page, Section, Verdict, file_name, log_names, short_name, unique
+from hydroid.reporting.responses import JointResponse, logged_pressures, response_data, response_tabs
+from hydroid.reporting.table import Cell, Table, number
+
+_BANDS = "Prediction bands"
+_BAND_HEADER = (
+    "noise [deg]",
+    "expected error [deg]",
+    "error [deg]",
+    "error of the model [deg]",
+    "inside [%]",
+)
+_NOTES = {True: "Unseen: the fit was not made from this log.", False: "The fit was made from this log."}
+_BAND_NOTE = (
+    "noise: standard deviation that the fit saw in its own residuals. expected error: rms, of this noise and "
+    "of the parameters' uncertainty together. error: rms. error of the model: the part of the error that the "
+    "expected one does not explain. inside: samples within the 95 % band; 95 % are expected if the model is "
+    "right, and slow noise may leave it for a while."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """One fit's response to one log.
+
+    Attributes:
+        fit: its name.
+        log: what it is compared with.
+        response: outputs [rad], shape (T, K).
+        indices: of the error by joint, numbered from 1.
+        bands: prediction bands by joint; empty of a model that is no fit.
+        fitted: whether the fit was made from this log; None: not known.
+    """
+
+    fit: str
+    log: Log
+    response: Array
+    indices: Mapping[int, ErrorIndices]
+    bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
+    fitted: bool | None = None
+
+    @property
+    def unseen(self) -> bool:
+        """Whether the fit is known not to have seen the log."""
+        return self.fitted is False
+
+    @property
+    def rms(self) -> float:
+        """Rms error over all joints [deg]."""
+        return degrees(math.sqrt(sum(i.rms**2 for i in self.indices.values()) / len(self.indices)))
+
+
+def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedModel] = ()) -> Page:
+    """Return the page of several fits on several logs; its table is `validation` (article, table 9)."""
+    logs = {result.log.source: result.log for result in results}
+    names = dict(zip(logs, log_names(list(logs.values())), strict=True))
+    rows: list[tuple[Cell, ...]] = []
+    band_rows: list[tuple[Cell, ...]] = []
+    verdicts: list[str] = []
+    for result, fit in zip(results, _fit_names(results), strict=True):
+        name = names[result.log.source]
+        for joint, indices in result.indices.items():
+            rows.append((fit, name, joint, *index_cells(indices)))
+            if band := result.bands.get(joint):
+                band_rows.append((fit, name, joint, *_band_cells(band)))
+                verdicts.append(f"{fit} on {name}, joint {joint}: {_verdict(band)}")
+    table = Table(
+        "Output error on given logs",
+        ("fit", "log", "joint", *INDICES),
+        tuple(rows),
+        INDICES_NOTE,
+        INDICES[:3:2],
+    )
+    responses = validation_responses(results)
+    notes = {names[r.log.source]: _NOTES[r.unseen] for r in results if r.fitted is not None}
+    verdict = _strip(results)
+    tabs = sorted(response_tabs(responses, notes), key=lambda tab: tab.note != _NOTES[True])
+    section = Section("Prediction", tabs=tuple(tabs), tables={"validation": table})
+    bands = {"bands": Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)}
+    limits = Section("What limits the prediction", points=tuple(verdicts), more=bands)
+    sections = [section, limits] if band_rows else [section]
+    if folds:
+        sections.append(Section("Without one log", tables={"folds": _fold_table(folds)}))
+    numbers = {"kind": "validation", "errors": _errors(results, names)}
+    return Page(
+        "validation",
+        "Validation",
+        verdict.prediction,
+        tuple(sections),
+        data=response_data(responses),
+        verdict=verdict,
+        numbers=numbers,
+    )
+
+
+def validation_responses(results: Sequence[Validation]) -> dict[str, JointResponse]:
+    """Return the responses of all fits to each record, by file name; only the best fit is shown at first.
+
+    Fits that read a log with another delay or period were not compared with the same record.
+    """
+    logs = {result.log.source: result.log for result in results}
+    names = dict(zip(logs, log_names(list(logs.values())), strict=True))
+    order = sorted(range(len(results)), key=lambda i: _rank(results)[results[i].fit])
+    fits = _fit_names(results)
+    records: dict[object, tuple[JointResponse, dict[str, Array], dict[str, Array]]] = {}
+    for i in order:
+        result, log, name = results[i], results[i].log, names[results[i].log.source]
+        for column, joint in enumerate(result.indices):
+            command, measured = log.command[:, joint - 1], log.angle[:, joint - 1]
+            simulated, halves = dict[str, Array](), dict[str, Array]()
+            pressures = logged_pressures(log, joint - 1)
+            response = JointResponse(
+                name, joint, log.time, command, measured, simulated, halves, frozenset(), pressures
+            )
+            key = name, joint, measured.tobytes(), command.tobytes()
+            _, simulated, halves = records.setdefault(key, (response, simulated, halves))
+            fit = fits[i] if fits[i] not in simulated else unique(fits[i], simulated)
+            simulated[fit] = result.response[:, column]
+            if band := result.bands.get(joint):
+                halves[fit] = band.half
+    taken: set[str] = set()
+    return {
+        file_name(f"validation_{Path(one.log).stem}_joint_{one.joint}", taken): replace(
+            one, off=frozenset(list(one.simulated)[1:])
+        )
+        for one, *_ in records.values()
+    }
+
+
+def _fit_names(results: Sequence[Validation]) -> list[str]:
+    """Names of the fits as shown: numbered where several of one name are compared with one log."""
+    taken: dict[str, list[str]] = {}
+    return [
+        _taken(unique(short_name(r.fit), names := taken.setdefault(r.log.source, [])), names) for r in results
+    ]
+
+
+def _taken(name: str, names: list[str]) -> str:
+    names.append(name)
+    return name
+
+
+def _judged(results: Sequence[Validation]) -> list[Validation]:
+    """Results on logs that the fits have not seen, or all where there is none."""
+    return [result for result in results if result.unseen] or list(results)
+
+
+def _rank(results: Sequence[Validation]) -> dict[str, float]:
+    """Rms error of each fit on unseen logs, or on all where there is none [deg], the smallest first."""
+    squares: dict[str, list[float]] = {}
+    for result in _judged(results):
+        squares.setdefault(result.fit, []).append(result.rms**2)
+    errors = {fit: math.sqrt(sum(each) / len(each)) for fit, each in squares.items()}
+    errors |= {result.fit: math.inf for result in results if result.fit not in errors}
+    return dict(sorted(errors.items(), key=lambda item: item[1]))
+
+
+def _strip(results: Sequence[Validation]) -> Verdict:
+    """The verdict: the best fit's error on unseen logs, the others', and what limits it."""
+    judged, errors = _judged(results), _rank(results)
+    logs = list(dict.fromkeys(result.log.source for result in judged))
+    unseen = judged[0].unseen
+    kind = "unseen log" if unseen else "log"
+    which = f"{'an' if unseen else 'the'} {kind}" if len(logs) == 1 else f"{len(logs)} {kind}s"
+    (best, error), *others = errors.items()
+    prediction = f"{short_name(best)} predicts {which} with an error of {error:.2g}° rms."
+    rest = [f"{short_name(name)} {value:.2g}°" for name, value in others]
+    parameters = f"Others: {', '.join(rest)}." if rest else ""
+    lights = [_seen_light(results)]
+    if bands := [band for r in judged if r.fit == best for band in r.bands.values()]:
+        outside = [band for band in bands if band.model_limits]
+        inside = f"{min(100 * band.inside for band in bands):.0f} %"
+        if outside:
+            words = f"The model: in {len(outside)} of {len(bands)} responses its error exceeds the noise."
+            lights.append(Light("What limits it", "fair", words))
+        else:
+            words = (
+                f"Noise and parameters explain the error: at least {inside} of the samples lie in the band."
+            )
+            lights.append(Light("What limits it", "good", words))
+    return Verdict(prediction, parameters, tuple(lights))
+
+
+def _seen_light(results: Sequence[Validation]) -> Light:
+    question = "Unseen logs"
+    logs = {result.log.source: result for result in results}
+    fresh = [name for name in logs if all(r.unseen for r in results if r.log.source == name)]
+    if fresh:
+        return Light(question, "good", f"{len(fresh)} of {len(logs)} logs were not fitted.")
+    if any(result.fitted is None for result in results):
+        return Light(question, "open", "Not known: the values are not from a run folder.")
+    return Light(question, "fair", "None: the fits were made from these logs.")
+
+
+def _errors(results: Sequence[Validation], names: Mapping[str, str]) -> list[dict[str, object]]:
+    return [
+        {"fit": r.fit, "log": names[r.log.source], "unseen": r.unseen, "rms_deg": finite(r.rms)}
+        for r in results
+    ]
+
+
+def _fold_table(folds: Sequence[IdentifiedModel]) -> Table:
+    """Return the parameters of models that were refined without one log each."""
+    values = np.array([fold.theta for fold in folds])
+    rows: list[tuple[Cell, ...]] = []
+    parameters = folds[0].settings.parameter_set().parameters
+    for parameter, column in zip(parameters, values.T, strict=True):
+        if parameter.fixed is None:
+            mean, spread = float(column.mean()), float(column.std(ddof=1))
+            relative = 100 * spread / abs(mean) if mean else np.inf
+            rows.append((parameter.name, parameter.unit, *map(float, column), relative))
+    header = ("name", "unit", *(short_name(fold.source) for fold in folds), "spread [%]")
+    note = "Each column: refined without one log. spread: their standard deviation relative to their mean."
+    return Table("Parameters without one log", header, tuple(rows), note, ("spread [%]",))
+
+
+def _band_cells(band: Band) -> tuple[Cell, ...]:
+    """Return the cells of _BAND_HEADER."""
+    errors = (degrees(x) for x in (band.noise, band.expected, band.error, band.model_error))
+    return (*errors, 100 * band.inside)
+
+
+def _verdict(band: Band) -> str:
+    """Say what limits the prediction."""
+    inside = f"{100 * band.inside:.0f} % of the samples lie inside the band."
+    if not band.model_limits:
+        return f"{inside} The noise and the uncertainty of the parameters explain the error."
+    ratio = number(band.model_error / band.noise)
+    return f"{inside} The model limits the prediction, not the noise: its error is {ratio} times the noise."

@@ -1,0 +1,72 @@
+"""The verdict strip of a fit's page: a picture, two sentences, and the lights."""
+
+import math
+
+from hydroid.fitting.fit import Fit
+from hydroid.problem.problem import Problem
+from hydroid.reporting.arm_picture import arm_picture
+from hydroid.reporting.page import Light, Verdict
+from hydroid.reporting.phrases import listed
+from hydroid.uncertainty.covariance import Uncertainty
+from hydroid.uncertainty.flags import Flag
+
+_MOST_NAMES = 4
+
+
+def fit_verdict(problem: Problem, fit: Fit) -> Verdict:
+    """Return the verdict on a fit from its own logs."""
+    count = len(problem.logs)
+    logs = "the fitted log" if count == 1 else f"the {count} fitted logs"
+    rms = f"{math.degrees(fit.best.rms):.2g}"
+    prediction = f"Reproduces {logs} with an error of {rms}° rms."
+    known, free = known_count(fit)
+    determined = len([q for q in fit.quantities.scalars.values() if q.interval[0] is not None])
+    parameters = f"{known} of {free} parameters are known to 30 % or better"
+    if determined:
+        parameters += f", and {determined} quantities that follow from all of them together"
+    pose = problem.logs[0].start
+    lights = (_converged(fit), _validated(), *uncertainty_lights(problem, fit.uncertainty))
+    picture = arm_picture(problem.settings.arm, pose, problem.settings.outputs)
+    return Verdict(prediction, f"{parameters}.", lights, picture)
+
+
+def known_count(fit: Fit) -> tuple[int, int]:
+    """Return how many parameters are known to 30 % from logs and priors, and how many are free."""
+    status = [s for s in fit.uncertainty.status if s.flag is not Flag.FIXED]
+    return sum(s.flag is Flag.IDENTIFIABLE for s in status), len(status)
+
+
+def _converged(fit: Fit) -> Light:
+    if fit.refinement is None:
+        return Light("Converged", "fair", "Not refined: the search's own estimate.")
+    if fit.converged:
+        return Light("Converged", "good", "Yes: least squares found an optimum.")
+    return Light("Converged", "bad", f"No: {fit.refinement.ending.value}.")
+
+
+def _validated() -> Light:
+    return Light("Validated on unseen logs", "open", "Not yet: hydroid validate OTHER.csv --fit RUN.")
+
+
+def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Light]:
+    """Return the lights for identifiable, and at bounds."""
+    status = dict(zip(problem.parameters.names, known.status, strict=True))
+    lost = [name for name, s in status.items() if s.flag in (Flag.UNIDENTIFIABLE, Flag.NO_EFFECT)]
+    weak = [name for name, s in status.items() if s.flag is Flag.WEAK]
+    at = [name for name, s in status.items() if s.at_bound and s.flag is not Flag.NO_EFFECT]
+    question = "Identifiable"
+    if lost:
+        first = Light(question, "bad", f"Not from these logs: {_some(lost)}.")
+    elif weak:
+        first = Light(question, "fair", f"Only to 30–100 %: {_some(weak)}.")
+    else:
+        first = Light(question, "good", "Yes: every free parameter.")
+    if at:
+        words = f"{_some(at)}: widen the bounds, or the model lacks something."
+        return first, Light("At bounds", "bad", words)
+    return first, Light("At bounds", "good", "No parameter.")
+
+
+def _some(names: list[str]) -> str:
+    more = len(names) - _MOST_NAMES
+    return listed(names) if more <= 1 else f"{', '.join(names[:_MOST_NAMES])} and {more} more"

@@ -54,7 +54,9 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
         Light("Range, speed and command", "fair", "Within their limits, in simulation only."),
         Light("Collisions", "open", "Not checked: design.clearance_m is null.")
         if settings.clearance_m is None
-        else Light("Collisions", "fair", f"None within {settings.clearance_m:g} m, with the model's shapes only."),
+        else Light(
+            "Collisions", "fair", f"None within {settings.clearance_m:g} m, with the model's shapes only."
+        ),
     )
     steps = (
         Step("Run commands.csv on the machine, with a hand on the emergency stop.", safety(settings)),

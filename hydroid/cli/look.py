@@ -29,7 +29,7 @@ def check(
 
     result = check(logs, load_settings(config, overrides(setting)), repair=repair)
     plain = {"logs": [_plain(log) for log in result.logs], "findings": [*map(_finding, result.findings)]}
-    show(output, lambda: plain, _lines(result))
+    show(output, lambda: plain, check_lines(result))
     if any(log.log is None for log in result.logs):
         raise typer.Exit(2)
 
@@ -157,7 +157,8 @@ def _model(estimate: NominalEstimate, output: Output) -> "IdentifiedModel":
     return model
 
 
-def _lines(result: "Check") -> list[str]:
+def check_lines(result: "Check") -> list[str]:
+    """Return what `check` prints, a line each: findings by level, then the usable logs."""
     from hydroid.log import grouped, in_one_line
 
     every = [finding for log in result.logs for finding in log.findings]

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydroid.log.log import Finding, Floats, numbered
-from hydroid.log.signals import Recording
+from hydroid.log.signals import Recording, Signal
 from hydroid.log.suspicion import outside_hint, time_hint, unit_findings
 from hydroid.settings.log import LogSettings
 
@@ -121,15 +122,21 @@ def _steps(
 
 
 def _outside(recording: Recording) -> Iterator[Finding]:
+    """Values outside their limits: a finding for each signal, or one for all that another unit explains."""
+    faults: dict[str, list[tuple[Signal, NDArray[np.int64], float]]] = {}
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rounding = ROUNDING if signal.kind == "command" else 0.0
         rows = np.flatnonzero((values < signal.low - rounding) | (values > signal.high + rounding))
-        if not len(rows):
-            continue
-        to_unit, unit, hint = PRESENTED[signal.kind]
-        value, low, high = (to_unit * x for x in (values[rows[0]], signal.low, signal.high))
+        if len(rows):
+            hint = outside_hint(recording, signal, values) or f"{PRESENTED[signal.kind][2]} of {signal}"
+            faults.setdefault(hint, []).append((signal, rows, values[rows[0]]))
+    for hint, ((signal, rows, first), *others) in faults.items():
+        to_unit, unit, usual = PRESENTED[signal.kind]
+        value, low, high = (to_unit * x for x in (first, signal.low, signal.high))
         what = f"{signal} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}"
-        hint = outside_hint(recording, signal, values) or hint
+        if others:
+            what += f", and {signal.kind}s of {numbered([other.joint for other, *_ in others])} likewise"
+        hint = usual if hint.startswith(usual) else hint
         yield recording.finding("error", what, hint, rows, signal, "outside")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from hydroid.log.log import Floats
 
 TOLERANCE = 0.03  # of a range: converters overshoot, and joysticks do not rest exactly in the middle
-LEAST_USE = 0.2  # part of a range that a log about its middle uses at least
+LEAST_USE = 0.1  # part of half a range that a log uses on each side of its middle at least
 RESTING = 0.05  # part of the samples that has the same value, for this to be the value at rest
 SYMMETRIC = {1.0: "±1", 10.0: "±10 V", 100.0: "%", 1000.0: "±1000", 32767.0: "±32767"}
 """ranges about 0, by their end"""
@@ -40,8 +40,8 @@ def likely_range(values: Floats) -> CommandRange | None:
     values = values[~np.isnan(values)]
     if not len(values) or not values.any():
         return None
-    low, high, rest = float(values.min()), float(values.max()), _rest(values)
-    raised = next(_raised(low, high, rest), None) if low >= 0 and rest > 0 else None
+    low, high = float(values.min()), float(values.max())
+    raised = next(_raised(low, high, _rests(values)), None) if low >= 0 else None
     if raised:
         return raised
     largest = max(-low, high)
@@ -49,17 +49,21 @@ def likely_range(values: Floats) -> CommandRange | None:
     return None if end is None else CommandRange(SYMMETRIC[end], 100 / end, 0.0)
 
 
-def _raised(low: float, high: float, rest: float) -> Iterator[CommandRange]:
+def _raised(low: float, high: float, rests: list[float]) -> Iterator[CommandRange]:
     for name, (start, end) in RAISED.items():
         middle, half = (start + end) / 2, (end - start) / 2
         slack = 2 * half * TOLERANCE
         inside = start - slack <= low and high <= end + slack
-        if inside and abs(rest - middle) <= slack and high - low >= LEAST_USE * 2 * half:
+        used = low < middle - LEAST_USE * half and high > middle + LEAST_USE * half
+        if inside and used and any(abs(rest - middle) <= slack for rest in rests):
             yield CommandRange(name, 100 / half, -100 * middle / half)
 
 
-def _rest(values: Floats) -> float:
-    """Return the value of a command at rest: the most common one, or else the first."""
+def _rests(values: Floats) -> list[float]:
+    """Return the values that may be that of a command at rest: the first, and the most common one.
+
+    None where 0 is common: this is then the value at rest.
+    """
     kinds, counts = np.unique(values, return_counts=True)
-    most = int(counts.argmax())
-    return float(kinds[most] if counts[most] >= RESTING * len(values) else values[0])
+    common = kinds[counts >= RESTING * len(values)]
+    return [] if 0 in common else [float(values[0]), float(kinds[counts.argmax()])]

@@ -46,8 +46,8 @@ def suggest_delay(log: Log, joint: int) -> Delay | None:
     if used.stop - used.start < last or np.isnan(q).any() or (u == u[0]).all() or (q == q[0]).all():
         return None
     width = SMOOTHING / log.period
-    command, angle = _smooth(u, width), _smooth(q, width)
-    speed = _smooth(q, width, derivative=True)
+    command, angle = smooth(u, width), smooth(q, width)
+    speed = smooth(q, width, derivative=True)
     counts = ~_at_stop(command, angle, speed, log.period)[used]
     if counts.sum() < last:
         return None
@@ -71,11 +71,11 @@ def stands_at_stop(log: Log, joint: int) -> NDArray[np.bool_]:
     """
     width = SMOOTHING / log.period
     q = log.angle[:, joint - 1]
-    command, angle = _smooth(log.command[:, joint - 1], width), _smooth(q, width)
-    speed = _smooth(q, width, derivative=True)
+    command, angle = smooth(log.command[:, joint - 1], width), smooth(q, width)
+    speed = smooth(q, width, derivative=True)
     moving = np.abs(speed) > FAST * np.abs(speed).max()
     enough = np.median(np.abs(command[moving])) if moving.any() else np.inf
-    return _at_stop(command, angle, speed, log.period) & (np.abs(command) > enough)
+    return _at_stop(command, angle, speed, log.period) & (np.abs(command) > 0.99 * enough)
 
 
 def delay_findings(log: Log, delay_s: float, column: Callable[[int], str]) -> list[Finding]:
@@ -135,7 +135,7 @@ def _at_stop(command: Floats, angle: Floats, speed: Floats, period: float) -> ND
     return stopped
 
 
-def _smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats:
+def smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats:
     """Smooth a signal by a Gaussian of `width` samples, or return the derivative of that per sample."""
     reach = int(4 * width + 0.5)
     at = np.arange(-reach, reach + 1)

@@ -58,8 +58,8 @@ def direction_findings(log: Log, column: Callable[[int], str]) -> list[Finding]:
         return []
     share = ", ".join(f"{d.against:.0%} of {d.travel:.3g} deg" for d in found.values())
     what = f"angle of {numbered([*found])} moves against the command ({share})"
-    hint = "give log.command or log.angle a negative scale if one is logged the other way around"
     first = next(iter(found))
+    hint = f"set a negative scale, log.joints.{first}.command.scale: -1, if it is logged the other way around"
     return [Finding("warning", what, log.source, hint, column=column(first), kind="direction")]
 
 
@@ -72,9 +72,7 @@ def disagreements(logs: Sequence[Log]) -> list[Finding]:
         others = [source for source, d in directions.items() if d.against < 1 - AGAINST]
         if turned and others:
             odd = min(turned, others, key=len)
-            what = (
-                f"joint {joint} moves against its command in {len(turned)} logs, and with it in {len(others)}"
-            )
+            what = f"joint {joint} moves against its command in {len(turned)} of {len(turned + others)} logs"
             hint = "the sign of the logging has changed: mend these logs, or give them settings of their own"
             findings.append(Finding("warning", what, odd[0], hint, kind="directions differ"))
     return findings

@@ -5,34 +5,37 @@ from itertools import pairwise
 
 import numpy as np
 
-from hydroid.log.delay import stands_at_stop
+from hydroid.log.delay import smooth, stands_at_stop
 from hydroid.log.direction import disagreements
 from hydroid.log.log import Finding, Floats, Log, numbered
 
-HARDLY = 0.5  # [deg]: a joint that is driven strongly moves further
+SMOOTHING = 0.25  # standard deviation of a Gaussian over which a travel is taken [s]
+HARDLY = 2.0  # [deg]: a joint that is driven strongly moves further
 STRONG = 30.0  # [%]
+LEAST = 300.0  # [% s] of strong commands before their effect is judged
 REST = 0.2  # [s] of rest before the first command that give a start pose
 AT_STOP = 0.5  # [s] at a stop that are worth a line
 HELD = 0.3  # [s] for which logs hold a command before it counts
 BIN = 5.0  # [%]
-OPEN = 15.0  # [%]: a wider interval without commands leaves the valve curve open
+OPEN = 19.5  # [%]: a wider interval without commands leaves the valve curve open
 HIGH = 80.0  # [%]: above the largest command, if it is lower, the curve is open too
-_MAX_LISTED = 6
+_MAX_LISTED = 3  # joints in a line
 
 
 def moved(log: Log, joint: int) -> float:
-    """Return the range over which a measured joint (number, from 1) moved [deg]."""
-    return float(np.rad2deg(np.ptp(log.angle[:, joint - 1])))
+    """Return the range over which a measured joint (number, from 1) moved [deg], but for its noise."""
+    return float(np.rad2deg(np.ptp(smooth(log.angle[:, joint - 1], SMOOTHING / log.period))))
 
 
 def motion_findings(log: Log) -> list[Finding]:
     """Report joints that hardly move or stand at a stop, and a log that does not begin at rest."""
     findings = list[Finding]()
     joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
-    still = [j for j in joints if np.abs(log.command[:, j - 1]).max() > STRONG and 0 < moved(log, j) < HARDLY]
+    strong = np.where(np.abs(log.command) > STRONG, np.abs(log.command), 0.0).sum(axis=0) * log.period
+    still = [j for j in joints if strong[j - 1] > LEAST and 0 < moved(log, j) < HARDLY]
     if still:
         most = max(moved(log, joint) for joint in still)
-        what = f"{numbered(still)} hardly moves under strong commands, by {most:.2g} deg"
+        what = f"strong commands hardly move {numbered(still)}, by {most:.2g} deg at most"
         hint = "check log.joints: is this the angle of that command?"
         findings.append(Finding("warning", what, log.source, hint, kind="no motion"))
     stops = {j: float(stands_at_stop(log, j).sum() * log.period) for j in joints if j not in still}
@@ -54,26 +57,23 @@ def survey(logs: Sequence[Log]) -> list[Finding]:
     """Report what all logs together lack or contradict: directions, and commands that none of them has."""
     if not logs:
         return []
-    findings, gaps = disagreements(logs), list[str]()
-    one_way = dict[int, str]()
+    findings, gaps, one_way = disagreements(logs), list[str](), list[str]()
     joints = np.flatnonzero(np.any([log.driven & log.measured for log in logs], axis=0)) + 1
     for joint in joints.tolist():
         levels = {sign: _levels(logs, joint, sign) for sign in (1, -1)}
+        if open_ := [*_gaps(levels[1], 1), *_gaps(levels[-1], -1)]:
+            gaps.append(f"joint {joint} {', '.join(open_)}")
         for sign, word in ((1, "positive"), (-1, "negative")):
             if not len(levels[sign]) and len(levels[-sign]):
-                one_way[joint] = word
-            gaps += [f"joint {joint} {word} {gap}" for gap in _gaps(levels[sign])]
+                one_way.append(f"joint {joint} {word}")
     source = logs[0].source if len(logs) == 1 else f"{len(logs)} logs"
     if gaps:
-        listed = ", ".join(gaps[:_MAX_LISTED]) + (
-            f" and {len(gaps) - _MAX_LISTED} more" * (len(gaps) > _MAX_LISTED)
-        )
-        what = f"no command: {listed}; the valve curve is open there"
+        more = f"; and of {len(gaps) - _MAX_LISTED} more joints" if len(gaps) > _MAX_LISTED else ""
+        what = f"no command [%] of {'; '.join(gaps[:_MAX_LISTED])}{more}: the valve curve is open there"
         hint = "add logs with such commands, or hold the parameters of the curve"
         findings.append(Finding("note", what, source, hint, kind="open valve curve"))
     if one_way:
-        parts = ", ".join(f"joint {joint} {word}" for joint, word in one_way.items())
-        what = f"never commanded: {parts}"
+        what = f"never commanded: {', '.join(one_way)}"
         hint = "parameters of that direction stay unknown"
         findings.append(Finding("note", what, source, hint, kind="one direction"))
     return findings
@@ -90,8 +90,10 @@ def _levels(logs: Sequence[Log], joint: int, sign: int) -> Floats:
     return np.array([np.average(values[bins == b], weights=seconds[bins == b]) for b in used])
 
 
-def _gaps(levels: Floats) -> list[str]:
-    """Return the intervals without commands between levels [%] and above them."""
-    wide = [(a, b) for a, b in pairwise(levels) if b - a >= OPEN]
-    gaps = [f"between {a:.0f} and {b:.0f} %" for a, b in wide]
-    return [*gaps, f"above {levels[-1]:.0f} %"] if len(levels) and levels[-1] < HIGH else gaps
+def _gaps(levels: Floats, sign: int) -> list[str]:
+    """Return the intervals without commands between levels [%] and above them, in the direction of `sign`."""
+    wide = [(sign * a, sign * b) for a, b in pairwise(levels) if b - a >= OPEN]
+    gaps = [f"between {min(pair):.0f} and {max(pair):.0f}" for pair in wide]
+    if len(levels) and levels[-1] < HIGH:
+        gaps.append(f"{'above' if sign > 0 else 'below'} {sign * levels[-1]:.0f}")
+    return gaps

@@ -70,7 +70,8 @@ def outside_hint(recording: Recording, signal: Signal, values: Floats) -> str:
 def time_hint(recording: Recording, period: float) -> str:
     """Return the setting that makes a sample period [s] plausible; "" where there is none."""
     unit = likely_unit(period / recording.signals[0].gain)
-    return f"if the time is in {unit}, set log.time.unit: {unit}" if unit else ""
+    spelt = {"min": "minutes", "h": "hours", "day": "days"}.get(unit, unit)
+    return f"if the time is in {spelt}, set log.time.unit: {unit}" if unit else ""
 
 
 def _stated(recording: Recording) -> Iterator[Finding]:
@@ -107,9 +108,10 @@ def _time_unit(recording: Recording) -> str:
 
 def _ranges(recording: Recording, driven: np.ndarray, means: Floats) -> Iterator[Finding]:
     """Commands that look like another range than percent."""
-    signals = {s.joint: s for s in recording.signals if s.kind == "command" and s.low < 0}
-    columns = {s.joint: v for s, v in zip(recording.signals, recording.values.T, strict=True) if s.low < 0}
-    likely = {j: likely_range(columns[j]) for j in signals}
+    pairs = zip(recording.signals, recording.values.T, strict=True)
+    signed = {s.joint: (s, values) for s, values in pairs if s.kind == "command" and s.low < 0}
+    signals = {joint: signal for joint, (signal, _) in signed.items()}
+    likely = {joint: likely_range(values) for joint, (_, values) in signed.items()}
     raised = {j: found for j, found in likely.items() if found and found.offset}
     for name in dict.fromkeys(found.name for found in raised.values()):
         joints = [j for j, found in raised.items() if found.name == name]

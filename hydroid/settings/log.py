@@ -1,4 +1,4 @@
-"""How the columns of a CSV log become commands [%] and joint angles [rad]. The defaults fit the shipped logs.
+"""How the columns of a log become commands [%] and joint angles [rad]. The defaults fit the shipped logs.
 
 log:
   time: {column: t, unit: ms}
@@ -43,7 +43,7 @@ class TimeColumn(Settings):
     """The column that holds the time."""
 
     column: Name = "time_s"
-    """name in the header"""
+    """name in the header; a ROS bag has a clock of its own and needs none"""
     unit: Literal["s", "ms", "us", "ns", "min", "h", "day"] = "s"
     """unit of the cells; dates and times of day are recognised"""
 
@@ -113,7 +113,7 @@ def _common(columns: C | None) -> C | None:
 
 
 class LogSettings(Settings):
-    """The layout of CSV logs: columns, units and tolerances."""
+    """The layout of logs: columns, units and tolerances."""
 
     time: TimeColumn = TimeColumn()
     command: Annotated[CommandColumns | None, AfterValidator(_common)] = CommandColumns()

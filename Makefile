@@ -86,6 +86,13 @@ coverage: setup  ## whether the intervals hold the truth as often as they say (d
 quantity-coverage: setup  ## the same for quantities such as speeds and dead bands (docs/quantities.md)
 	$(BIN)/python benchmarks/quantity_coverage.py
 
+.PHONY: prediction-bands leave-one-out
+prediction-bands: setup  ## the share of unseen samples inside the bands, with an exact and a wrong model; two minutes
+	$(BIN)/python benchmarks/prediction_bands.py
+
+leave-one-out: setup  ## expected and actual error on each of five logs that a fit left out
+	$(BIN)/python benchmarks/leave_one_out.py
+
 fuzz: setup  ## 12,000 damaged files of every kind; a quarter of an hour
 	$(BIN)/python benchmarks/fuzz.py
 

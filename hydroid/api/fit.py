@@ -136,7 +136,11 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
     folder.write_estimate(problem, result)
     began = time.monotonic()
     last = problem.freed() if result.final == "joint" else problem
-    suggested = suggestions(last, result.uncertainty, thorough=False) if result.best.usable else None
+    suggested = (
+        suggestions(last, result.uncertainty, result.quantities, thorough=False)
+        if result.best.usable
+        else None
+    )
     write_page(fit_page(folder.identity(), problem, result, suggested), folder.path)
     folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
     return result

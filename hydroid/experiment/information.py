@@ -99,6 +99,10 @@ class Precision:
         """Relative standard deviation of each free parameter, (F,), after an experiment's information."""
         return np.sqrt(np.diag(self._covariance(information)))
 
+    def spread(self, slopes: Array, information: Array | float = 0.0) -> Array:
+        """Standard deviation of functions with derivatives (k, F) per relative change, shape (k,)."""
+        return np.sqrt(np.sum((slopes @ self._covariance(information)) * slopes, axis=1))
+
     def weakest(self, information: Array | float = 0.0) -> tuple[float, Array]:
         """Relative standard deviation and unit vector (F,) of the least known of `directions`."""
         basis = self.directions

@@ -38,12 +38,14 @@ class Known:
         sd: standard deviation, shape (m,): infinite where not determined, NaN where unknown.
         interval: of 95 %, shape (m, 2); infinite where not determined.
         given: quantities that no free parameter changes, shape (m,).
+        slopes: derivatives per relative change of the free parameters, shape (p, m).
     """
 
     value: Array
     sd: Array
     interval: Array
     given: NDArray[np.bool_]
+    slopes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +130,7 @@ class Precision:
         sd[lost] = np.inf
         interval[np.isposinf(sd)] = -np.inf, np.inf
         interval[np.isposinf(sd) & positive] = 0.0, np.inf
-        return Known(value, sd, interval, np.all(abs(slopes) <= GIVEN_BELOW * abs(value), axis=0))
+        return Known(value, sd, interval, np.all(abs(slopes) <= GIVEN_BELOW * abs(value), axis=0), slopes)
 
 
 def precision(parameters: ParameterSet, uncertainty: Uncertainty) -> Precision:

@@ -25,11 +25,13 @@ class Quantities:
     """What follows from an estimate: single quantities and curves by name, and what they were computed from.
 
     Quantities that no free parameter changes are left out: the settings give them, not the logs.
+    slopes: relative changes of the single quantities per relative change of the free parameters, shape (p,).
     """
 
     scalars: dict[str, QuantityEstimate]
     curves: dict[str, CurveEstimate]
     precision: Precision
+    slopes: dict[str, Array]
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
@@ -38,6 +40,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     estimate = problem.stage.candidates(uncertainty.theta[None])
     scalars: dict[str, QuantityEstimate] = {}
     curves: dict[str, CurveEstimate] = {}
+    slopes: dict[str, Array] = {}
     for joint in problem.settings.outputs:
         bench = make_bench(problem.settings, problem.logs, joint)
         measure = joint_measure(bench, estimate)
@@ -55,11 +58,16 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         result = known.propagate(values, positive, concerned)
         single = [i for i, c in enumerate(columns) if not c.along]
         scalars |= {names[i]: _scalar(joint, columns[i], result, i) for i in single if _told(result, i)}
+        slopes |= {
+            names[i]: result.slopes[:, i] / result.value[i]
+            for i in single
+            if names[i] in scalars and result.value[i] != 0
+        }
         for name in dict.fromkeys(c.name for c in columns if c.along):
             points = [i for i, n in enumerate(names) if n == name and np.isfinite(result.value[i])]
             if any(_told(result, i) for i in points):
                 curves[name] = _curve(joint, columns, result, sorted(points, key=lambda i: columns[i].at))
-    return Quantities(scalars, curves, known)
+    return Quantities(scalars, curves, known, slopes)
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:

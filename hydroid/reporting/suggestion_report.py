@@ -264,17 +264,24 @@ def action_effect(action: Action) -> str:
     before, after = action.known
     share = f"{after} of {action.total} parameters are then known to {100 * WEAK_ABOVE:.0f} %"
     change = f"{share}, as before" if before == after else f"{share}, {before} before"
-    low, high = (f"{100 * d:.2g} %" for d in action.deviations)
-    return f"{change}; {action.parameter} improves most, from ±{low} to ±{high}"
+    improved = [(action.parameter, action.deviations)]
+    improved += [(action.quantity, action.quantity_deviations)] if action.quantity else []
+    most = [f"{name} from ±{100 * low:.2g} % to ±{100 * high:.2g} %" for name, (low, high) in improved]
+    return f"{change}; most improves {'; of the quantities, '.join(most)}"
 
 
 def action_table(actions: Sequence[Action]) -> Table:
     """Return one row per action."""
     rows = tuple(
-        (a.kind.value, a.subject, a.known[0], a.known[1], a.parameter, *(100 * d for d in a.deviations))
+        (
+            *(a.kind.value, a.subject, *a.known),
+            *(a.parameter, *(100 * d for d in a.deviations)),
+            *((a.quantity, *(100 * d for d in a.quantity_deviations)) if a.quantity else ("", None, None)),
+        )
         for a in actions
     )
     header = ("action", "of", "known before", "known after", "improves most", "from ± [%]", "to ± [%]")
+    header += ("quantity", "quantity from ± [%]", "quantity to ± [%]")
     note = (
         f"known: number of parameters whose relative standard deviation is at most {100 * WEAK_ABOVE:.0f} %. "
         "Predicted at the estimate, with the noise that the residuals show, from ±100 % without any log."
@@ -322,6 +329,9 @@ def suggestion_content(result: Suggestions) -> dict[str, Any]:
             "parameter": action.parameter,
             "before_percent": 100 * action.deviations[0],
             "after_percent": 100 * action.deviations[1],
+            "quantity": action.quantity or None,
+            "quantity_before_percent": 100 * action.quantity_deviations[0] if action.quantity else None,
+            "quantity_after_percent": 100 * action.quantity_deviations[1] if action.quantity else None,
         }
         for action in result.actions
     ]

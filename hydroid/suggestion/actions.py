@@ -6,7 +6,7 @@ angles show: the model's own error is part of it, so the forecast is no better t
 every parameter has a prior of ±100 % (`PRIOR_SD`), so that all deviations are finite.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -79,6 +79,8 @@ class Action:
         parameter: the one that improves most, but for the one that is stated.
         deviations: its relative standard deviation before and after.
         improvement: factor by which all deviations shrink on geometric average.
+        quantity: the engineering quantity that improves most; empty where none does by FEWEST_TIMES.
+        quantity_deviations: its relative standard deviation before and after.
     """
 
     kind: ActionKind
@@ -88,15 +90,24 @@ class Action:
     parameter: str
     deviations: tuple[float, float]
     improvement: float
+    quantity: str
+    quantity_deviations: tuple[float, float]
 
 
 def next_actions(
-    problem: Problem, uncertainty: Uncertainty, *, simulate: bool = True, progress: Progress = no_progress
+    problem: Problem,
+    uncertainty: Uncertainty,
+    slopes: Mapping[str, Array],
+    *,
+    simulate: bool = True,
+    progress: Progress = no_progress,
 ) -> tuple[Action, ...]:
-    """Return the actions that would help, the best first; without `simulate` only statements of values."""
+    """Return the actions that would help, the best first; without `simulate` only statements of values.
+
+    `slopes` are relative changes of quantities by name per relative change of the free parameters, (p,).
+    """
     names = [n for n, free in zip(problem.parameters.names, uncertainty.free, strict=True) if free]
-    precision = Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(names)))
-    before = precision.deviations()
+    forecast = _Forecasts(names, slopes, Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(names))))
     sources = [_statements(problem, names)]
     if simulate:
         sources += [
@@ -107,8 +118,12 @@ def next_actions(
     found: list[Action] = []
     for done, source in enumerate(sources):
         progress("actions", done, len(sources))
-        found += [_action(k, subject, names, before, precision.deviations(i)) for k, subject, i in source]
-    useful = [a for a in found if a.known[1] > a.known[0] or a.deviations[0] > FEWEST_TIMES * a.deviations[1]]
+        found += [forecast.action(*each) for each in source]
+    useful = [
+        a
+        for a in found
+        if a.known[1] > a.known[0] or a.quantity or a.deviations[0] > FEWEST_TIMES * a.deviations[1]
+    ]
     useful.sort(key=lambda a: (-a.known[1], -a.improvement))
     kept = [a for i, a in enumerate(useful) if sum(b.kind is a.kind for b in useful[:i]) < _most(a.kind)]
     return tuple(kept)
@@ -119,13 +134,40 @@ def _most(kind: ActionKind) -> int:
     return 1 if kind is ActionKind.CONSTANT_COMMANDS else MOST
 
 
-def _action(kind: ActionKind, subject: str, names: Sequence[str], before: Array, after: Array) -> Action:
-    known = int(np.sum(before <= WEAK_ABOVE)), int(np.sum(after <= WEAK_ABOVE))
-    best = int(np.argmax(np.where([name == subject for name in names], 0.0, before / after)))
-    shrunk = float(np.exp(np.mean(np.log(before / after))))
-    return Action(
-        kind, subject, len(names), known, names[best], (float(before[best]), float(after[best])), shrunk
-    )
+@dataclass(frozen=True, eq=False)
+class _Forecasts:
+    """What information adds to parameters of some names, and to quantities."""
+
+    names: Sequence[str]
+    slopes: Mapping[str, Array]
+    precision: Precision
+
+    def action(self, kind: ActionKind, subject: str, added: Array) -> Action:
+        """Return an action that adds information, shape (p, p)."""
+        before, after = self.precision.deviations(), self.precision.deviations(added)
+        known = int(np.sum(before <= WEAK_ABOVE)), int(np.sum(after <= WEAK_ABOVE))
+        best = int(np.argmax(np.where([name == subject for name in self.names], 0.0, before / after)))
+        shrunk = float(np.exp(np.mean(np.log(before / after))))
+        return Action(
+            kind,
+            subject,
+            len(self.names),
+            known,
+            self.names[best],
+            (float(before[best]), float(after[best])),
+            shrunk,
+            *self._quantity(added),
+        )
+
+    def _quantity(self, added: Array) -> tuple[str, tuple[float, float]]:
+        """Name of the quantity that improves most, with its relative standard deviation before and after."""
+        if not self.slopes:
+            return "", (0.0, 0.0)
+        rows = np.array(list(self.slopes.values()))
+        before, after = self.precision.spread(rows), self.precision.spread(rows, added)
+        best = int(np.argmax(before / np.maximum(after, np.finfo(float).tiny)))
+        name = list(self.slopes)[best] if before[best] > FEWEST_TIMES * after[best] else ""
+        return name, (float(before[best]), float(after[best]))
 
 
 Forecast = tuple[ActionKind, str, Array]

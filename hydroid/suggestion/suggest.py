@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
+from hydroid.quantities.quantities import Quantities, quantities
 from hydroid.suggestion.actions import Action, next_actions
 from hydroid.suggestion.missing import MissingTerms, missing_terms
 from hydroid.suggestion.residuals import ResidualCheck, residual_checks
@@ -28,9 +29,24 @@ class Suggestions:
 
 
 def suggestions(
-    problem: Problem, uncertainty: Uncertainty, *, thorough: bool = True, progress: Progress = no_progress
+    problem: Problem,
+    uncertainty: Uncertainty,
+    determined: Quantities | None = None,
+    *,
+    thorough: bool = True,
+    progress: Progress = no_progress,
 ) -> Suggestions:
-    """Return the suggestions about an estimate; `thorough` ones take several times the simulations."""
+    """Return the suggestions about an estimate; `thorough` ones take several times the simulations.
+
+    `determined` are the quantities at the estimate, if they are known already.
+    """
+    determined = quantities(problem, uncertainty) if determined is None else determined
     missing = missing_terms(problem, uncertainty, thorough=thorough, progress=progress)
-    actions = next_actions(problem, uncertainty, simulate=thorough, progress=progress)
+    several = len(problem.active_joints) > 1
+    scalars = determined.scalars
+    slopes = {
+        f"{scalars[name].label}{f' of joint {scalars[name].joint}' if several else ''}": each
+        for name, each in determined.slopes.items()
+    }
+    actions = next_actions(problem, uncertainty, slopes, simulate=thorough, progress=progress)
     return Suggestions(missing, residual_checks(problem, uncertainty), actions, thorough)

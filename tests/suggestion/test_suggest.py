@@ -128,13 +128,17 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: t
     problem, known = late
     # two parameters of which only the sum is known well
     root = np.array([[100.0, 100.0, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 50.0]])
-    actions = next_actions(problem, replace(known, root=root), simulate=False)
+    difference = {"difference": np.array([1.0, -1.0, 0.0])}
+    actions = next_actions(problem, replace(known, root=root), difference, simulate=False)
     assert {action.kind for action in actions} == {ActionKind.STATE}
     assert {action.subject for action in actions} == {"A_A", "A_B"}
     for action in actions:
         assert action.known == (1, 3)
         assert action.parameter in {"A_A", "A_B"} - {action.subject}
         assert action.deviations[1] == pytest.approx(0.05, rel=0.05)
+        # one up, the other down: twice what one of them is known to
+        assert action.quantity == "difference"
+        np.testing.assert_allclose(action.quantity_deviations, 2 * np.array(action.deviations), rtol=0.03)
 
 
 def test_the_information_of_white_noise_is_fishers_and_of_slow_noise_what_least_squares_gets():

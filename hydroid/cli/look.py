@@ -42,7 +42,7 @@ def convert(
         str | None,
         typer.Option(
             help="Settings that map the columns (`log`): a YAML file, or the name of a shipped config "
-            "[default: the columns are guessed, and each guess is printed]."
+            "[default: the columns are guessed, and each guess is printed; --set corrects them]."
         ),
     ] = None,
     setting: Set = None,
@@ -52,14 +52,22 @@ def convert(
 
     With settings it holds what a fit uses: resampled to log.period_s, delayed by log.delay_s, with its signs.
     """
+    import yaml
+
     from hydroid.api.convert import convert
     from hydroid.api.look import load_settings
 
-    settings = load_settings(config or "fit-mech", overrides(setting)) if config or setting else None
-    result = convert(log, out, settings, repair=repair)
+    changes = overrides(setting)
+    settings = load_settings(config, changes) if config else None
+    result = convert(log, out, settings, changes=None if config else changes, repair=repair)
     guessed = [*result.guess.reasons] if result.guess else []
     left = [f"not used: {', '.join(result.guess.unused)}"] if result.guess and result.guess.unused else []
     notes = [f"{finding.level}: {finding}" for finding in result.findings]
+    if result.guess:
+        section = yaml.safe_dump(
+            result.guess.log, default_flow_style=True, width=1e9, sort_keys=False, allow_unicode=True
+        )
+        left.append(f"as settings: log: {section.strip()}")
     summary = f"{out}: {len(result.log.time)} samples, {result.log.duration:.2f} s"
     plain = {
         "out": str(out),

@@ -162,6 +162,8 @@ def missing_columns(file: Table, wanted: Sequence[Signal]) -> list[Finding]:
             hint += (
                 f"; for a joint that is not in the log set it to null, such as log.joints.{joints[-1]}=null"
             )
+        if any(signal.kind == "time" for signal in lacking):
+            hint += "; `hydroid convert LOG --out LOG.csv` guesses the columns"
         what = f"the {'header' if file.header else 'file'} lacks {names}"
         findings.append(
             Finding("error", what, file.source, hint, file.header, lacking[0].name, kind="missing column")

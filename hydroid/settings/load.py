@@ -101,7 +101,7 @@ def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) 
     """
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
-        _set(values, key, value)
+        replace_setting(values, key, value)
     return validate(values, kind, str(path), lines, sorted(overrides or ()), path.parent)
 
 
@@ -146,7 +146,12 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), read_document(value, f"--set {text}")[0]
 
 
-def _set(values: dict[str, Any], key: str, value: Any) -> None:
+def replace_setting(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set a value of nested mappings by its dotted key; numbers of joints may be keys.
+
+    Raises:
+        SettingsError: what the key names has no settings below it.
+    """
     *folders, last = key.split(".")
     for folder in folders:
         inner = values.setdefault(folder, {})

@@ -58,6 +58,7 @@ hydraulics:
   onset_a: 0                       # V      no jump behind the dead band
   onset_b: 0
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
+  substeps: 5                      # of valves and oil in one MuJoCo step
 
 # Wide guesses; write what you know. Of a valve, A is the direction of positive angles. `each: true` gives
 # every compared joint its own.

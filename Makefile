@@ -36,7 +36,7 @@ excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the 
 	$(BIN)/hydroid fit-hyd examples/excavator/fit_*.csv --config examples/excavator/fit.yaml --out runs/excavator/fit
 	$(BIN)/hydroid validate examples/excavator/check_*.csv --fit runs/excavator/fit --out runs/excavator/validation
 
-excavator-seeds: setup  ## the same over five seeds, with time and simulations (docs/measured.md)
+excavator-seeds: setup  ## the same from five starts, with time and simulations (docs/measured.md)
 	$(BIN)/python benchmarks/excavator.py 5
 
 six-joints: setup  ## six hydraulic joints at once, 54 parameters (docs/measured.md)

@@ -1,9 +1,11 @@
-"""The real excavator: fitted to its twelve logs, judged on the other six, over seeds.
+"""The real excavator: fitted to its twelve logs, judged on the other six, from several starts.
 
     python benchmarks/excavator.py [SEEDS] [--figure PNG]
 
-Prints time, simulations and, by joint, the mean absolute error over whole logs [deg], beside the throw-away
-models that were tried before. The last fit's prediction of the first check log can be drawn.
+Nothing in the shipped fit is random: seed 1 is the shipped start, and every other seed moves all start values
+by half a standard deviation of their priors. Prints time, simulations and, by joint, the mean absolute error
+over whole logs [deg], beside the throw-away models that were tried before. The last fit's prediction of the
+first check log can be drawn.
 """
 
 import sys
@@ -17,10 +19,27 @@ from hydroid.prediction import predict
 
 FOLDER = Path(__file__).parents[1] / "examples" / "excavator"
 JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
+MOVED = 0.5
+"""standard deviations of its prior by which a start value is moved"""
 BEFORE = {
     "a table of speeds, 24 bins per joint, with a delay": (2.1, 2.5, 8.6, 5.0),
     "dead band, power law, lag, delay, gravity per joint": (1.9, 3.2, 10.0, 4.7),
 }
+
+
+def starts(seed: int) -> dict[str, object]:
+    """Return settings that move the start values; none for seed 1."""
+    if seed == 1:
+        return {}
+    rng = np.random.default_rng(seed)
+    moved: dict[str, object] = {}
+    for p in hydroid.load_settings(FOLDER / "fit.yaml").parameter_set().parameters:
+        if p.fixed is None and p.start is not None and p.prior is not None:
+            # the distance between the bounds, in standard deviations
+            sd = p.prior.score(np.array(p.upper)) - p.prior.score(np.array(p.lower))
+            place = np.clip(p.position(p.start) + rng.normal(0, MOVED) / sd, 0.0, 1.0)
+            moved[f"parameters.{p.name}.start"] = float(p.at(place))
+    return moved
 
 
 def errors(model: hydroid.IdentifiedModel, logs: list[hydroid.Log]) -> list[float]:
@@ -57,7 +76,7 @@ def main(seeds: int, picture: Path | None) -> None:
         print(f"{name:54}" + "".join(f"{e:9.1f}" for e in row))
     model = None
     for seed in range(1, seeds + 1):
-        settings = hydroid.load_settings(FOLDER / "fit.yaml", {"search.seed": seed})
+        settings = hydroid.load_settings(FOLDER / "fit.yaml", starts(seed))
         logs, checks = (
             hydroid.read_logs(sorted(FOLDER.glob(f"{kind}_*.csv")), settings) for kind in ("fit", "check")
         )

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from hydroid.cli import fit, judge, look, model, options, plan, report, start, stopping
+from hydroid.cli import convert, fit, judge, look, model, options, plan, report, start, stopping
 
 STOPPED = 130
 """exit status of a command that Ctrl-C or a signal stopped, as in shells"""
@@ -51,7 +51,7 @@ app = typer.Typer(
 COMMANDS = (
     ("start", start.init, "write a project from an arm's CAD and a log", "mine --arm robot.urdf --log a.csv"),
     ("look", look.check, "find faults in logs", "LOG.csv"),
-    ("look", look.convert, "write a log of any format as plain CSV", "LOG.mat --out LOG.csv"),
+    ("look", convert.convert, "write a log of any format as plain CSV", "LOG.mat --out LOG.csv"),
     ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
     ("look", look.collisions, "find bodies that meet along a trajectory", "LOG.csv --arm right"),
     ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),

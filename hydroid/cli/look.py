@@ -1,4 +1,4 @@
-"""`hydroid check`, `convert`, `view` and `plot-actuator`."""
+"""`hydroid check`, `view` and `plot-actuator`."""
 
 import os
 import sys
@@ -28,57 +28,10 @@ def check(
     from hydroid.api.look import check, load_settings
 
     result = check(logs, load_settings(config, overrides(setting)), repair=repair)
-    plain = {"logs": [_plain(log) for log in result.logs], "findings": [*map(_finding, result.findings)]}
+    plain = {"logs": [_plain(log) for log in result.logs], "findings": [*map(plain_finding, result.findings)]}
     show(output, lambda: plain, check_lines(result))
     if any(log.log is None for log in result.logs):
         raise typer.Exit(2)
-
-
-def convert(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="CSV, .mat, Parquet, ROS bag or MCAP.")],
-    output: Output,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT.csv", help="The CSV to write.")],
-    config: Annotated[
-        str | None,
-        typer.Option(
-            help="Settings that map the columns (`log`): a YAML file, or the name of a shipped config "
-            "[default: the columns are guessed, and each guess is printed; --set corrects them]."
-        ),
-    ] = None,
-    setting: Set = None,
-    repair: Repair = False,
-) -> None:
-    """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
-
-    With settings it holds what a fit uses: resampled to log.period_s, delayed by log.delay_s, with its signs.
-    """
-    import yaml
-
-    from hydroid.api.convert import convert
-    from hydroid.api.look import load_settings
-
-    changes = overrides(setting)
-    settings = load_settings(config, changes) if config else None
-    result = convert(log, out, settings, changes=None if config else changes, repair=repair)
-    guessed = [*result.guess.reasons] if result.guess else []
-    left = [f"not used: {', '.join(result.guess.unused)}"] if result.guess and result.guess.unused else []
-    notes = [f"{finding.level}: {finding}" for finding in result.findings]
-    if result.guess:
-        section = yaml.safe_dump(
-            result.guess.log, default_flow_style=True, width=1e9, sort_keys=False, allow_unicode=True
-        )
-        left.append(f"as settings: log: {section.strip()}")
-    summary = f"{out}: {len(result.log.time)} samples, {result.log.duration:.2f} s"
-    plain = {
-        "out": str(out),
-        "samples": len(result.log.time),
-        "duration_s": result.log.duration,
-        "period_s": result.log.period,
-        "log": result.guess and result.guess.log,
-        "reasons": guessed,
-        "findings": [*map(_finding, result.findings)],
-    }
-    show(output, lambda: plain, [*guessed, *left, *notes, f"{summary}, every {result.log.period:g} s"])
 
 
 def view(
@@ -192,11 +145,12 @@ def _plain(result: "LogCheck") -> dict[str, Any]:
         "duration_s": float(result.log.duration) if result.log else None,
         "driven_joints": _driven(result),
         "moved_deg": {str(joint): deg for joint, deg in result.moved_deg.items()},
-        "findings": [*map(_finding, result.findings)],
+        "findings": [*map(plain_finding, result.findings)],
     }
 
 
-def _finding(finding: "Finding") -> dict[str, str]:
+def plain_finding(finding: "Finding") -> dict[str, str]:
+    """Return a finding as JSON holds it."""
     names = ("level", "kind", "what", "where", "hint")
     return {name: getattr(finding, name) for name in names}
 

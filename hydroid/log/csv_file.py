@@ -20,6 +20,7 @@ from hydroid.log.table import Cells
 
 MAX_BYTES = 2**28
 MAX_LINE = 100_000  # characters; also below the csv module's own limit for one cell
+_PLAIN = "CSV in UTF-8 separated by commas"
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 
 
@@ -71,11 +72,13 @@ class CsvTable:
         below = range(self.found.header, len(self.lines))
         kept = [k for k in below if is_content(self.lines[k], separator) and k + 1 not in self.found.skipped]
         rows, lines = [self.lines[k] for k in kept], np.array(kept, np.int64) + 1
-        if separator != ",":
-            rows = [row.replace(",", ".") for row in rows]  # decimal commas
+        remarks = [] if self.layout == _PLAIN else [f"read as {self.layout}"]
+        if separator != "," and any("," in row for row in rows):
+            rows = [row.replace(",", ".") for row in rows]
+            remarks = [f"read as {self.layout}, with decimal commas"]
         values = _plain_numbers(rows, wanted, width, separator)
         if values is not None:
-            return Cells(values, lines, np.zeros(len(lines), bool))
+            return Cells(values, lines, np.zeros(len(lines), bool), remarks=tuple(remarks))
         parted = [split(row, separator) for row in rows]
         ragged = np.array([len(c) < width or any(map(str.strip, c[width:])) for c in parted], bool)
         whole = [[cells[c].strip() for c in wanted] for cells, r in zip(parted, ragged, strict=True) if not r]
@@ -87,8 +90,8 @@ class CsvTable:
                 if c in clocks
                 else [float(cells[c]) if is_number(cells[c]) else np.nan for cells in whole]
             )
-        remarks = tuple(f"{columns[c]} holds times of day, taken as seconds from the first" for c in clocks)
-        return Cells(values, lines, ragged, frozenset(columns[c] for c in clocks), remarks)
+        remarks += [f"{columns[c]} holds times of day, taken as seconds from the first" for c in clocks]
+        return Cells(values, lines, ragged, frozenset(columns[c] for c in clocks), tuple(remarks))
 
 
 def open_csv(path: Path, wanted: Collection[str] = ()) -> CsvTable:

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-hyd accuracy least-squares search-budget many-parameters virtual-boom design-study coverage quantity-coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-quick accuracy least-squares search-budget many-parameters virtual-boom design-study coverage quantity-coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -51,11 +51,12 @@ bench: setup  ## the time to an answer, what a simulation costs, and what hydroi
 structure: setup  ## size and shape of the code
 	$(BIN)/python benchmarks/structure.py
 
-article: setup  ## the article's simulated study over ten seeds (docs/measured.md); half an hour
-	$(BIN)/python benchmarks/article_mech.py
+article: setup  ## the article's tables and figures over ten seeds (docs/reproduction.md); about two hours, goes on where it was
+	$(BIN)/hydroid article --all --out runs/article
+	$(BIN)/python docs/reproduction.py runs/article > docs/reproduction.md
 
-article-hyd: setup  ## the same for stage 2
-	$(BIN)/python benchmarks/article_hyd.py
+article-quick: setup  ## the same in its short form: shows that everything runs; at most five minutes
+	$(BIN)/hydroid article --all --quick --out runs/article-quick
 
 accuracy: setup  ## the hydraulics against a stiff reference solver, and 1,000 random sets on all joints
 	$(BIN)/python benchmarks/hydraulic_accuracy.py

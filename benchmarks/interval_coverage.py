@@ -18,9 +18,9 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from pseudo_random import pseudo_random_log
 
 from hydroid import load_settings
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 import scipy.optimize
 from mujoco import minimize
-from pseudo_random import pseudo_random_log
 
 from hydroid import load_settings, read_logs
 from hydroid.estimate import read_values
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import fit
 from hydroid.fitting.refinement import refine
 from hydroid.prediction import simulate_log

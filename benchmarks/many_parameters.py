@@ -18,12 +18,12 @@ import argparse
 import time
 
 import numpy as np
-from article_mech import Silent
-from pseudo_random import pseudo_random_log
 from scipy.stats import norm
 from sysid_peer import Peer
 
 from hydroid import load_settings
+from hydroid.api.fit import Silent
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import Fit, fit
 from hydroid.log import Log
 from hydroid.prediction import simulate_log

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 from least_squares import TRUTH, Silent
-from pseudo_random import pseudo_random_log
 
 from hydroid import load_settings, read_logs
 from hydroid.estimate import read_values
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState

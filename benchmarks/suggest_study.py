@@ -17,10 +17,10 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pseudo_random import pseudo_random_log
 
 from hydroid import load_settings
 from hydroid.arm.model import load_model
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log

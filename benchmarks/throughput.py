@@ -14,12 +14,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from pseudo_random import pseudo_random_log
 
 from hydroid import load_settings
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
+from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Search
 from hydroid.prediction import simulate_log

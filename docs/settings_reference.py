@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import JointColumns
+from hydroid.settings.study import StudySettings
 
 _HEAD = """# Settings
 
@@ -38,7 +39,16 @@ _UNIT = re.compile(r" ?\[([^\]]*[^\d\], ][^\],]*)\]")
 def reference() -> str:
     """Return the whole page as Markdown."""
     arm = "\n## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n"
-    return _HEAD + "## A fit's file\n\n" + _table(FitSettings) + arm + _table(Arm)
+    study = "\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n"
+    return (
+        _HEAD
+        + "## A fit's file\n\n"
+        + _table(FitSettings)
+        + arm
+        + _table(Arm)
+        + study
+        + _table(StudySettings)
+    )
 
 
 def _table(kind: type[BaseModel]) -> str:
@@ -96,7 +106,9 @@ def _type(annotation: Any) -> str:
         )
     if origin is dict:
         inner = _type(arguments[1])
-        return f"mapping to {inner}" if inner.startswith("list") else f"mapping to {inner}s"
+        return f"mapping to {inner}" if inner.startswith(("list", "mapping to")) else f"mapping to {inner}s"
+    if annotation is Any:
+        return "value"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "mapping" if annotation is not Arm else "text or mapping"
     plain = {float: "number", int: "whole number", str: "text", bool: "true or false", Path: "path"}
@@ -111,6 +123,8 @@ def _default(field: FieldInfo) -> str:
     if field.is_required():
         return ""
     value = field.get_default(call_default_factory=True, validated_data={})
+    if value == "":
+        return ""
     if isinstance(value, BaseModel):
         given = value.model_dump(exclude_unset=True)
         return f"`{{{', '.join(f'{k}: {v}' for k, v in given.items())}}}`" if given else ""
@@ -161,7 +175,12 @@ def _docstrings(kind: type[Any]) -> dict[str, str]:
 
 def undescribed() -> list[str]:
     """Return the settings that have no description."""
-    return [key for kind in (FitSettings, Arm) for key, _, meaning in _settings(kind, "") if not meaning]
+    return [
+        key
+        for kind in (FitSettings, Arm, StudySettings)
+        for key, _, meaning in _settings(kind, "")
+        if not meaning
+    ]
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ LAYERS = [
     {"fitting", "experiment"},
     {"suggestion"},
     {"run"},
+    {"studies"},
     {"reporting"},
     {"project"},
     {"viewer"},

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from hydroid.cli import convert, fit, judge, look, model, options, plan, report, start, stopping
+from hydroid.cli import convert, fit, judge, look, model, options, plan, report, start, stopping, study
 
 STOPPED = 130
 """exit status of a command that Ctrl-C or a signal stopped, as in shells"""
@@ -20,6 +20,7 @@ GROUPS = {
     "judge": "Judge a fit",
     "plan": "Plan what to do next",
     "model": "Use and build models",
+    "study": "Compare settings over many seeds",
 }
 
 
@@ -67,6 +68,8 @@ COMMANDS = (
     ("plan", plan.design, "design the next experiment", "LOG.csv --fit runs/mech --duration 30"),
     ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),
     ("model", model.build_model, "make an arm's MJCF model from its meshes", "--arm my-arm.yaml"),
+    ("study", study.study, "run a study of your own", "my-study.yaml --seeds 10"),
+    ("study", study.article, "make the article's tables and figures anew", "--table 6 --seeds 10"),
 )
 """group, function, summary and example of each command"""
 

@@ -1,4 +1,4 @@
-"""Pseudo-random commands for the studies: random levels and dwells, as in the article's figure 17."""
+"""Pseudo-random commands for studies: random levels and dwells, as in the article's figure 17."""
 
 from collections.abc import Callable
 

@@ -1,0 +1,138 @@
+"""`hydroid study` and `article`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.cli.options import Folder, Output
+from hydroid.cli.output import show
+
+if TYPE_CHECKING:
+    from hydroid.api.studies import StudyOptions
+    from hydroid.cli.progress import Progress
+    from hydroid.studies.study import StudyRuns
+
+
+@dataclass(kw_only=True)
+class StudyFlags:
+    """How a study runs."""
+
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=1, max=10_000, help="Number of seeds [default: as the study's file says]."),
+    ] = None
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Two seeds, short data and few generations: shows that everything runs."
+        ),
+    ] = False
+    processes: Annotated[
+        int, typer.Option(min=0, max=1024, help="Number of processes. 0 means one per core.")
+    ] = 0
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="local[:N]|slurm|ADDRESS",
+            help="Run on the workers of a Dask scheduler instead. The result is the same.",
+        ),
+    ] = None
+    dask_insecure: Annotated[
+        bool,
+        typer.Option(
+            "--dask-insecure",
+            help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.",
+        ),
+    ] = False
+
+    def options(self, progress: "Progress") -> "StudyOptions":
+        """Return them as the function's options."""
+        from hydroid.api.studies import StudyOptions
+
+        return StudyOptions(self.seeds, self.quick, self.processes, self.dask, self.dask_insecure, progress)
+
+
+def study(
+    file: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="The study's file (docs/studies.md).")],
+    flags: StudyFlags,
+    output: Output,
+    out: Folder = Path("runs/study"),
+) -> None:
+    """Compare settings over many seeds: which fits better, and is the difference more than chance?
+
+    The file names a config, the settings that vary, the data, and the claims to be tested. A study that was
+    stopped goes on with the same command.
+    """
+    from hydroid.api.studies import study
+    from hydroid.cli.progress import Progress
+
+    with Progress(quiet=output.silent) as progress:
+        result = study(file, out, flags.options(progress))
+    lines = [*result.page.tables.values(), *_sentences(result.result), str(out / f"{result.page.name}.html")]
+    show(output, lambda: {"out": str(out)} | _content(result.result), lines)
+
+
+def article(
+    flags: StudyFlags,
+    output: Output,
+    table: Annotated[
+        list[int] | None, typer.Option(metavar="N", help="A table of the article, 1 to 9. May be repeated.")
+    ] = None,
+    figure: Annotated[
+        list[int] | None, typer.Option(metavar="N", help="A figure of the article, 9 to 20. May be repeated.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="All tables and figures.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List them, and run nothing.")] = False,
+    out: Folder = Path("runs/article"),
+) -> None:
+    """Make the article's tables and figures anew over many seeds, and test its conclusions.
+
+    Each is a study whose file travels with hydroid (configs/article). All of them take hours; --quick shows
+    in minutes that they run. What was stopped goes on with the same command.
+    """
+    from hydroid.api.studies import article, article_items
+    from hydroid.cli.progress import Progress
+
+    if listed:
+        items = article_items()
+        lines = [f"{item:10} {name:12} {settings.title}" for item, (name, settings) in items.items()]
+        show(output, lambda: {"items": {item: name for item, (name, _) in items.items()}}, lines)
+        return
+    chosen = [f"table {n}" for n in table or ()] + [f"figure {n}" for n in figure or ()]
+    if not chosen and not every:
+        raise typer.BadParameter("give --table N, --figure N, --all or --list")
+    with Progress(quiet=output.silent) as progress:
+        result = article([] if every else chosen, out, flags.options(progress))
+    sentences = [line for runs in result.result for line in (runs.plan.study.title, *_sentences(runs))]
+    content = {runs.plan.name: _content(runs) for runs in result.result}
+    show(output, lambda: {"out": str(out), "studies": content}, [*sentences, str(out / "article.html")])
+
+
+def _sentences(runs: "StudyRuns") -> list[str]:
+    found = [f"- {verdict.sentence}" for verdict in runs.verdicts] + [f"- {text}" for text in runs.findings]
+    failed = sum(bool(row.failed) for row in runs.rows)
+    return [*found, f"- {failed} of {len(runs.rows)} runs failed"] if failed else found
+
+
+def _content(runs: "StudyRuns") -> dict[str, Any]:
+    """Return verdicts and runs for JSON."""
+    from hydroid.estimate import finite
+
+    verdicts = [
+        {
+            "claim": v.claim.says,
+            "verdict": v.outcome.value,
+            "p": finite(v.p),
+            "effect": finite(v.effect),
+            "seeds": v.seeds,
+        }
+        for v in runs.verdicts
+    ]
+    rows = [
+        {"cell": r.cell, "seed": r.seed, "failed": r.failed or None}
+        | {name: finite(value) for name, value in r.values.items()}
+        for r in runs.rows
+    ]
+    return {"verdicts": verdicts, "findings": list(runs.findings), "runs": rows}

@@ -1,0 +1,62 @@
+"""The article's studies: every item has one, each file is sound, and all run in their short form."""
+
+from pathlib import Path
+
+import pytest
+
+from hydroid import StudyOptions, article, read_logs
+from hydroid.api.studies import ELSEWHERE, article_items
+from hydroid.errors import SettingsError
+from hydroid.studies.study import StudyPlan, plan_study
+
+FILES = sorted((Path(__file__).parents[2] / "configs" / "article").glob("*.yaml"))
+
+
+def planned(file: Path) -> StudyPlan:
+    return plan_study(file, lambda paths, settings: read_logs(paths, settings), quick=True)
+
+
+def test_every_table_and_every_figure_of_a_result_has_a_study():
+    wanted = {f"table {n}" for n in range(1, 10)} | {f"figure {n}" for n in range(9, 21)}
+    assert set(article_items()) | set(ELSEWHERE) == wanted
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_study_of_the_article_can_run(file: Path):
+    plan = planned(file)
+    assert plan.data.logs[0].duration <= plan.study.quick.duration_s + 1
+    assert len(plan.tasks) == (len(plan.cells) * 2 if plan.study.seeds else 0)
+    for cell, settings in plan.cells.items():  # the article refines nothing
+        assert not plan.tasks or (settings.refinement is None) == ("refined" not in cell)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_printed_sums_are_the_sums_of_the_printed_errors(file: Path):
+    """What was typed from the article agrees with itself."""
+    for table in planned(file).study.tables:
+        errors = [i for i, column in enumerate(table.columns) if column.startswith("error ")]
+        if len(errors) >= 9 and "parameter error" in table.columns:
+            at = table.columns.index("parameter error")
+            for cell, values in table.article.items():
+                total = sum(values[i] or 0.0 for i in errors)
+                assert total == pytest.approx(values[at], abs=0.05), cell
+
+
+def test_an_unknown_item_is_refused_with_the_known_ones(tmp_path: Path):
+    with pytest.raises(SettingsError, match=r"table 10: no such item; known: table 1, table 2"):
+        article(["table 10"], tmp_path)
+    with pytest.raises(SettingsError, match=r"figure 12: is the flow chart"):
+        article(["figure 12"], tmp_path)
+
+
+@pytest.mark.slow
+def test_the_whole_article_runs_in_its_short_form(tmp_path: Path):
+    studies = article([], tmp_path, StudyOptions(quick=True, seeds=1)).result
+    assert {runs.plan.name for runs in studies} == {file.stem for file in FILES}
+    for runs in studies:
+        assert not [row.failed for row in runs.rows if row.failed]
+        figures = list((tmp_path / runs.plan.name / "figures").glob("*.png"))
+        assert len(figures) == len(runs.plan.study.figures)
+    assert (tmp_path / "article.html").is_file()
+    # the simple GA of tables 1 and 6 and figures 14 and 15 is one run
+    assert len(list((tmp_path / "runs").glob("*.json"))) < sum(len(runs.rows) for runs in studies)

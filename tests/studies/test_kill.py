@@ -1,0 +1,71 @@
+"""A study that is killed goes on, ends with the same bits, and leaves no process behind."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from small_studies import written
+
+
+def start(file: Path, out: Path) -> "subprocess.Popen[str]":
+    command = [
+        sys.executable,
+        "-m",
+        "hydroid",
+        "study",
+        str(file),
+        "--out",
+        str(out),
+        "--processes",
+        "2",
+        "-q",
+    ]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def content(out: Path) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for file in sorted((out / "runs").iterdir()):
+        found[file.name] = json.loads(file.read_text())
+        found[file.name].pop("seconds")
+    tables = {file.name: file.read_text() for file in (out / "tables").iterdir()}
+    return found | tables
+
+
+def children(process: "subprocess.Popen[str]") -> list[int]:
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True)
+    return [int(pid) for pid in found.stdout.split()]
+
+
+@pytest.mark.slow
+def test_a_killed_study_ends_the_same(tmp_path: Path):
+    file = written(tmp_path, seeds=6)
+    whole = start(file, tmp_path / "whole")
+    killed = start(file, tmp_path / "killed")
+    while not list((tmp_path / "killed").glob("runs/*.json")) and killed.poll() is None:
+        time.sleep(0.01)
+    workers = children(killed)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    assert whole.wait(timeout=300) == 0, whole.communicate()
+    left = len(list((tmp_path / "killed" / "runs").glob("*.json")))
+    assert 0 < left < 12
+    again = start(file, tmp_path / "killed")
+    assert again.wait(timeout=300) == 0, again.communicate()
+    assert content(tmp_path / "killed") == content(tmp_path / "whole")
+    assert workers
+    for pid in workers:
+        assert not (Path("/proc") / str(pid)).exists()
+
+
+@pytest.mark.slow
+def test_dask_and_processes_come_to_the_same(tmp_path: Path):
+    file = written(tmp_path, seeds=1)
+    assert start(file, tmp_path / "here").wait(timeout=300) == 0
+    command = [sys.executable, "-m", "hydroid", "study", str(file), "--out", str(tmp_path / "there"), "-q"]
+    subprocess.run([*command, "--dask", "local:2"], check=True, timeout=300)
+    assert content(tmp_path / "there") == content(tmp_path / "here")

@@ -8,7 +8,7 @@ import time
 from collections.abc import Generator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,7 +48,7 @@ class StudyOptions:
     processes: int = 0
     dask: str | None = None
     dask_insecure: bool = False
-    progress: Progress = no_progress
+    progress: Progress = field(default_factory=lambda: no_progress)
 
 
 def study(

@@ -73,7 +73,6 @@ class Problem:
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
-        self._spec = spec
         self.open_starts: tuple[OpenStart, ...] = ()
         self.stage = Stage(settings)
         self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
@@ -123,13 +122,14 @@ class Problem:
         if not self.leaves_start_open:
             return self
         opened, candidates = copy(self), self.stage.candidates(theta[None])
+        spec = load_model(self.settings.arm.model, self.settings.arm)  # cannot be pickled: not kept
         found: list[OpenStart | None] = []
         for i, log in enumerate(self.logs):
             own = [channel for channel in self.channels if channel.log == i]
 
             def residuals(joint: int, shift: float, i: int = i, own: list[Channel] = own) -> Array:
                 log = self.logs[i].moved(joint, shift)
-                one = make_simulation(self._spec, log, self.outputs, self.settings, self._pressures[i])
+                one = make_simulation(spec, log, self.outputs, self.settings, self._pressures[i])
                 response = {i: one.simulate(candidates)}
                 return np.concatenate([channel.residual(response)[0] for channel in own])
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
+from hydroid.cad.shapes import primitive
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 
@@ -69,24 +70,12 @@ def _view() -> Array:
 
 
 def _points(model: mujoco.MjModel, geom: int) -> Array:
-    """Points of a shape in its own frame, shape (n, 3); none of a plane or other endless one."""
-    kind, size = model.geom_type[geom], model.geom_size[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = model.geom_dataid[geom]
-        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-        return np.asarray(model.mesh_vert[first : first + count], float)
-    around = np.stack([f(np.linspace(0, 2 * np.pi, 24, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
-    if kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE):
-        ring = np.column_stack([size[0] * around, np.zeros(len(around))])
-        up = np.array([0.0, 0.0, size[1]])
-        return np.concatenate([ring + up, ring - up])
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * size
-    if kind in (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID):
-        radii = size if size[1] else np.full(3, size[0])
-        flat = np.zeros((len(around), 1))
-        return np.concatenate([np.hstack([around, flat]), np.hstack([flat, around])]) * radii
-    return np.empty((0, 3))
+    """Corners of a shape in its own frame, shape (n, 3); none of a plane."""
+    mesh = int(model.geom_dataid[geom])
+    if mesh >= 0:
+        return np.asarray(model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]], float)
+    shape = primitive(int(model.geom_type[geom]), model.geom_size[geom])
+    return np.empty((0, 3)) if shape is None else np.asarray(shape.vertices, float)
 
 
 def _outline(points: Array) -> Array:

@@ -13,7 +13,6 @@
 
   const color = (name) => getComputedStyle(page).getPropertyValue(`--${name}`).trim();
   const numbers = (values) => (values ?? []).map((v) => v ?? NaN);
-  const dashes = { dashed: [6, 4], dotted: [2, 3] };
   const sizes = { circle: "circle", diamond: "diamond", square: "square", dash: "dash" };
 
   // [low, high] of all marks that are shown along an axis, with a margin
@@ -38,7 +37,7 @@
   function addMark(figure, mark, shown) {
     const paint = color(mark.color), alpha = mark.alpha;
     const x = numbers(mark.x), y = numbers(mark.y), end = numbers(mark.end);
-    const line = { line_color: paint, line_alpha: alpha, line_width: mark.width, line_dash: dashes[mark.look] ?? [] };
+    const line = { line_color: paint, line_alpha: alpha, line_width: mark.width, line_dash: mark.look || "solid" };
     let made = [];
     if (mark.kind === "line") made = [figure.line({ x, y, ...line })];
     else if (mark.kind === "step") made = [figure.step({ x, y, mode: "after", ...line })];

@@ -28,7 +28,7 @@ from pathlib import Path
 
 from hydroid.cli.app import main as hydroid
 from hydroid.fitting import search
-from hydroid.reporting import page
+from hydroid.reporting import page_file
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600
@@ -74,7 +74,7 @@ def start(folder: Path, log: Path, options: list[str]) -> int:
         os.dup2(errors.fileno(), 2)
         os.dup2(errors.fileno(), 1)
     search.SAVE_EVERY = 0.0
-    page.write_page = lambda *_: []
+    page_file.write_page = lambda *_: []
     sys.argv = ["hydroid", "fit-mech", str(log), *options, "--out", str(folder), "--resume", "--quiet"]
     code = 99
     try:

@@ -128,7 +128,7 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.reporting.fit_report import fit_page
-    from hydroid.reporting.page import write_page
+    from hydroid.reporting.page_file import write_page
     from hydroid.suggestion.suggest import suggestions
 
     checkpoint = folder.begin_or_continue(problem.settings, problem.logs)

@@ -190,7 +190,7 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
     from hydroid.problem.stage import Stage
     from hydroid.quantities.delta import stored_precision
     from hydroid.reporting.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
-    from hydroid.reporting.page import write_page
+    from hydroid.reporting.page_file import write_page
 
     stage, arm = Stage(model.settings), model.settings.arm
     actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)

@@ -26,7 +26,7 @@ def report(folders: Sequence[str | Path], out: str | Path = "runs/report") -> Pa
     """
     from hydroid.files import write_atomic
     from hydroid.reporting.comparison import comparison, names_of
-    from hydroid.reporting.page import content_html, read_page
+    from hydroid.reporting.page_file import content_html, read_page
 
     files = [_page(Path(folder)) for folder in folders]
     contents = [read_page(file) for file in files]

@@ -194,7 +194,7 @@ def _workers(settings: FitSettings, options: FitOptions) -> "AbstractContextMana
 
 
 def _spread(out: Path, results: Sequence[FitResult]) -> "Page":
-    from hydroid.reporting.page import write_page
+    from hydroid.reporting.page_file import write_page
     from hydroid.reporting.spread import run_result, spread_page
 
     parameters = results[0].problem.parameters

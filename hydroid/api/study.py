@@ -35,7 +35,7 @@ class Study(Generic[T]):
             RunError: the folder cannot be written.
         """
         if out is not None:
-            from hydroid.reporting.page import write_page
+            from hydroid.reporting.page_file import write_page
 
             write_page(self.page, Path(out))
         return self

@@ -194,7 +194,7 @@ def collect(
 
 
 def _show(runs: "FitRuns", output: Output) -> None:
-    from hydroid.reporting.fit_report import objective_table, parameter_table
+    from hydroid.reporting.fit_tables import objective_table, parameter_table
     from hydroid.reporting.phrases import fit_summary, fit_warnings
     from hydroid.reporting.quantities_report import best_known
     from hydroid.reporting.spread import final_spread

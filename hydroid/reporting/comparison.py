@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hydroid.reporting.page import SCHEMA, Bar
+from hydroid.reporting.page import Bar
+from hydroid.reporting.page_file import SCHEMA
 from hydroid.reporting.table import number, plain
 
 _SERIES = ("orange", "blue", "green", "pink", "yellow", "sky")
@@ -14,7 +15,7 @@ Content = Mapping[str, Any]
 
 
 def comparison(contents: Mapping[str, Content]) -> dict[str, Any]:
-    """Return the content of a page that compares others, by name; see `page.page_content`."""
+    """Return the content of a page that compares others, by name; see `page_file.page_content`."""
     tables = [t for t in (_errors(contents),) if t["rows"]]
     charts, tabs = _responses(contents)
     sections: list[dict[str, Any]] = [

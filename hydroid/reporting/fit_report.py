@@ -13,12 +13,12 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.search import HISTORY
-from hydroid.fitting.validation import ErrorIndices, error_indices, pooled_indices
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.reporting.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
 from hydroid.reporting.by_log_report import by_log_warning
 from hydroid.reporting.estimates import estimates as draw_estimates
+from hydroid.reporting.fit_tables import objective_table, parameter_table
 from hydroid.reporting.names import plain_name
 from hydroid.reporting.next_steps import fit_steps
 from hydroid.reporting.objectives import learning, pareto
@@ -28,31 +28,22 @@ from hydroid.reporting.phrases import (
     ALGORITHMS,
     STAGES,
     direction_phrases,
-    estimate_label,
-    estimate_meanings,
     fit_summary,
     fit_warnings,
-    in_reader_units,
     norm_label,
     parameter_advice,
     prior_phrase,
     rank_phrase,
-    status_phrase,
 )
 from hydroid.reporting.quantities_report import curves_csv, lost_quantities, quantity_section
 from hydroid.reporting.responses import joint_responses, response_data, response_tabs
 from hydroid.reporting.suggestion_report import action_effect, action_name, suggestion_sections
-from hydroid.reporting.table import Cell, Given, Table, number, numbers_csv, unless_nan
+from hydroid.reporting.table import Table, number, numbers_csv
 from hydroid.reporting.uncertainty_report import determined_sections
 from hydroid.reporting.verdict import fit_verdict
 from hydroid.suggestion.suggest import Suggestions
 from hydroid.uncertainty.by_log import by_log
 
-INDICES = ("mean absolute [deg]", "rms [deg]", "largest [deg]", "fit [%]")
-INDICES_NOTE = (
-    "fit: 100 % for a perfect response, 0 % for a response that is always the mean of the measured angle. A "
-    "dash (–): the joint does not move."
-)
 _FILES = (
     "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
     "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
@@ -214,70 +205,6 @@ def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None) -> tuple[
         return folded
     tabs = tuple(Tab(t.name, tuple(replace(p, where=PAGE) for p in t.plots)) for t in residual.tabs)
     return (replace(residual, tabs=tabs), *folded)
-
-
-def parameter_table(problem: Problem, fit: Fit) -> Table:
-    """Return one row per parameter: bounds, every estimate, interval, share of the data, effect, flag."""
-    names = list(fit.estimates)
-    labels = [estimate_label(fit, name) for name in names]
-    rows: list[tuple[Cell, ...]] = []
-    for i, parameter in enumerate(problem.parameters.parameters):
-        bounds = (parameter.lower, parameter.upper) if parameter.lower < parameter.upper else (None, None)
-        if given := problem.settings.parameters[parameter.name].bounds:
-            bounds = (Given(given[0]), Given(given[1]))
-        values = (float(fit.estimates[name].theta[i]) for name in names)
-        status = fit.uncertainty.status[i]
-        ends = (unless_nan(end) for end in fit.uncertainty.interval[i])
-        share = 100 * status.share if fit.uncertainty.free[i] else None
-        judged = *ends, share, unless_nan(degrees(fit.effects[i]))
-        phrase = status_phrase(status)
-        rows.append((parameter.name, parameter.unit, *bounds, *values, *judged, phrase))
-    header = ("name", "unit", "lower", "upper", *labels, "from", "to", "data [%]", "effect [deg]", "flag")
-    final = estimate_label(fit, fit.final)
-    others = [label for label in labels[1:] if label != final]
-    optional = (
-        *others,
-        "effect [deg]",
-        "data [%]",
-        *(labels[:1] if labels[0] != final else ()),
-        "lower",
-        "upper",
-    )
-    note = (
-        f"{estimate_meanings(fit)} from, to: 95 % interval of {final}. "
-        "The noise is taken from the residuals. The interval is only right if the model is right. A dash "
-        "(–): it has no limit, or the parameter is at a bound or fixed. data: part of the information on the "
-        "parameter that the logs gave; its prior gave the rest. effect: rms change of the output when the "
-        "parameter changes by 1 %."
-    )
-    return Table("Parameters", header, tuple(rows), note, optional)
-
-
-def objective_table(problem: Problem, fit: Fit) -> Table:
-    """Return the output error of each estimate on the fitted logs, and the norm that the search minimised."""
-    responses = joint_responses(problem, fit)
-    several = len(responses) > 1
-    objective = problem.settings.objective
-    rows: list[tuple[Cell, ...]] = []
-    for name, estimate in fit.estimates.items():
-        label = estimate_label(fit, name)
-        overall = float(in_reader_units(objective, np.array(estimate.overall)))
-        pairs = [(response.measured, response.simulated[label]) for response in responses]
-        for response, pair in zip(responses, pairs, strict=True):
-            indices = index_cells(error_indices(*pair))
-            rows.append((label, response.log, response.joint, *indices, None if several else overall))
-        if several:
-            rows.append((label, "all", None, *index_cells(pooled_indices(pairs)), overall))
-    pooled = " all: every joint about its own mean." if several else ""
-    note = f"{INDICES_NOTE}{pooled} objective: {norm_label(objective)} over the whole record."
-    column = "objective [-]" if objective.relative else "objective [deg]"
-    header = ("estimate", "log", "joint", *INDICES, column)
-    return Table("Output error on the fitted logs", header, tuple(rows), note, (INDICES[0], column))
-
-
-def index_cells(indices: ErrorIndices) -> tuple[float, ...]:
-    """Return the cells of INDICES."""
-    return (degrees(indices.mean_absolute), degrees(indices.rms), degrees(indices.largest), indices.fit)
 
 
 def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, str], ...]:

@@ -14,7 +14,7 @@ from hydroid.identified import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.quantities.band import Band
-from hydroid.reporting.fit_report import INDICES, INDICES_NOTE, index_cells
+from hydroid.reporting.fit_tables import INDICES, INDICES_NOTE, index_cells
 from hydroid.reporting.page import Light, Page, Section, Verdict, file_name, log_names, short_name, unique
 from hydroid.reporting.responses import JointResponse, logged_pressures, response_data, response_tabs
 from hydroid.reporting.table import Cell, Table, number

@@ -17,7 +17,7 @@ from hydroid.cli.app import app
 from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.reporting.page import write_page
+from hydroid.reporting.page_file import write_page
 from hydroid.reporting.spread import final_spread, run_result, spread_page
 
 SMALL = {
@@ -41,7 +41,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory):
     results = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "hydroid.reporting.page.write_page", lambda *_: []
+            "hydroid.reporting.page_file.write_page", lambda *_: []
         )  # figures take longer than all else here
         for seed in SEEDS:
             seeded = load_settings("article-mech", SMALL | {"search.seed": seed})

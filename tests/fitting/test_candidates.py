@@ -11,7 +11,8 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.reporting.fit_report import fit_page, objective_table, parameter_table
+from hydroid.reporting.fit_report import fit_page
+from hydroid.reporting.fit_tables import objective_table, parameter_table
 from hydroid.reporting.phrases import fit_warnings
 
 STEPS = 2**16 - 1

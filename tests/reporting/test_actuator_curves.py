@@ -15,7 +15,7 @@ from hydroid.reporting.actuator_report import (
     joint_actuator,
 )
 from hydroid.reporting.chart import Panel
-from hydroid.reporting.page import write_page
+from hydroid.reporting.page_file import write_page
 from hydroid.settings.arm import Arm
 from hydroid.simulation import Candidates
 

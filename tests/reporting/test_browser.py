@@ -13,7 +13,7 @@ from report_fits import make_fit, make_problem
 
 from hydroid.fitting.validation import error_indices
 from hydroid.reporting.fit_report import fit_page
-from hydroid.reporting.page import write_page
+from hydroid.reporting.page_file import write_page
 from hydroid.reporting.validation_report import Validation, validation_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

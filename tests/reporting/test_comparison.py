@@ -11,7 +11,7 @@ import hydroid
 from hydroid.errors import RunError
 from hydroid.fitting.validation import error_indices
 from hydroid.reporting.fit_report import fit_page
-from hydroid.reporting.page import read_page, write_page
+from hydroid.reporting.page_file import read_page, write_page
 from hydroid.reporting.validation_report import Validation, validation_page
 
 IDENTITY = {"hydroid": "0", "mujoco": "4", "logs": {"a.csv": "f" * 64}}

@@ -7,7 +7,7 @@ import pytest
 from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.fitting.validation import error_indices
-from hydroid.reporting.fit_report import objective_table, parameter_table
+from hydroid.reporting.fit_tables import objective_table, parameter_table
 from hydroid.reporting.page import log_names
 from hydroid.reporting.phrases import fit_warnings, parameter_advice
 from hydroid.reporting.responses import joint_responses

@@ -17,7 +17,8 @@ from hydroid.errors import RunError
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import error_indices
 from hydroid.reporting.fit_report import fit_page
-from hydroid.reporting.page import Page, Plot, Section, read_page, write_page
+from hydroid.reporting.page import Page, Plot, Section
+from hydroid.reporting.page_file import read_page, write_page
 from hydroid.reporting.responses import MOST_FILES
 from hydroid.reporting.spread import run_result, spread_page
 from hydroid.reporting.validation_report import Validation, validation_page

@@ -12,7 +12,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.reporting.page import write_page
+from hydroid.reporting.page_file import write_page
 from hydroid.reporting.suggestion_report import setting_line, suggestion_content, suggestion_page
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import QUANTITIES, SPANS, TARGETS

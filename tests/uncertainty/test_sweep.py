@@ -12,7 +12,7 @@ from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.objectives import contours
-from hydroid.reporting.page import write_page
+from hydroid.reporting.page_file import write_page
 from hydroid.reporting.sensitivity_report import sensitivity_page
 from hydroid.uncertainty.sweep import SWEEP_POINTS, Sweep, surface, sweep
 

@@ -1,7 +1,7 @@
 """The report of a fit: prediction and convergence, parameters, what the logs determine, the search."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import degrees
@@ -53,6 +53,7 @@ _CITATION = (
     "hydraulic robot manipulator using a multi-objective genetic algorithm, 2017. To cite hydroid: "
     "CITATION.cff."
 )
+_MOST_DIRECTIONS = 6
 _ESTIMATES = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
 _LEARNING = "Best candidate so far, and the median of each population."
 _PARETO = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
@@ -146,7 +147,7 @@ def _unknown(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Secti
     """What the logs leave open, and the actions that would settle it."""
     points = (
         *parameter_advice(problem, fit),
-        *(f"{phrase}." for phrase in direction_phrases(problem, fit.identifiability)),
+        *_few_directions(direction_phrases(problem, fit.identifiability)),
         *lost_quantities(fit.quantities),
     )
     steps: tuple[Step, ...] = ()
@@ -155,6 +156,13 @@ def _unknown(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Secti
     text = "" if points else "Nothing: the logs determine every free parameter."
     more = " What would settle it stands below, the best first." if steps else ""
     return Section("What is not known", f"{text}{more}".strip(), points, steps=steps)
+
+
+def _few_directions(phrases: Sequence[str]) -> tuple[str, ...]:
+    """Return the first sentences on unidentifiable directions, and where the others stand."""
+    more = len(phrases) - _MOST_DIRECTIONS
+    shown = tuple(f"{phrase}." for phrase in (phrases if more <= 1 else phrases[:_MOST_DIRECTIONS]))
+    return shown if more <= 1 else (*shown, f"{more} more combinations: see Directions, below.")
 
 
 def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:

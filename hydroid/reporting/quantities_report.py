@@ -23,6 +23,8 @@ BEST = 6
 """quantities that a fit prints at most"""
 BEST_WITHIN = 0.3
 """relative half interval of these at most"""
+MOST_LOST = 8
+"""quantities that are not determined, of which at most so many are named"""
 DETERMINED_WITHIN = 1.0
 """relative half interval above which a quantity is listed as not determined"""
 _HELD = 0.2
@@ -50,7 +52,11 @@ def quantity_section(problem: Problem, quantities: Quantities) -> Section:
 def lost_quantities(quantities: Quantities) -> tuple[str, ...]:
     """Name the quantities that the logs do not determine."""
     lost = [_name(q, quantities) for q in quantities.scalars.values() if not _within(q) <= DETERMINED_WITHIN]
-    return (f"Not determined: {listed(lost)}.",) if lost else ()
+    if not lost:
+        return ()
+    more = len(lost) - MOST_LOST
+    names = listed(lost) if more <= 1 else f"{', '.join(lost[:MOST_LOST])} and {more} more quantities"
+    return (f"Not determined: {names}.",)
 
 
 def quantity_table(quantities: Quantities) -> Table:

@@ -1,7 +1,7 @@
 """The chart of the residual checks: each residual over time, angle, velocity and command."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -26,7 +26,9 @@ _CAPTION = (
 )
 
 
-def residual_tabs(problem: Problem, checks: Sequence[ResidualCheck]) -> tuple[Tab, ...]:
+def residual_tabs(
+    problem: Problem, checks: Sequence[ResidualCheck], notes: Callable[[ResidualCheck], str]
+) -> tuple[Tab, ...]:
     """Return a tab for each of the angles with the largest errors; that of the largest is also a file."""
     names = log_names(problem.logs)
     tabs: list[Tab] = []
@@ -34,7 +36,7 @@ def residual_tabs(problem: Problem, checks: Sequence[ResidualCheck]) -> tuple[Ta
         draw = partial(residual_panels, problem, check)
         plot = Plot(f"residual_checks_{i + 1}" if i else "residual_checks", _CAPTION, draw, where=PAGE)
         plot = plot if i else replace(plot, where=PAGE | FILE)
-        tabs.append(Tab(f"joint {check.joint}, {names[check.log]}", (plot,)))
+        tabs.append(Tab(f"joint {check.joint}, {names[check.log]}", (plot,), notes(check)))
     return tuple(tabs)
 
 

@@ -26,7 +26,8 @@ _POINTS = 9000
 """points of a page's responses: many responses are drawn with fewer points each"""
 _FEWEST, _MOST = 150, 1000
 """parts of one response of which the lowest and the highest sample are drawn"""
-_WIDEST_BAND = np.pi  # [rad]: infinite where the parameters leave the angle open
+_WIDEST = 2.0  # largest residuals: a wider band is cut, and fills the panel
+_LEAST_RESIDUAL = 1e-6  # [deg]
 _RUNAWAY = 3.0  # ranges of the measured angle: a response farther off has run away
 _LEAST_RANGE = 1.0  # [deg] of the measured angle for _RUNAWAY: a joint may be at rest
 
@@ -152,7 +153,9 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
             _curve(time, np.where(np.abs(residual) < reach, residual, np.nan), bins, **look | {"width": 1})
         )
         if name in response.bands:
-            half = np.degrees(np.minimum(response.bands[name], _WIDEST_BAND))
+            # a band that the parameters leave open must not flatten the residual either
+            widest = _WIDEST * float(np.nanmax(np.abs(residual), initial=_LEAST_RESIDUAL))
+            half = np.minimum(np.degrees(np.nan_to_num(response.bands[name], nan=np.inf)), widest)
             at, edge = style.decimated(time, half, bins)
             band = Mark(
                 "band", at, -edge, edge, color=color, label=f"95 % band of {name}", alpha=0.18, off=off

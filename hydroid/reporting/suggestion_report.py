@@ -59,7 +59,11 @@ def suggested_steps(problem: Problem, result: Suggestions) -> list[Step]:
 
 def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section, ...]:
     """Return the three sections."""
-    seen = residual_phrases(problem, result.residuals)
+    seen, several = residual_phrases(problem, result.residuals), len(result.residuals) > 1
+
+    def notes(check: ResidualCheck) -> str:
+        return " ".join(residual_phrases(problem, [check])) if several else ""
+
     more = "" if result.thorough else " hydroid suggest also tests logs, sensors and experiments."
     actions = action_phrases(problem, result.actions)
     return (
@@ -71,10 +75,10 @@ def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section,
         ),
         Section(
             "What the residual shows",
-            "" if seen else "Nothing beyond the noise.",
-            points=seen,
-            tables={"residuals": residual_table(problem, result.residuals)},
-            tabs=residual_tabs(problem, result.residuals),
+            ("The largest errors first." if several else "") if seen else "Nothing beyond the noise.",
+            points=() if several else seen,
+            tabs=residual_tabs(problem, result.residuals, notes),
+            more={"residuals": residual_table(problem, result.residuals)},
         ),
         Section(
             "What each action would bring",

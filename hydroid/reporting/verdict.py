@@ -2,13 +2,16 @@
 
 import math
 
+import numpy as np
+
 from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.reporting.arm_picture import arm_picture
 from hydroid.reporting.page import Light, Verdict
 from hydroid.reporting.phrases import listed
+from hydroid.reporting.quantities_report import quantity_table
 from hydroid.uncertainty.covariance import Uncertainty
-from hydroid.uncertainty.flags import Flag
+from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
 
 _MOST_NAMES = 4
 
@@ -20,7 +23,7 @@ def fit_verdict(problem: Problem, fit: Fit) -> Verdict:
     rms = f"{math.degrees(fit.best.rms):.2g}"
     prediction = f"Reproduces {logs} with an error of {rms}° rms."
     known, free = known_count(fit)
-    determined = len([q for q in fit.quantities.scalars.values() if q.interval[0] is not None])
+    determined = len(quantity_table(fit.quantities).rows)
     parameters = f"{known} of {free} parameters are known to 30 % or better"
     if determined:
         parameters += f", and {determined} quantities that follow from all of them together"
@@ -32,8 +35,8 @@ def fit_verdict(problem: Problem, fit: Fit) -> Verdict:
 
 def known_count(fit: Fit) -> tuple[int, int]:
     """Return how many parameters are known to 30 % from logs and priors, and how many are free."""
-    status = [s for s in fit.uncertainty.status if s.flag is not Flag.FIXED]
-    return sum(s.flag is Flag.IDENTIFIABLE for s in status), len(status)
+    known = fit.uncertainty
+    return int(np.sum(known.relative[known.free] <= WEAK_ABOVE)), int(known.free.sum())
 
 
 def _converged(fit: Fit) -> Light:

@@ -142,7 +142,7 @@ def make_quantities(problem: Problem, uncertain: Uncertainty) -> Quantities:
             interval=((None, None), (-13.0, -11.0), (11.0, 13.0), (None, None)),
             **one,
         )
-    return Quantities(scalars, curves, precision(problem.parameters, uncertain))
+    return Quantities(scalars, curves, precision(problem.parameters, uncertain), {})
 
 
 def make_uncertainty(

@@ -30,11 +30,11 @@ def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     return _respond(model, log, joints).angle[0]
 
 
-def predict_log(model: IdentifiedModel, log: Log) -> Log:
+def predict_log(model: IdentifiedModel, log: Log, *, all_pressures: bool = False) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 
     Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
-    chamber pressures of driven joints, where `log.pressure` maps columns for them.
+    chamber pressures of driven joints, where `log.pressure` maps columns for them or with `all_pressures`.
 
     Raises:
         RunError: the simulation diverged.
@@ -47,7 +47,8 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
         angle[:] = log.start
     measured: list[int] = []
     if settings.stage == "hyd":
-        measured = [j for j in range(log.joints) if log.driven[j] and settings.log.pressure_of(j + 1)]
+        measured = [j for j in range(log.joints) if log.driven[j]]
+        measured = [j for j in measured if all_pressures or settings.log.pressure_of(j + 1)]
     response = _respond(model, log, moving, measured)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None

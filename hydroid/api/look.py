@@ -10,7 +10,6 @@ import numpy as np
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.files import write_atomic
 from hydroid.identified import IdentifiedModel, load_identified
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
@@ -186,7 +185,7 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
         RunError: `out` cannot be written.
     """
     model = open_model(model)
-    _require_hydraulics(model)
+    require_hydraulics(model)
     from hydroid.problem.stage import Stage
     from hydroid.quantities.delta import stored_precision
     from hydroid.reporting.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
@@ -200,53 +199,8 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
     return write_page(actuator_page(actuator), Path(out))
 
 
-def view(
-    model: ModelSource,
-    log: "str | Path | Log | None" = None,
-    *,
-    pose: str | None = None,
-    gif: str | Path | None = None,
-    repair: bool = False,
-) -> None:
-    """Show the arm in MuJoCo's viewer in real time until its window is closed, or write its motion to a GIF.
-
-        hydroid.view("runs/a", "a.csv", gif="a.gif")
-
-    Args:
-        model: a run folder, a YAML file of values or an identified model.
-        log: whose commands drive; None: the viewer's sliders.
-        pose: name of the start pose in the arm's file; by default the log's first angles, or the settings'
-            start pose.
-        gif: a file to write; needs a log and no display.
-        repair: fill holes of the log up to `log.repair_s`.
-
-    Raises:
-        RunError: no window can be opened, or the simulation diverged.
-        SettingsError: a GIF without a log, or no such pose.
-    """
-    if gif is not None and log is None:
-        raise SettingsError("needs a log: a file has no sliders", where=str(gif))
-    model = open_model(model)
-    if model.nominal:
-        _require_hydraulics(model)
-    from hydroid.log import Log
-
-    commands = (
-        log
-        if log is None or isinstance(log, Log)
-        else read_commands(log, model.settings, pose, repair=repair)
-    )
-    from hydroid.viewer.playback import make_playback
-    from hydroid.viewer.window import animation, show
-
-    playback = make_playback(model, commands, pose)
-    if gif is None:
-        show(playback)
-    else:
-        write_atomic(Path(gif), animation(playback))
-
-
-def _require_hydraulics(model: IdentifiedModel) -> None:
+def require_hydraulics(model: IdentifiedModel) -> None:
+    """Refuse a model of stage 1."""
     if model.settings.stage != "hyd":
         hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
         raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)

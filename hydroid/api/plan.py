@@ -52,7 +52,7 @@ def suggest(
     from hydroid.uncertainty.covariance import uncertainty
 
     opened = open_model(model)
-    given = logs if not isinstance(logs, Sequence) or len(logs) else _run_logs(model)
+    given = logs if not isinstance(logs, Sequence) or len(logs) else run_logs(model)
     problem = Problem(opened.settings, read_logs(given, opened.settings, repair=repair))
     if not np.isfinite(problem.residuals(opened.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=opened.source)
@@ -60,7 +60,7 @@ def suggest(
     return Study(result, suggestion_page(problem, result, opened.name)).write(out)
 
 
-def _run_logs(model: ModelSource) -> list[Path]:
+def run_logs(model: ModelSource) -> list[Path]:
     """Logs that a run folder was fitted to."""
     source = Path(model.source).parent if isinstance(model, IdentifiedModel) else Path(model)
     if not is_file(source / "run.json"):

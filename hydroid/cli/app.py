@@ -9,7 +9,20 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from hydroid.cli import convert, fit, judge, look, model, options, plan, report, start, stopping, study
+from hydroid.cli import (
+    convert,
+    fit,
+    judge,
+    look,
+    model,
+    motion,
+    options,
+    plan,
+    report,
+    start,
+    stopping,
+    study,
+)
 
 STOPPED = 130
 """exit status of a command that Ctrl-C or a signal stopped, as in shells"""
@@ -53,8 +66,9 @@ COMMANDS = (
     ("start", start.init, "write a project from an arm's CAD and a log", "mine --arm robot.urdf --log a.csv"),
     ("look", look.check, "find faults in logs", "LOG.csv"),
     ("look", convert.convert, "write a log of any format as plain CSV", "LOG.mat --out LOG.csv"),
-    ("look", look.view, "show the arm in motion, in a window or as a GIF", "LOG.csv --fit runs/hyd"),
-    ("look", look.collisions, "find bodies that meet along a trajectory", "LOG.csv --arm right"),
+    ("look", motion.view, "show the arm in motion", "runs/hyd"),
+    ("look", motion.render, "film the arm beside the ghost of the measured one", "runs/hyd -o arm.mp4"),
+    ("look", motion.collisions, "find bodies that meet along a trajectory", "LOG.csv --arm right"),
     ("look", look.plot_actuator, "draw the curves of an actuator", "--fit runs/hyd --joint 2"),
     ("fit", fit.fit_mech, "stage 1: gain, damping, stiffness, masses", "LOG.csv --out runs/mech"),
     ("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd"),

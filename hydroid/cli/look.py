@@ -1,20 +1,25 @@
-"""`hydroid check`, `view` and `plot-actuator`."""
+"""`hydroid check` and `plot-actuator`."""
 
-import os
-import sys
-from ctypes.util import find_library
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Arm, Config, Folder, Logs, NominalEstimate, Output, Repair, Set, overrides
+from hydroid.cli.options import (
+    Config,
+    Folder,
+    Logs,
+    NominalEstimate,
+    Output,
+    Repair,
+    Set,
+    nominal_model,
+    overrides,
+)
 from hydroid.cli.output import show
 
 if TYPE_CHECKING:
     from hydroid.api.look import Check, LogCheck
-    from hydroid.arm.collision import Clearance
-    from hydroid.identified import IdentifiedModel
     from hydroid.log import Finding
 
 
@@ -34,64 +39,6 @@ def check(
         raise typer.Exit(2)
 
 
-def view(
-    estimate: NominalEstimate,
-    output: Output,
-    log: Annotated[
-        Path | None,
-        typer.Argument(metavar="LOG.csv", help="Log whose commands drive the arm [default: the sliders]."),
-    ] = None,
-    pose: Annotated[
-        str | None, typer.Option(help="Name of the start pose in the arm's file [default: start of the log].")
-    ] = None,
-    gif: Annotated[
-        Path | None, typer.Option(metavar="OUT.gif", help="Write the motion to a GIF instead of a window.")
-    ] = None,
-    repair: Repair = False,
-) -> None:
-    """Show the moving arm in MuJoCo's viewer, in real time.
-
-    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
-    """
-    if gif is not None:
-        _render_without_display()
-    from hydroid.api.look import view
-
-    try:
-        view(_model(estimate, output), log, pose=pose, gif=gif, repair=repair)
-    except KeyboardInterrupt:
-        if gif is not None:
-            raise
-        return  # as good as closing the window
-    if gif is not None:
-        show(output, lambda: {"out": str(gif)}, [str(gif)])
-
-
-def collisions(
-    trajectory: Annotated[
-        Path, typer.Argument(metavar="TRAJECTORY.csv", help="Joint angles over time, such as a log.")
-    ],
-    output: Output,
-    config: Config = "fit-mech",
-    setting: Set = None,
-    arm: Arm = None,
-    out: Folder = Path("runs/collisions"),
-    repair: Repair = False,
-) -> None:
-    """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise.
-
-    Checks the arm against itself, its base and the floor; with --arm also against the carrier and the other
-    arm. The exit status is 0 if nothing meets, 1 if bodies meet, and 2 if the input cannot be used.
-    """
-    from hydroid.api.arms import collisions
-    from hydroid.api.look import load_settings
-
-    settings = load_settings(config, overrides(setting))
-    study = collisions(trajectory, settings, out, arm=arm, repair=repair)
-    result, lines = study.result, [*study.page.tables.values(), study.page.lead]
-    show(output, lambda: _clearance(result), [*lines, str(out / "collisions.html")])
-    if result.meetings:
-        raise typer.Exit(1)
 
 
 def plot_actuator(
@@ -103,19 +50,8 @@ def plot_actuator(
     """Draw the curves of an actuator: calibration, current, force, spool, opening, flow and torque."""
     from hydroid.api.look import plot_actuator
 
-    files = plot_actuator(_model(estimate, output), joint, out)
+    files = plot_actuator(nominal_model(estimate, output), joint, out)
     show(output, lambda: {"files": [str(file) for file in files]}, [str(files[-1])])
-
-
-def _model(estimate: NominalEstimate, output: Output) -> "IdentifiedModel":
-    from hydroid.identified import load_identified
-
-    changes = overrides(estimate.setting)
-    model = load_identified(estimate.fit, estimate.config, changes, default="fit-hyd", nominal=True)
-    if model.nominal and not output.silent:
-        which = ", ".join(model.nominal) if estimate.fit else "all parameters"
-        typer.echo(f"hydroid: note: nominal values for {which}", err=True)
-    return model
 
 
 def check_lines(result: "Check") -> list[str]:
@@ -155,34 +91,5 @@ def plain_finding(finding: "Finding") -> dict[str, str]:
     return {name: getattr(finding, name) for name in names}
 
 
-def _clearance(result: "Clearance") -> dict[str, Any]:
-    nearest = result.smallest
-    return {
-        "free": not result.meetings,
-        "clearance_m": float(result.distance[nearest]),
-        "clearance_at_s": float(result.time[nearest]),
-        "clearance_between": list(result.nearest[nearest]),
-        "collisions": [
-            {
-                "bodies": [meeting.first, meeting.second],
-                "from_s": meeting.begins,
-                "to_s": meeting.ends,
-                "depth_m": meeting.depth,
-                "deepest_at_s": meeting.deepest,
-            }
-            for meeting in result.meetings
-        ],
-        "checked_pairs": result.checked,
-        "excluded": [list(pair) for pair in result.excluded],
-    }
-
-
 def _driven(result: "LogCheck") -> list[int]:
     return [] if result.log is None else [j + 1 for j, driven in enumerate(result.log.driven) if driven]
-
-
-def _render_without_display() -> None:
-    """Choose a way to render that needs no window; MuJoCo asks for it when it is imported."""
-    for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
-        if sys.platform == "linux" and find_library(library):
-            os.environ.setdefault("MUJOCO_GL", name)

@@ -4,12 +4,15 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from hydroid.cli import stopping
 from hydroid.cli.output import log_lines
+
+if TYPE_CHECKING:
+    from hydroid.identified import IdentifiedModel
 
 Logs = Annotated[
     list[Path],
@@ -108,6 +111,18 @@ class NominalEstimate:
         typer.Option(help="Settings [default: config.yaml in the folder of the estimate, or else fit-hyd]."),
     ] = None
     setting: Set = None
+
+
+def nominal_model(estimate: NominalEstimate, output: Output) -> "IdentifiedModel":
+    """Return the model that the options name, and say which values are nominal."""
+    from hydroid.identified import load_identified
+
+    changes = overrides(estimate.setting)
+    model = load_identified(estimate.fit, estimate.config, changes, default="fit-hyd", nominal=True)
+    if model.nominal and not output.silent:
+        which = ", ".join(model.nominal) if estimate.fit else "all parameters"
+        typer.echo(f"hydroid: note: nominal values for {which}", err=True)
+    return model
 
 
 def command(function: Callable[..., None]) -> Callable[..., None]:

@@ -27,6 +27,9 @@ FLAGS = {
 }
 """settings that have an option of their own"""
 
+FORMER_OPTIONS = {"--gif": "`hydroid render RUN -o arm.gif`"}
+"""options of earlier versions, and what became of them"""
+
 SCHEMA = 1
 """version of the JSON (docs/json.md)"""
 
@@ -81,6 +84,8 @@ def show_usage_error(error: Any) -> None:
         _show_json_error("usage", str(error.format_message()), "", "")
     else:
         error.show()
+        if now := FORMER_OPTIONS.get(getattr(error, "option_name", "")):
+            typer.echo(f"{error.option_name} is now {now}", err=True)
 
 
 def _show_json_error(kind: str, what: str, where: str, hint: str) -> None:

@@ -1,50 +1,71 @@
-"""A plant under the commands of a log, or under those of the viewer's sliders."""
+"""What the window shows: a plant under its sliders, or a simulated motion beside the measured one."""
 
-from pathlib import Path
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from hydroid.errors import SettingsError
 from hydroid.identified import IdentifiedModel
-from hydroid.log import Log
 from hydroid.plant import Plant
+from hydroid.viewer.film import add_ghost, place
+from hydroid.viewer.motion import Motion
 
 
-def make_playback(identified: IdentifiedModel, log: Log | None, pose: str | None = None) -> "Playback":
-    """Return the playback of a log, or one with all joints on sliders that starts in a pose.
+class Playback(Protocol):
+    """Something that moves in a window.
 
-    Raises:
-        SettingsError: a log that commands nothing, or what `Plant` refuses.
-    """
-    settings = identified.settings
-    if log is None:
-        return Playback(Plant(identified, joints=range(1, 1 + len(settings.arm.joints))), pose=pose)
-    driven = [int(j) + 1 for j in np.flatnonzero(log.driven)]
-    if not driven:
-        raise SettingsError("commands nothing", where=log.source, hint="leave it out to use the sliders")
-    payload = settings.payloads.get(Path(log.source).name, 0.0)
-    return Playback(Plant(identified, joints=driven, payload=payload), log)
-
-
-class Playback:
-    """Plays a plant from its start as often as wanted.
-
-    Args:
-        plant: the plant; its joints are on sliders.
-        log: whose commands drive, from its first pose to its end; None: the sliders command, for ever.
-        pose: where the sliders begin, a pose of the arm's file; by default the settings' start pose.
+    Attributes:
+        model: in MuJoCo.
+        data: its state, drawn as it is.
     """
 
-    def __init__(self, plant: Plant, log: Log | None = None, pose: str | None = None) -> None:
-        self.plant, self._log = plant, log
-        self._start = pose if log is None else log.start
-        self.restart()
+    model: mujoco.MjModel
+    data: mujoco.MjData
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        ...
 
     @property
     def duration(self) -> float:
-        """Of the log [s]; inf where the sliders command."""
-        return np.inf if self._log is None else (len(self._log.time) - 1) * self._log.period
+        """Until it stands still [s]; inf: never."""
+        ...
+
+    def restart(self) -> None:
+        """Go back to the start."""
+
+    def advance(self, until: float) -> None:
+        """Go on to the sample before `until` [s]."""
+
+    def captions(self) -> tuple[str, str]:
+        """Return two columns of text: what moves, and how."""
+        ...
+
+    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
+        """Add what was measured to a scene; `away` is the direction of sight, shape (3,)."""
+
+
+class Sliders:
+    """A plant with all joints on the viewer's sliders; its physics can be pushed about.
+
+    Args:
+        plant: the plant.
+        pose: where it begins, a pose of the arm's file; by default the settings' start pose.
+    """
+
+    duration = np.inf
+
+    def __init__(self, plant: Plant, pose: str | None = None) -> None:
+        self.plant, self._start = plant, pose
+        self.restart()
+        self.model, self.data = plant.model, plant.data
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return self.plant.time
 
     def restart(self) -> None:
         """Go back to the start."""
@@ -52,37 +73,87 @@ class Playback:
         self._refresh()
 
     def advance(self, until: float) -> None:
-        """Step to the period before `until` [s], or to the log's end.
+        """Step to the period before `until` [s].
 
         Raises:
             RunError: the simulation diverged.
         """
         plant = self.plant
-        while plant.time + plant.period <= min(until, self.duration) + 1e-9:
-            if self._log is None:
-                command = plant.command
-            else:
-                command = self._log.command[round(plant.time / self._log.period)]
-            plant.step(command)
+        while plant.time + plant.period <= until + 1e-9:
+            plant.step(plant.command)
         self._refresh()
 
     def captions(self) -> tuple[str, str]:
-        """Two columns of text beside the picture: what moves; its command, its angle, and the log's."""
+        """Return the joints, and their commands and angles."""
         plant = self.plant
         names, command, angle = plant.names, plant.command, np.degrees(plant.angle)
-        lines = [
-            f"{command[j - 1]:4.0f} %  {angle[j - 1]:7.2f} deg{self._logged(j - 1)}" for j in plant.joints
-        ]
+        lines = [f"{command[j - 1]:4.0f} %  {angle[j - 1]:7.2f} deg" for j in plant.joints]
         first = ["time", *(names[j - 1] for j in plant.joints)]
         return "\n".join(first), "\n".join([f"{plant.time:.1f} s", *lines])
 
-    def _logged(self, joint: int) -> str:
-        if self._log is None or not np.ptp(self._log.angle[:, joint]):
-            return ""
-        return f"  (log {np.degrees(self._log.angle[round(self.plant.time / self._log.period), joint]):.2f})"
+    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
+        """Nothing was measured."""
 
     def _refresh(self) -> None:
         """Bring what is drawn up to the angles: `mj_step` leaves it a step behind."""
-        model, data = self.plant.model, self.plant.data
-        for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
-            update(model, data)
+        place(self.plant.model, self.plant.data, self.plant.data.qpos)
+
+
+class Replay:
+    """A simulated motion from its start to its end.
+
+    Args:
+        motion: what is shown.
+    """
+
+    def __init__(self, motion: Motion) -> None:
+        self.model = motion.machine.model
+        self.data, self._ghost = mujoco.MjData(self.model), mujoco.MjData(self.model)
+        self._motion, self._seen = motion, (mujoco.MjvOption(), mujoco.MjvPerturb())
+        self.restart()
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return float(self._motion.time[self._sample])
+
+    @property
+    def duration(self) -> float:
+        """Of the motion [s]."""
+        return float(self._motion.time[-1])
+
+    def restart(self) -> None:
+        """Go back to the start."""
+        self.advance(0.0)
+
+    def advance(self, until: float) -> None:
+        """Go on to the sample before `until` [s]."""
+        motion = self._motion
+        self._sample = motion.sample(until)
+        place(self.model, self.data, motion.simulated[self._sample])
+        self.data.time = self.time
+        if motion.measured is not None:
+            place(self.model, self._ghost, motion.measured[self._sample])
+
+    def captions(self) -> tuple[str, str]:
+        """Return the driven joints, and their commands, angles and pressures."""
+        first, second, k = ["time"], [f"{self.time:.1f} s"], self._sample
+        for signals in self._motion.signals:
+            line = f"{signals.command[k]:4.0f} %  {signals.simulated[k]:7.2f} deg"
+            if signals.measured is not None:
+                line += f"  (log {signals.measured[k]:.2f})"
+            if signals.pressure is not None:
+                line += "  {:.0f} / {:.0f} bar".format(*signals.pressure[k])
+            first.append(signals.name)
+            second.append(line)
+        return "\n".join(first), "\n".join(second)
+
+    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
+        """Add the measured machine."""
+        if self._motion.measured is not None:
+            add_ghost(self.model, self._ghost, scene, self._seen, away)
+
+
+def make_sliders(model: IdentifiedModel, pose: str | None = None) -> Sliders:
+    """Return the plant of a model with all joints on sliders."""
+    return Sliders(Plant(model, joints=range(1, 1 + len(model.settings.arm.joints))), pose)

@@ -1,6 +1,5 @@
-"""A plant on the screen, in MuJoCo's own viewer and in real time; or as pictures in a file."""
+"""A motion on the screen, in MuJoCo's own viewer and in real time."""
 
-import io
 import sys
 import threading
 import time
@@ -9,16 +8,13 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-import mujoco
-
 from hydroid.errors import RunError
-from hydroid.plant import Plant
+from hydroid.viewer.film import sight
 from hydroid.viewer.playback import Playback
 
 FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
 CLOSING = 5.0  # the longest that closing the window may take [s]
-GIF_FRAME, SIZE = 0.1, (480, 360)  # between two pictures of a file [s]; their size [px]
 
 
 def show(playback: Playback) -> None:
@@ -27,12 +23,15 @@ def show(playback: Playback) -> None:
     Raises:
         RunError: no window can be opened, or the simulation diverged.
     """
-    with window(playback.plant) as viewer:
+    with window(playback) as viewer:
         play(playback, viewer)
 
 
 class Viewer(Protocol):
     """What is used of `mujoco.viewer.Handle`."""
+
+    user_scn: Any
+    cam: Any
 
     def is_running(self) -> bool: ...  # noqa: D102
     def sync(self) -> None: ...  # noqa: D102
@@ -45,28 +44,31 @@ def play(
     clock: Callable[[], float] = time.perf_counter,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
-    """Show a plant in real time until the window is closed; the viewer's reset starts it again.
+    """Show what moves in real time until the window is closed; the viewer's reset starts it again.
 
     Raises:
         RunError: the simulation diverged.
     """
-    plant, begun = playback.plant, clock()
+    begun = clock()
     while viewer.is_running():
         frame = clock()
-        begun += max(0.0, frame - begun - plant.time - LATE) if plant.time < playback.duration else 0.0
+        late = frame - begun - playback.time - LATE
+        begun += max(0.0, late) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
         viewer.set_texts((None, None, *playback.captions()))
-        before = plant.data.time
+        viewer.user_scn.ngeom = 0
+        playback.draw_ghost(viewer.user_scn, sight(viewer.cam.azimuth, viewer.cam.elevation))
+        before = playback.data.time
         viewer.sync()
-        if plant.data.time < before:
+        if playback.data.time < before:
             playback.restart()
             begun = clock()
         sleep(max(0.0, FRAME - (clock() - frame)))
 
 
 @contextmanager
-def window(plant: Plant) -> Generator[Viewer]:
-    """Open MuJoCo's viewer on a plant; it closes with the context.
+def window(playback: Playback) -> Generator[Viewer]:
+    """Open MuJoCo's viewer on what moves; it closes with the context.
 
     Raises:
         RunError: this machine cannot show a window.
@@ -77,15 +79,15 @@ def window(plant: Plant) -> Generator[Viewer]:
 
         if sys.platform != "darwin":
             _try_window()
-        viewer = mujoco.viewer.launch_passive(plant.model, plant.data, show_left_ui=False)
+        viewer = mujoco.viewer.launch_passive(playback.model, playback.data, show_left_ui=False)
     except (ImportError, RuntimeError) as error:
-        hint = "without a display write a file with --gif OUT.gif"
+        hint = "without a display write a file: hydroid render RUN -o arm.mp4"
         raise RunError(f"no window can be opened ({error})", hint=hint) from None
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
-            viewer.cam.lookat[:] = plant.model.stat.center
-            viewer.cam.distance = 2.3 * plant.model.stat.extent
+            viewer.cam.lookat[:] = playback.model.stat.center
+            viewer.cam.distance = 2.3 * playback.model.stat.extent
             # where the model's camera `corner` stands
             viewer.cam.azimuth, viewer.cam.elevation = 135.0, -25.0
         yield viewer
@@ -108,30 +110,3 @@ def _try_window() -> None:
             glfw.terminate()
     if not opened:
         raise RuntimeError("no display, or no OpenGL on it")
-
-
-def animation(playback: Playback, camera: str = "corner") -> bytes:
-    """Render a playback to its end as an animated GIF.
-
-    Raises:
-        RunError: the simulation diverged, or this machine cannot render.
-    """
-    from PIL import Image  # comes with matplotlib
-
-    plant = playback.plant
-    try:
-        renderer = mujoco.Renderer(plant.model, height=SIZE[1], width=SIZE[0])
-    except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
-        hint = "install libEGL or libOSMesa (Mesa's need no GPU)"
-        raise RunError(f"no picture can be rendered ({error})", hint=hint) from None
-    frames: list[Image.Image] = []
-    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # most of the time where there is no GPU
-    named = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_CAMERA, camera) >= 0
-    with renderer:
-        for k in range(round(playback.duration / GIF_FRAME) + 1):
-            playback.advance(k * GIF_FRAME)
-            renderer.update_scene(plant.data, camera if named else -1)
-            frames.append(Image.fromarray(renderer.render()).quantize(128))
-    buffer, pause = io.BytesIO(), round(1e3 * GIF_FRAME)  # [ms]
-    frames[0].save(buffer, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
-    return buffer.getvalue()

@@ -1,0 +1,231 @@
+"""A motion as pictures: the simulated machine, the measured one as its ghost, and the signals beside them."""
+
+import io
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from hydroid.errors import RunError, SettingsError
+from hydroid.progress import Progress, no_progress
+from hydroid.viewer.motion import Motion
+from hydroid.viewer.opengl import make_renderer
+from hydroid.viewer.panel import Panel
+
+Picture = NDArray[np.uint8]
+Direction = NDArray[np.float64]
+
+KINDS = (".mp4", ".gif", ".png")
+SIZE = {".mp4": (1920, 1080), ".gif": (960, 540), ".png": (1920, 1080)}
+"""width and height of a file's pictures [px]"""
+RATE = {".mp4": 20.0, ".gif": 10.0}
+"""pictures in a second"""
+MOMENTS = 4
+"""pictures of a motion in a png"""
+SCENE = 0.62
+"""part of the width that shows the machine; the panel has the rest"""
+GHOST = (0.12, 0.44, 0.82, 0.42)
+"""colour and opacity of the measured machine"""
+BEHIND = 0.004
+"""distance of the ghost behind where it was measured [m]"""
+AZIMUTH, ELEVATION, FIELD = 125.0, -18.0, 40.0
+"""where the camera looks to, and how high its picture is [deg]"""
+FILLED, ROOM = 0.7, 1.08
+"""part of the ball around a body that the body fills, about; and room around the machine in the picture"""
+
+
+class Stage:
+    """Renders a motion; it is a context.
+
+    Args:
+        motion: what moves.
+        size: of a whole picture [px].
+        panel: whether the signals stand beside the machine.
+
+    Raises:
+        RunError: this machine cannot render.
+    """
+
+    def __init__(self, motion: Motion, size: tuple[int, int], *, panel: bool = True) -> None:
+        width, height = size
+        wide = round(SCENE * width) if panel and motion.signals else width
+        self._motion, self._model = motion, motion.machine.model
+        self._model.vis.global_.fovy = FIELD
+        # the map covers what the camera sees, or its border shows as dots on the floor
+        self._model.vis.map.shadowclip, self._model.vis.quality.shadowsize = 3.0, 4096
+        self._renderer = make_renderer(self._model, wide, height)
+        self._data = mujoco.MjData(self._model), mujoco.MjData(self._model)
+        self._camera = _camera(motion, wide / height)
+        self._seen = mujoco.MjvOption(), mujoco.MjvPerturb()
+        self._panel = Panel(motion, (width - wide, height), height / 1080) if wide < width else None
+
+    def __enter__(self) -> "Stage":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def machine(self, time: float) -> Picture:
+        """Return the machine at a time [s] as RGB, shape (height, width, 3)."""
+        sample, (data, ghost) = self._motion.sample(time), self._data
+        place(self._model, data, self._motion.simulated[sample])
+        self._renderer.update_scene(data, self._camera)
+        if self._motion.measured is not None:
+            place(self._model, ghost, self._motion.measured[sample])
+            add_ghost(self._model, ghost, self._renderer.scene, self._seen, sight(AZIMUTH, ELEVATION))
+        return self._renderer.render().copy()
+
+    def picture(self, times: Sequence[float]) -> Picture:
+        """Return the machine at one time, or a strip of several, with the signals beside it."""
+        shown = [self.machine(time) for time in times]
+        left = shown[0] if len(shown) == 1 else _tiles(shown)
+        return left if self._panel is None else np.hstack([left, self._panel.at(times)])
+
+
+def render_motion(
+    motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
+) -> bytes:
+    """Render a motion as a film or a strip of moments.
+
+    Args:
+        motion: what moves.
+        kind: .mp4, .gif or .png.
+        span: from when to when [s].
+        progress: called with what is done, how much of it, and how much there is.
+
+    Returns:
+        The file's content.
+
+    Raises:
+        SettingsError: a span without time.
+        RunError: this machine cannot render, or cannot write films.
+    """
+    begin, end = max(span[0], 0.0), min(span[1], float(motion.time[-1]))
+    if not begin < end:
+        what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
+        raise SettingsError(what, where="--span", hint="write FROM:TO in seconds")
+    with Stage(motion, SIZE[kind]) as stage:
+        if kind == ".png":
+            times = np.linspace(begin, end, MOMENTS).tolist()
+            return _png(stage.picture(times))
+        times = np.arange(begin, end, 1 / RATE[kind]).tolist()
+        pictures = _counted(stage, times, progress)
+        return _gif(pictures) if kind == ".gif" else _mp4(pictures)
+
+
+def check_kind(file: Path) -> str:
+    """Return the ending of a file that `render_motion` writes.
+
+    Raises:
+        SettingsError: another one.
+    """
+    kind = file.suffix.lower()
+    if kind not in KINDS:
+        raise SettingsError("is no film or picture", where=str(file), hint=f"end it in {', '.join(KINDS)}")
+    return kind
+
+
+def add_ghost(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    scene: mujoco.MjvScene,
+    seen: tuple[mujoco.MjvOption, mujoco.MjvPerturb],
+    away: Direction,
+) -> None:
+    """Add what moves of a machine to a scene, translucent.
+
+    It stands BEHIND farther along `away`, the direction of sight, shape (3,): where both machines agree only
+    the simulated one is seen, and their surfaces do not flicker.
+    """
+    first = scene.ngeom
+    mujoco.mjv_addGeoms(model, data, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
+    for geom in scene.geoms[first : scene.ngeom]:
+        geom.rgba[:], geom.matid, geom.transparent = GHOST, -1, 1
+        geom.pos[:] += BEHIND * away
+
+
+def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Direction) -> None:
+    """Bring all that is drawn of a machine to joint angles [rad], shape (nq,)."""
+    data.qpos[:] = angle
+    for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
+        update(model, data)
+
+
+def sight(azimuth: float, elevation: float) -> Direction:
+    """Return the direction in which a camera looks, from its angles [deg], shape (3,)."""
+    turn, rise = np.radians([azimuth, elevation])
+    return np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
+
+
+def _camera(motion: Motion, aspect: float) -> mujoco.MjvCamera:
+    """Return a camera that has the machine and its ghost in its picture all the time."""
+    model, data = motion.machine.model, mujoco.MjData(motion.machine.model)
+    solid = np.flatnonzero((model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_rbound > 0))
+    every = max(1, len(motion.time) // 40)
+    moves = [angle[::every] for angle in (motion.simulated, motion.measured) if angle is not None]
+    points: list[NDArray[np.float64]] = []
+    for angle in np.vstack(moves):
+        data.qpos[:] = angle
+        mujoco.mj_kinematics(model, data)
+        points.append(data.geom_xpos[solid].copy())
+    ahead = sight(AZIMUTH, ELEVATION)
+    right = sight(AZIMUTH - 90.0, 0.0)
+    axes = np.array([right, np.cross(right, ahead), ahead])
+    seen = np.concatenate(points) @ axes.T  # to the right, up, and away from the camera
+    half = np.tile(FILLED * model.geom_rbound[solid], len(points))[:, None]
+    middle = 0.5 * ((seen - half).min(axis=0) + (seen + half).max(axis=0))
+    slope = np.tan(0.5 * np.radians(FIELD)) * np.array([aspect, 1.0])
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation, camera.lookat[:] = AZIMUTH, ELEVATION, middle @ axes
+    away = np.abs(seen - middle)[:, :2] + half
+    camera.distance = ROOM * float((away / slope - (seen - middle)[:, 2:]).max())
+    return camera
+
+
+def _tiles(pictures: Sequence[Picture]) -> Picture:
+    """Lay pictures out in two columns, at half their size."""
+    small = [np.asarray(Image.fromarray(p).reduce(2)) for p in pictures]
+    rows = [np.hstack(small[k : k + 2]) for k in range(0, len(small), 2)]
+    return np.vstack(rows)
+
+
+def _counted(stage: Stage, times: Sequence[float], progress: Progress) -> Generator[Picture]:
+    for k, time in enumerate(times):
+        progress("pictures", k, len(times))
+        yield stage.picture([time])
+
+
+def _png(picture: Picture) -> bytes:
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, "PNG", optimize=True)
+    return content.getvalue()
+
+
+def _gif(pictures: Generator[Picture]) -> bytes:
+    frames = [Image.fromarray(picture).quantize(96, dither=Image.Dither.NONE) for picture in pictures]
+    content, pause = io.BytesIO(), round(1e3 / RATE[".gif"])  # [ms]
+    frames[0].save(
+        content, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=True
+    )
+    return content.getvalue()
+
+
+def _mp4(pictures: Generator[Picture]) -> bytes:
+    try:
+        import av
+    except ImportError:
+        hint = "pip install 'hydroid[film]', or write a .gif"
+        raise RunError("an mp4 needs the package av", hint=hint) from None
+    content = io.BytesIO()
+    with av.open(content, "w", format="mp4") as file:
+        stream: Any = file.add_stream("libx264", rate=round(RATE[".mp4"]))
+        stream.width, stream.height = SIZE[".mp4"]
+        stream.pix_fmt, stream.options = "yuv420p", {"crf": "20", "preset": "fast"}
+        for picture in pictures:
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        file.mux(stream.encode())
+    return content.getvalue()

@@ -1,5 +1,11 @@
 """What several tests share: the shipped arm, and small logs made by simulation."""
 
+# ruff: noqa: E402  # MuJoCo asks for OpenGL when it is imported
+
+from hydroid.viewer.opengl import choose_platform
+
+choose_platform()
+
 import numpy as np
 import pytest
 from hypothesis import settings

@@ -42,7 +42,10 @@ def test_an_estimate_is_drawn_with_the_settings_beside_it(tmp_path: Path):
         ),
         (["view", "--params", "bad.yaml"], "no force-stroke curve"),
         (["view", "--pose", "asleep"], "no pose 'asleep'"),
-        (["view", "--gif", "a.gif"], "a file has no sliders"),
+        (["view", "--arm", "both"], "needs a log"),
+        (["render", str(LOG), "-o", "a.avi"], "is no film or picture"),
+        (["render", str(LOG), "--span", "now"], "'now' is no span"),
+        (["render", "."], "cannot be read"),
     ],
 )
 def test_what_the_user_can_mend_is_one_line_and_exit_2(tmp_path: Path, arguments, says):
@@ -58,7 +61,7 @@ def test_what_the_user_can_mend_is_one_line_and_exit_2(tmp_path: Path, arguments
 def test_without_a_display_the_viewer_says_so_and_names_the_other_way(tmp_path: Path):
     done = hydroid("view", "-q", cwd=tmp_path, code=2)
     assert done.stderr.startswith("hydroid: no window can be opened")
-    assert "--gif" in done.stderr
+    assert "hydroid render" in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
 
@@ -67,7 +70,7 @@ def test_a_motion_is_written_where_pictures_can_be_rendered(tmp_path: Path):
     short.write_text("\n".join(LOG.read_text().splitlines()[:101]) + "\n")
     command = "from hydroid.cli.app import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", command, "view", str(short), "-q", "--gif", "a.gif"],
+        [sys.executable, "-c", command, "render", str(short), "-q", "-o", "a.gif"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -83,5 +86,10 @@ def test_a_motion_is_written_where_pictures_can_be_rendered(tmp_path: Path):
         for k in range(picture.n_frames):
             picture.seek(k)
             frames.append(picture.convert("RGB").tobytes())
-    assert len(frames) == 11
+    assert len(frames) == 10
     assert len(set(frames)) > 5  # it moves
+
+
+def test_a_former_option_names_what_it_is_now(tmp_path: Path):
+    done = hydroid("view", "--gif", "a.gif", cwd=tmp_path, code=2)
+    assert "--gif is now `hydroid render" in done.stderr

@@ -1,18 +1,26 @@
 """The arm in motion: what is shown is the plant, at the pace of the clock."""
 
 import io
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from conftest import step_log
+from PIL import Image
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified import IdentifiedModel, load_identified
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.settings.arm import Arm
-from hydroid.viewer.playback import Playback, make_playback
-from hydroid.viewer.window import LATE, animation, play
+from hydroid.viewer import film
+from hydroid.viewer.film import Stage
+from hydroid.viewer.motion import Motion, simulated_motion
+from hydroid.viewer.playback import Replay, Sliders
+from hydroid.viewer.window import LATE, play
 
 SHOULDER = 1
 
@@ -25,21 +33,23 @@ def nominal() -> IdentifiedModel:
 
 @pytest.fixture(scope="module")
 def plants(nominal: IdentifiedModel) -> dict[str, Plant]:
-    return {"log": Plant(nominal), "sliders": Plant(nominal, joints=range(1, 8))}
+    return {"sliders": Plant(nominal, joints=range(1, 8))}
 
 
 @pytest.fixture
-def slide(plants: dict[str, Plant]) -> Playback:
+def slide(plants: dict[str, Plant]) -> Sliders:
     """All joints on sliders, from the study pose."""
-    return Playback(plants["sliders"])
+    return Sliders(plants["sliders"])
 
 
 class FakeViewer:
     """A window that stays open for some pictures; `at` does what a hand does before the k-th."""
 
-    def __init__(self, playback: Playback, pictures: int, at=lambda k, data: None) -> None:
+    def __init__(self, playback: Any, pictures: int, at=lambda k, data: None) -> None:
         self.playback, self.left, self.at = playback, pictures, at
         self.times: list[float] = []
+        self.user_scn = mujoco.MjvScene(playback.model, 1000)
+        self.cam = mujoco.MjvCamera()
         self.texts: list[tuple] = []
 
     def is_running(self) -> bool:
@@ -50,8 +60,8 @@ class FakeViewer:
         self.texts.append(texts)
 
     def sync(self) -> None:
-        self.times.append(self.playback.plant.time)
-        self.at(len(self.times), self.playback.plant.data)
+        self.times.append(self.playback.time)
+        self.at(len(self.times), self.playback.data)
 
 
 class FakeClock:
@@ -68,19 +78,19 @@ class FakeClock:
         self.now += seconds
 
 
-def test_a_log_is_played_as_the_plant_steps(nominal: IdentifiedModel, plants, study_log: Log):
+def test_a_log_is_shown_as_the_plant_steps(nominal: IdentifiedModel, study_log: Log):
     plant = Plant(nominal)
     expected = [plant.reset(study_log.start)] + [plant.step(u) for u in study_log.command[:-1]]
-    shown = Playback(plants["log"], study_log)
+    shown = Replay(simulated_motion(nominal, {"alone": study_log}))
     for moment in (0.013, 0.5, 0.5, 1.23, 99.0):  # whatever the pace
         shown.advance(moment)
-        sample = round(shown.plant.time / study_log.period)
+        sample = round(shown.time / study_log.period)
         assert sample == min(int(moment / study_log.period), len(expected) - 1)
-        np.testing.assert_array_equal(shown.plant.angle, expected[sample])
+        np.testing.assert_array_equal(shown.data.qpos, expected[sample])
     assert np.ptp(np.array(expected)[:, SHOULDER]) > 0.05  # it does move
 
 
-def test_what_is_drawn_stands_where_the_angles_say(slide: Playback, arm: Arm):
+def test_what_is_drawn_stands_where_the_angles_say(slide: Sliders, arm: Arm):
     slide.plant.data.ctrl[SHOULDER] = 100.0
     slide.advance(1.0)
     plant = slide.plant
@@ -88,7 +98,7 @@ def test_what_is_drawn_stands_where_the_angles_say(slide: Playback, arm: Arm):
     assert np.arcsin(axis[2]) == pytest.approx(plant.angle[SHOULDER], abs=1e-12)
 
 
-def test_sliders_move_their_joint_and_zero_stops_it(slide: Playback):
+def test_sliders_move_their_joint_and_zero_stops_it(slide: Sliders):
     plant = slide.plant
     start = plant.angle
     plant.data.ctrl[SHOULDER] = 60.0
@@ -103,7 +113,7 @@ def test_sliders_move_their_joint_and_zero_stops_it(slide: Playback):
     assert plant.angle[SHOULDER] == pytest.approx(stopped, abs=np.radians(0.1))
 
 
-def test_the_picture_keeps_pace_with_the_clock(slide: Playback):
+def test_the_picture_keeps_pace_with_the_clock(slide: Sliders):
     clock = FakeClock()
     viewer = FakeViewer(slide, 30)
     play(slide, viewer, clock, clock.sleep)
@@ -116,14 +126,14 @@ def test_the_picture_keeps_pace_with_the_clock(slide: Playback):
     assert values.splitlines()[0] == f"{slide.plant.time:.1f} s"
 
 
-def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Playback):
+def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Sliders):
     clock = FakeClock(cost=0.5)
     viewer = FakeViewer(slide, 5)
     play(slide, viewer, clock, clock.sleep)
     assert np.diff(viewer.times) == pytest.approx(LATE, abs=0.011)
 
 
-def test_the_viewers_reset_starts_again(slide: Playback):
+def test_the_viewers_reset_starts_again(slide: Sliders):
     def reset(k, data):
         if k == 10:
             data.time = 0.0
@@ -138,31 +148,108 @@ def test_the_viewers_reset_starts_again(slide: Playback):
     assert np.abs(slide.plant.angle - start).max() < 1e-3
 
 
-def test_a_playback_that_diverges_says_when(slide: Playback):
+def test_a_playback_that_diverges_says_when(slide: Sliders):
     slide.plant.data.qpos[0] = np.nan
     with pytest.raises(RunError, match=r"diverged before 0\.01 s"):
         slide.advance(0.02)
 
 
-def test_a_gif_shows_the_arm_in_motion(nominal: IdentifiedModel, arm: Arm):
-    """Rendered without a display, where this machine can."""
-    Image = pytest.importorskip("PIL.Image")
-    log = step_log(arm.pose("study"), [80.0], dwell=0.61)
+def renderable(motion: Motion) -> Stage:
+    """A small stage where this machine has OpenGL without a display; otherwise the test is skipped."""
     try:
-        picture = animation(make_playback(nominal, log))
+        return Stage(motion, (480, 270))
     except RunError as error:
         if "no picture can be rendered" not in str(error):
             raise
         pytest.skip(str(error))
-    with Image.open(io.BytesIO(picture)) as gif:
-        assert gif.n_frames == 7
-        first = np.asarray(gif.convert("RGB"), float)
-        gif.seek(6)
-        last = np.asarray(gif.convert("RGB"), float)
+
+
+def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedModel, study_log: Log):
+    bent = study_log.angle.copy()
+    bent[:, SHOULDER] += np.radians(30) * study_log.time / study_log.time[-1]
+    motion = simulated_motion(nominal, {"alone": replace(study_log, angle=bent)})
+    assert motion.measured is not None
+    with renderable(motion) as stage:
+        first, last = (stage.machine(time).astype(float) for time in (0.0, 5.0))
+        whole = stage.picture([2.0])
+    assert whole.shape == (270, 480, 3)
     assert np.abs(first - last).max() > 50  # the arm has moved
-    assert np.unique(first.reshape(-1, 3), axis=0).shape[0] > 20  # and it is a picture, not one colour
+    blue = last[..., 2] - last[..., 0]
+    orange = last[..., 0] - last[..., 2]
+    for color in (blue, orange):  # both are there, and inside the picture
+        seen = np.argwhere(color > 60)
+        assert len(seen) > 100
+        assert seen.min() > 2
+        assert (seen.max(axis=0) < np.array(last.shape[:2]) - 3).all()
+    panel = whole[:, last.shape[1] :]
+    assert (panel == 255).mean() > 0.5  # white, with traces
+    assert len(np.unique(panel.reshape(-1, 3), axis=0)) > 20
+
+
+def test_where_both_agree_the_ghost_is_hidden(nominal: IdentifiedModel, study_log: Log):
+    motion = simulated_motion(nominal, {"alone": study_log})
+    assert motion.measured is None  # commands alone: nothing moves in the log
+    exact = replace(motion, measured=motion.simulated)
+    with renderable(exact) as stage:
+        picture = stage.machine(1.0).astype(float)
+    assert (picture[..., 2] - picture[..., 0] > 60).mean() < 0.003
+
+
+@pytest.mark.parametrize("kind", [".gif", ".mp4", ".png"])
+def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log, kind, monkeypatch):
+    if kind == ".mp4":
+        pytest.importorskip("av")
+    motion = simulated_motion(nominal, {"alone": study_log})
+    renderable(motion).__exit__()
+    monkeypatch.setitem(film.SIZE, kind, (480, 270))
+    content = film.render_motion(motion, kind, (1.0, 1.5))
+    if kind == ".mp4":
+        import av
+
+        with av.open(io.BytesIO(content)) as file:
+            frames = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
+        assert len(frames) == round(0.5 * film.RATE[kind])
+        assert frames[0].shape == (270, 480, 3)
+        return
+    with Image.open(io.BytesIO(content)) as picture:
+        assert picture.format == kind[1:].upper()
+        assert kind == ".png" or picture.n_frames == round(0.5 * film.RATE[kind])
+
+
+def test_a_span_without_time_and_another_kind_of_file_are_refused(nominal: IdentifiedModel, study_log: Log):
+    motion = simulated_motion(nominal, {"alone": study_log})
+    with pytest.raises(SettingsError, match=r"9:12 s holds nothing of a motion of 4\.99 s"):
+        film.render_motion(motion, ".png", (9.0, 12.0))
+    with pytest.raises(SettingsError, match=r"a\.avi: is no film or picture.*\.mp4"):
+        film.check_kind(Path("a.avi"))
+
+
+def test_two_arms_move_as_mirror_images(nominal: IdentifiedModel, study_log: Log):
+    both = simulated_motion(nominal, {"right": study_log, "left": study_log})
+    np.testing.assert_array_equal(both.simulated[:, :7], both.simulated[:, 7:])
+    assert [signals.name for signals in both.signals] == ["both shoulder"]
+    one = simulated_motion(nominal, {"left": study_log})
+    assert np.ptp(one.simulated[:, :7], axis=0).max() == 0  # the other arm rests
+    np.testing.assert_array_equal(one.simulated[:, 7:], both.simulated[:, 7:])
+    pressure = one.signals[0].pressure
+    assert pressure is not None
+    assert 1 < pressure.min() < pressure.max() < 400
 
 
 def test_a_log_without_commands_is_refused(nominal: IdentifiedModel, arm: Arm):
     with pytest.raises(SettingsError, match="commands nothing"):
-        make_playback(nominal, step_log(arm.pose("study"), [0.0]))
+        simulated_motion(nominal, {"alone": step_log(arm.pose("study"), [0.0])})
+
+
+def test_the_window_shows_the_ghost_anew_in_every_picture(nominal: IdentifiedModel, study_log: Log):
+    bent = study_log.angle + np.linspace(0, 0.5, len(study_log.time))[:, None]
+    playback = Replay(simulated_motion(nominal, {"alone": replace(study_log, angle=bent)}))
+    clock, drawn = FakeClock(), []
+    viewer = FakeViewer(playback, 5, lambda k, data: drawn.append(viewer.user_scn.ngeom))
+    play(playback, viewer, clock, clock.sleep)
+    assert drawn[0] > 7  # links and cylinders
+    assert len(set(drawn)) == 1
+    names, values = viewer.texts[-1][2:]
+    assert names.splitlines() == ["time", "shoulder"]
+    assert "(log " in values
+    assert values.endswith(" bar")

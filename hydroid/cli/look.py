@@ -39,8 +39,6 @@ def check(
         raise typer.Exit(2)
 
 
-
-
 def plot_actuator(
     estimate: NominalEstimate,
     output: Output,

@@ -125,12 +125,16 @@ def check_log(path: Path, data: bytes) -> None:
 
 def _cells(data: bytes) -> tuple[list[str], np.ndarray]:
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    encoding = (
+        "utf-16-be" if data[:200:2].count(0) > 90 else "utf-16-le" if data[1:200:2].count(0) > 90 else ""
+    )
     try:
-        text = data.decode("utf-16" if wide else "utf-8-sig")
+        text = data.decode("utf-16" if wide else encoding or "utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     lines = [x for x in lines if x.strip(" \t,;|") and not x.strip(" \t,;").startswith(("#", "sep="))]
+    lines = lines[next((i for i, x in enumerate(lines) if "time_s" in x), 0) :]  # below a preamble
     for separator in ",;\t|":
         names = [name.strip() for name in next(csv.reader([lines[0]], delimiter=separator))]
         if "time_s" in names:

@@ -1,9 +1,9 @@
 """Leave-one-out on five logs of the virtual rig's shoulder: expected and actual error on the log left out.
 
-    python benchmarks/leave_one_out.py [--stages hyd mech]
+    python benchmarks/leave_one_out.py [--stages hyd mech] [--seconds 15]
 
-There are three logs in examples/logs. The two of the shoulder are cut at a rest near their middle, and of the
-log in which six joints move the shoulder is the fifth: the other joints follow their measured motion. The
+Two pieces of each shoulder log in examples/logs, which begin at rests, and one of the log in which six joints
+move are the five logs; in all of them the other joints follow their measured motion. The
 masses are held at the arm's nominal values, all else is as in the shipped config. The fit to all five logs is
 refined without each log in turn and predicts it. "expected" is the rms error that the noise and the
 uncertainty of the parameters explain. "pooled" and "by log" are the standard deviations of the parameters.
@@ -25,36 +25,35 @@ from hydroid.uncertainty.covariance import uncertainty
 
 LOGS = Path(__file__).parents[1] / "examples" / "logs"
 CUTS = {"rig_shoulder_1": 2200, "rig_shoulder_2": 3300}
-"""samples at which the logs rest, near their middle"""
+"""samples near the middle at which the logs rest: the second piece begins there"""
 CONFIGS = {"hyd": "fit-hyd", "mech": "fit-mech"}
 
 
-def part(log: Log, name: str, first: int, last: int) -> Log:
-    """Return the samples of a log from `first` on, up to `last`, as a log of its own."""
-    samples = slice(first, last)
-    time = log.time[samples] - log.time[first]
-    return replace(
-        log, source=f"{name}.csv", time=time, command=log.command[samples], angle=log.angle[samples]
-    )
+def piece(log: Log, name: str, first: int, seconds: float) -> Log:
+    """Return some seconds of a log as a log of its own."""
+    samples = slice(first, first + round(seconds / log.period))
+    command, angle = log.command[samples], log.angle[samples]
+    return replace(log, source=f"{name}.csv", time=log.time[: len(angle)], command=command, angle=angle)
 
 
-def five_logs(settings: FitSettings) -> list[Log]:
+def five_logs(settings: FitSettings, seconds: float) -> list[Log]:
     """Return the five logs of the shoulder."""
     logs: list[Log] = []
-    for name, cut in CUTS.items():
+    for name, second in CUTS.items():
         (log,) = hydroid.read_logs(LOGS / f"{name}.csv", settings)
-        logs += [part(log, f"{name}a", 0, cut), part(log, f"{name}b", cut, len(log.time))]
-    return [*logs, *hydroid.read_logs(LOGS / "rig_all_joints_1.csv", settings)]
+        logs += [piece(log, f"{name} from {k}", k, seconds) for k in (0, second)]
+    (log,) = hydroid.read_logs(LOGS / "rig_all_joints_1.csv", settings)
+    return [*logs, piece(log, "rig_all_joints_1", 0, seconds)]
 
 
-def study(stage: str) -> None:
+def study(stage: str, seconds: float) -> None:
     """Fit all five logs, leave each out, and print the tables."""
     changes: dict[str, object] = {"simulation.other_joints": "measured", "search.nsga2.generations": 3}
     changes |= {f"log.joints.{joint}.command": None for joint in (1, 3, 4, 5, 6, 7)}
     nominal = hydroid.load_settings(CONFIGS[stage]).arm.masses
     changes |= {f"parameters.M{i + 1}.fixed": float(nominal[i]) for i in range(6)}
     settings, began = hydroid.load_settings(CONFIGS[stage], changes), time.perf_counter()
-    logs = five_logs(settings)
+    logs = five_logs(settings, seconds)
     model = hydroid.fit(settings, logs).model
     problem = Problem(settings, logs)
     known = uncertainty(problem, model.theta)
@@ -82,8 +81,10 @@ def study(stage: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--stages", nargs="+", default=["hyd", "mech"], choices=list(CONFIGS))
-    for stage in parser.parse_args().stages:
-        study(stage)
+    parser.add_argument("--seconds", type=float, default=15.0)
+    arguments = parser.parse_args()
+    for stage in arguments.stages:
+        study(stage, arguments.seconds)
 
 
 if __name__ == "__main__":

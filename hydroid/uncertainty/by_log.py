@@ -9,9 +9,10 @@ M. D. Webb, 2023). The variance by log is
 
     (pooled variance) * sum of d_g² / (what the pooled noise would make of this sum on average)
 
-so it is unbiased where the model is right, and where all logs excite alike it is the usual sandwich times
-G / (G - 1). The sum is about chi-square with the degrees of freedom of its first two moments (R. M. Bell and
-D. F. McCaffrey, 2002), G - 1 for G logs that excite alike; the interval is Student's t with these.
+but for the priors' part of it. So it is unbiased where the model is right, and where all logs excite alike it
+is the usual sandwich times G / (G - 1). The sum is about chi-square with the degrees of freedom of its first
+two moments (R. M. Bell and D. F. McCaffrey, 2002), G - 1 for G logs that excite alike; the interval is
+Student's t with these.
 
 The changes d_g are linear. With J = V D U (`decompose`), U_g the columns of log g, r_g its residual and
 A_g = U_g U_g', they are V D^-1 (1 - A_g)^-1 U_g r_g. Nothing is simulated. Priors belong to no log, and stay.
@@ -26,6 +27,7 @@ from scipy.stats import t as student
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, decompose, ends
+from hydroid.uncertainty.flags import Source
 
 ALONE = 0.99
 """part of the information on a direction above which a log is called the only one that has it"""
@@ -43,7 +45,7 @@ class ByLog:
 
     Attributes:
         relative: relative standard deviation by log, shape (P,): infinite where one log alone determines the
-            parameter, NaN where it is fixed, at a bound, or not identifiable.
+            parameter, NaN where it is fixed, at a bound, not identifiable, or known from its prior only.
         interval: of 95 %, shape (P, 2).
         freedom: degrees of freedom of the standard deviation, shape (P,).
         differing: parameters that differ from log to log by more than the noise explains: the model errs.
@@ -98,12 +100,17 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
         "gpk,gkl,gpl->pg", changes, scatters, changes
     )
     mean, square = np.trace(expected, axis1=1, axis2=2), np.sum(expected**2, axis=(1, 2))
+    # what the priors say is no less certain where the logs differ
+    spread = scatters.sum(axis=0)
+    noise, stated = (np.einsum("pk,kl,pl->p", rows, m, rows) for m in (spread, priors @ priors.T))
     relative, freedom = np.full((2, len(inside)), np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):  # 0 / 0 of a parameter without effect: not known
         freedom[inside] = mean**2 / square
         ratio = found / mean
-    relative[inside] = np.where(lost.any(axis=0), np.inf, uncertainty.relative[inside] * np.sqrt(ratio))
-    relative[~np.isfinite(uncertainty.relative)] = np.nan
+        widened = np.sqrt((stated + noise * ratio) / (stated + noise))
+    relative[inside] = np.where(lost.any(axis=0), np.inf, uncertainty.relative[inside] * widened)
+    prior_only = np.array([status.source is Source.PRIOR for status in uncertainty.status])
+    relative[~np.isfinite(uncertainty.relative) | prior_only] = np.nan
     half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
     chances = np.ones(len(inside))
     chances[inside] = chi2.sf(freedom[inside] * ratio, freedom[inside])

@@ -91,7 +91,9 @@ def study_table(
             printed = ("" if v is None else f"{v:g}" for v in table.article[cell])
             lines.append((cell, "article", "", *printed))
     named = (f"{c} [{units[c]}]" if units[c] else c for c in table.columns)
-    return Table(table.title, ("cell", "from", "runs", *named), tuple(lines), f"{SPREAD} {table.note}".strip())
+    return Table(
+        table.title, ("cell", "from", "runs", *named), tuple(lines), f"{SPREAD} {table.note}".strip()
+    )
 
 
 def spread(values: Sequence[float]) -> str:

@@ -14,8 +14,9 @@ NAMES = [
     for name in hydroid.__all__
     if re.search(r"^ {8}\S*.*hydroid\.", getattr(hydroid, name).__doc__ or "", re.MULTILINE)
 ]
-WITHOUT_WINDOW = {"view", "render", "build_model"}
-"""a window or a film needs OpenGL, and build_model an arm of one's own; their commands have tests"""
+WITHOUT_WINDOW = {"view", "render", "build_model", "report"}
+"""a window or a film needs OpenGL, build_model an arm of one's own, and report pages, which are not written
+here; they have tests of their own"""
 WRITES = {"fit": "a", "fit_mech": "mech", "fit_hyd": "hyd"}
 """the run folder that an example makes"""
 SMALL = {"population": 6, "generations": 2}

@@ -155,7 +155,7 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
         if name in response.bands:
             # a band that the parameters leave open must not flatten the residual either
             widest = _WIDEST * float(np.nanmax(np.abs(residual), initial=_LEAST_RESIDUAL))
-            half = np.minimum(np.degrees(np.nan_to_num(response.bands[name], nan=np.inf)), widest)
+            half = np.degrees(np.fmin(response.bands[name], np.radians(widest)))
             at, edge = style.decimated(time, half, bins)
             band = Mark(
                 "band", at, -edge, edge, color=color, label=f"95 % band of {name}", alpha=0.18, off=off

@@ -211,7 +211,7 @@ def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None) -> tuple[
     folded = tuple(replace(section, folded=True) for section in hidden if section is not None)
     if residual is None:
         return folded
-    tabs = tuple(Tab(t.name, tuple(replace(p, where=PAGE) for p in t.plots)) for t in residual.tabs)
+    tabs = tuple(replace(t, plots=tuple(replace(p, where=PAGE) for p in t.plots)) for t in residual.tabs)
     return (replace(residual, tabs=tabs), *folded)
 
 

@@ -38,7 +38,7 @@ def noisy(settings: FitSettings, values: dict[str, float], rng: np.random.Genera
     pose = settings.arm.pose("study")
     command = np.zeros((500, len(pose)))
     command[:, 1] = np.repeat(rng.uniform(-60.0, 60.0, 5), 100)
-    time = np.arange(len(command)) * 0.01
+    time = np.arange(len(command), dtype=np.float64) * 0.01
     drive = Log("steps.csv", time, command, np.tile(pose, (len(time), 1)), 0.01)
     log = simulate_log(settings, drive, values, "truth")
     noise = rng.normal(0.0, np.deg2rad(0.1), log.angle.shape)

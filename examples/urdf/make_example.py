@@ -87,7 +87,7 @@ def write_log(project: Path, path: Path, seed: int) -> None:
     arm = model.settings.arm
     command = commands(len(arm.joints), seed)
     angle = np.tile(0.5 * (arm.lower + arm.upper), (len(command), 1))
-    log = Log("commands", PERIOD * np.arange(len(command)), command, angle, PERIOD)
+    log = Log("commands", np.arange(len(command), dtype=np.float64) * PERIOD, command, angle, PERIOD)
     seen = hydroid.simulate(truth, log, noise_deg=NOISE_DEG, seed=seed).angle
     names = [name.removesuffix("_joint") for name in arm.joint_names]
     what = ("valve [V]", "angle [rad]")

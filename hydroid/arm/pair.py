@@ -79,10 +79,12 @@ def write_pair(spec: mujoco.MjSpec, arm: Arm) -> Path:
         RunError: it cannot be written; and what `build_pair` raises.
     """
     path, machine = pair_of(arm).model, build_pair(spec, arm)
+    text = machine.to_xml()
+    # in the text, not in the spec: that would look for its meshes beside the file it came from
     for mesh in machine.meshes:
-        mesh.file = Path(os.path.relpath(mesh.file, path.parent)).as_posix()
-    machine.modelfiledir = str(path.parent)
-    write_atomic(path, machine.to_xml())
+        beside = Path(os.path.relpath(mesh.file, path.parent)).as_posix()
+        text = text.replace(f'file="{mesh.file}"', f'file="{beside}"')
+    write_atomic(path, text)
     return path
 
 

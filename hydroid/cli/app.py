@@ -54,7 +54,8 @@ app = typer.Typer(
     name="hydroid",
     cls=Grouped,
     help="Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles.",
-    epilog="Start with: hydroid check LOG.csv, then hydroid fit-mech LOG.csv",
+    epilog="Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
+    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,  # plain help: importing rich would triple the time it takes
@@ -74,7 +75,7 @@ COMMANDS = (
     ("fit", fit.fit_hyd, "stage 2: the hydraulic actuators", "LOG.csv --mech runs/mech --out runs/hyd"),
     ("fit", fit.collect, "merge runs with different seeds", "'runs/array/seed-*'"),
     ("judge", judge.validate, "test fits on other logs", "OTHER.csv --fit runs/mech --fit runs/hyd"),
-    ("judge", judge.identifiability, "find what the logs determine", "LOG.csv --fit runs/hyd --profile F1"),
+    ("judge", judge.identifiability, "find what the logs determine", "LOG.csv --fit runs/hyd --profile A_A"),
     ("judge", judge.sensitivity, "draw the effect of each parameter", "LOG.csv --fit runs/mech"),
     ("judge", judge.surface, "draw the error over two parameters", "LOG.csv --fit runs/mech --over K,D"),
     ("judge", report.report, "draw reports anew, several side by side", "runs/hyd runs/validation"),

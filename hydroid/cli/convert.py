@@ -26,7 +26,8 @@ def convert(
 ) -> None:
     """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
 
-    With settings it holds what a fit uses: resampled to log.period_s, delayed by log.delay_s, with its signs.
+    With --config the CSV holds the data as a fit uses them: resampled to log.period_s, commands delayed by
+    log.delay_s, signs and units applied.
     """
     import yaml
 

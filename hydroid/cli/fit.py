@@ -71,7 +71,7 @@ class FitFlags:
         typer.Option(
             min=0,
             max=1024,
-            help="Number of threads. 0 means one per core; with --dask it means one per worker.",
+            help="Number of threads (0: one per core, or with --dask one per worker).",
         ),
     ] = None
     dask: Annotated[
@@ -158,8 +158,8 @@ def fit_hyd(
 ) -> None:
     """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
 
-    The parameters are the piston areas, currents, calibration and solenoid: all that is between command and
-    torque. Writes a run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets, delay and damping. The config can free more,
+    such as the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
     """
     from hydroid.api.stages import fit_hyd
 

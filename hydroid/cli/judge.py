@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Estimate, Folder, Logs, Output, OwnConfig, Repair, Set, names, overrides
+from hydroid.cli.options import FIT, Estimate, Folder, Logs, Output, OwnConfig, Repair, Set, names, overrides
 from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
@@ -34,8 +34,7 @@ def validate(
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file; "
-            "repeat the option for several.",
+            help=f"{FIT}. Repeat the option for several estimates.",
         ),
     ],
     out: Folder = Path("runs/validation"),
@@ -43,7 +42,10 @@ def validate(
     repair: Repair = False,
     leave_one_out: Annotated[
         bool,
-        typer.Option("--leave-one-out", help="Give the fit's own logs: refine without each, and predict it."),
+        typer.Option(
+            "--leave-one-out",
+            help="Give the fit's own logs. For each of them: refit without it, and predict it.",
+        ),
     ] = False,
 ) -> None:
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots."""
@@ -66,8 +68,7 @@ def identifiability(
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a folder written by Plant.save (Python) or a YAML file "
-            "[default: the start values of the parameters].",
+            help=f"{FIT} [default: the start values of the parameters].",
         ),
     ] = None,
     config: OwnConfig = None,
@@ -90,7 +91,7 @@ def identifiability(
     setting: Set = None,
     repair: Repair = False,
 ) -> None:
-    """Find which parameters, and which combinations of them, the logs determine.
+    """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
     do not determine.

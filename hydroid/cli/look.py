@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 def check(
     logs: Logs, output: Output, config: Config = "fit-mech", setting: Set = None, repair: Repair = False
 ) -> None:
-    """List the faults of logs, anything unusual in them, and what they lack, once for all logs that have it.
+    """List the faults of logs, anything unusual in them, and the commands that none of them has.
 
-    The exit status is 2 if a log is unusable.
+    A finding shared by several logs is listed once. The exit status is 2 if a log is unusable.
     """
     from hydroid.api.look import check, load_settings
 

@@ -24,7 +24,8 @@ def simulate(
         typer.Option(metavar="LOG.csv", help="The log to write [default: runs/COMMANDS-simulated.csv]."),
     ] = None,
     pose: Annotated[
-        str | None, typer.Option(help="Name of the start pose in the arm's file [default: start of the log].")
+        str | None,
+        typer.Option(help="Name of the start pose in the arm's file [default: the first angles of the log]."),
     ] = None,
     noise_deg: Annotated[
         float, typer.Option(min=0, max=90, help="Standard deviation of Gaussian noise on the angles [deg].")

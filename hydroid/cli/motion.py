@@ -34,7 +34,8 @@ def view(
     source: Annotated[Path | None, Source] = None,
     arm: Arm = None,
     pose: Annotated[
-        str | None, typer.Option(help="Name of the start pose in the arm's file [default: start of the log].")
+        str | None,
+        typer.Option(help="Name of the start pose in the arm's file [default: the first angles of the log]."),
     ] = None,
     repair: Repair = False,
 ) -> None:

@@ -32,14 +32,17 @@ OwnConfig = Annotated[
 Folder = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder for the report, tables and figures.")
 ]
+FIT = (
+    "An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a YAML file of "
+    "values by name"
+)
 Fit = Annotated[
     Path,
     typer.Option(
         "--fit",
         "--params",
         metavar="RUN|YAML",
-        help="An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a "
-        "YAML file of values by name.",
+        help=f"{FIT}.",
     ),
 ]
 Set = Annotated[
@@ -60,8 +63,8 @@ Arm = Annotated[
     typer.Option(
         "--arm",
         metavar="right|left|both",
-        help="Take the machine of two arms from the arm's file, and say which of them move. Columns that "
-        "begin with right_ and left_ are each arm's own; others are those of every arm that moves.",
+        help="Simulate the two-arm machine of the arm's file; the value names the arms that move. Columns "
+        "that begin with right_ or left_ belong to that arm. All others apply to every arm that moves.",
     ),
 ]
 
@@ -101,8 +104,7 @@ class NominalEstimate:
             "--fit",
             "--params",
             metavar="RUN|YAML",
-            help="An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file of "
-            "values [default: no estimate, but the values in the arm's file and under `hydraulics` in the "
+            help=f"{FIT} [default: the nominal values in the arm's file and under `hydraulics` in the "
             "settings].",
         ),
     ] = None

@@ -25,9 +25,9 @@ def suggest(
 ) -> None:
     """Find what the model lacks, and what to do next.
 
-    Tests every quantity that the fit holds or that its model has switched off, such as a delay or dry
-    friction: would freeing it lower the error? Shows what the residual depends on. Predicts for each of
-    several actions, from weighing a link to a new experiment, how much more would then be known.
+    Tests every parameter that is kept fixed or switched off, such as a delay or dry friction: would freeing
+    it lower the error? Shows what the residual depends on. Predicts for several actions, from weighing a link
+    to a new experiment, how much each would reduce the uncertainty.
     """
     from hydroid.api.plan import suggest
     from hydroid.identified import load_identified
@@ -58,7 +58,11 @@ def design(
     ] = None,
     criterion: Annotated[
         str | None,
-        typer.Option(metavar="E|D", help="Minimise the largest (E) or the average (D) uncertainty."),
+        typer.Option(
+            metavar="E|D",
+            help="What the experiment minimises. E: the uncertainty of the worst-known combination of "
+            "parameters. D: the volume of the uncertainty of all of them together.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search for commands.")] = 1,
     out: Folder = Path("runs/design"),

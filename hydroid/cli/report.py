@@ -18,8 +18,8 @@ def report(
 ) -> None:
     """Draw the report of a finished run or study anew, or several side by side on one page.
 
-    Nothing is simulated, and no log is needed. One report is replaced where it lies; several are compared on
-    a page in the folder --out: verdicts, errors, parameters, and responses to the same logs.
+    Nothing is simulated, and no log is needed. With one folder, its report is written again in place. With
+    several, --out gets one page that compares verdicts, errors, parameters, and responses to the same logs.
     """
     from hydroid.api.report import report
 

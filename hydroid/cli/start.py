@@ -27,15 +27,16 @@ def init(
         str | None,
         typer.Option(
             metavar="NAME,NAME",
-            help="The arm's joints as the log counts them, where its columns have numbers [default: in the "
-            "arm's order].",
+            help="Names of the arm's joints in the order of the log's numbers (u1, u2, ...) [default: the "
+            "order in the arm's file].",
         ),
     ] = None,
     tip: Annotated[
         str | None,
         typer.Option(
             metavar="LINK",
-            help="Link at which the arm ends [default: the branch that the log names, or the longest].",
+            help="Last link of the arm, if the robot has several branches [default: the end of the "
+            "branch whose joints the log names, or else of the longest branch].",
         ),
     ] = None,
 ) -> None:

@@ -62,8 +62,8 @@ def study(
 ) -> None:
     """Compare settings over many seeds: which fits better, and is the difference more than chance?
 
-    The file names a config, the settings that vary, the data, and the claims to be tested. A study that was
-    stopped goes on with the same command.
+    The file names a config, the settings that vary, the data, and the claims to be tested. To continue a
+    study that was stopped, give the same command again.
     """
     from hydroid.api.studies import study
     from hydroid.cli.progress import Progress
@@ -87,10 +87,10 @@ def article(
     listed: Annotated[bool, typer.Option("--list", help="List them, and run nothing.")] = False,
     out: Folder = Path("runs/article"),
 ) -> None:
-    """Make the article's tables and figures anew over many seeds, and test its conclusions.
+    """Make the tables and figures of the article (Montazeri et al. 2017) anew, and test its conclusions.
 
-    Each is a study whose file travels with hydroid (configs/article). All of them take hours; --quick shows
-    in minutes that they run. What was stopped goes on with the same command.
+    Each is a study over many seeds; its file travels with hydroid (configs/article). All of them take hours;
+    --quick shows in minutes that they run. To continue after a stop, give the same command again.
     """
     from hydroid.api.studies import article, article_items
     from hydroid.cli.progress import Progress

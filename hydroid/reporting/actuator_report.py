@@ -1,4 +1,4 @@
-"""The report of one actuator: its curves at rest, from the command to the joint's torque."""
+"""The report of one actuator: its curves in steady state, from the command to the joint's torque."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -90,7 +90,7 @@ def joint_records(arm: Arm, candidates: Candidates, joint: int) -> Any:
 def actuator_page(actuator: JointActuator) -> Page:
     """Return the page of an actuator: all its curves as one figure."""
     section = Section("From the command to the torque", plots=(actuator_plot(actuator),))
-    lead = "What its parameters mean at rest, from the command to the torque at the joint."
+    lead = "What its parameters mean in steady state, from the command to the torque at the joint."
     return Page("actuator", f"Actuator of {actuator.title.lower()}", lead, (section,))
 
 
@@ -147,7 +147,7 @@ def _spool(actuator: JointActuator) -> Panel:
     for edge, label, look in ((False, "valve opens", "dotted"), (True, "fully open", "dashed")):
         at = [p.overlap_a + edge * p.slot_width_a, -(p.overlap_b + edge * p.slot_width_b)]
         marks.append(Mark("rule", y=1e3 * np.array(at, float), color="grey", label=label, width=1, look=look))
-    return Panel("command [%]", "displacement [mm]", tuple(marks), "Spool at rest, (6)")
+    return Panel("command [%]", "displacement [mm]", tuple(marks), "Spool in steady state, (6)")
 
 
 def _opening(actuator: JointActuator) -> Panel:

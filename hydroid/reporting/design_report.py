@@ -41,7 +41,7 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
     margin = np.radians(settings.margin_deg)
     limits = np.column_stack([arm.lower + margin, arm.upper - margin])
     moving = "Commands and the motion that the present estimate predicts."
-    precise = "Predicted relative standard deviations, from ±100 % without any log."
+    precise = "Predicted relative standard deviations, assuming ±100 % on each parameter before any log."
     best = design.best.information
     weakest = f"{100 * design.precision.weakest(best)[0]:.2g}"
     known = int(np.sum(design.precision.deviations(best) <= WEAK_ABOVE))

@@ -48,6 +48,11 @@ _FILES = (
     "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
     "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
 )
+_SAME = {
+    "mech": "with the same versions. RUN/config.yaml holds all settings, and the seed.",
+    "hyd": "with the same versions. RUN/config.yaml holds all settings, the seed, and the values of stage 1: "
+    "the command needs no --mech.",
+}
 _CITATION = (
     "A. Montazeri, C. West, S. Monk and C. J. Taylor, Dynamic modelling and parameter estimation of a "
     "hydraulic robot manipulator using a multi-objective genetic algorithm, 2017. To cite hydroid: "
@@ -183,7 +188,7 @@ def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:
             actuator_plot(replace(actuator, known=known)), name=f"actuator_joint_{joint}", where=PAGE
         )
         tabs.append(Tab(actuator.title, (plot,)))
-    text = "What its parameters mean at rest, from the command to the torque at the joint."
+    text = "What its parameters mean in steady state, from the command to the torque at the joint."
     return (Section("The actuator", text, tabs=tuple(tabs)),) if tabs else ()
 
 
@@ -227,7 +232,7 @@ def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, st
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
     return (
         ("command", f"hydroid fit-{settings.stage} {given} --config RUN/config.yaml --out AGAIN"),
-        ("same bits", "with the same versions: RUN/config.yaml holds all settings, the seed among them"),
+        ("same bits", _SAME[settings.stage]),
         ("arm", f"{settings.arm.name}; its geometry is not estimated but read from arm.yaml"),
         ("stage", STAGES[settings.stage]),
         *logs,

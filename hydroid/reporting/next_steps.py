@@ -14,7 +14,10 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Sect
     steps: list[Step] = []
     if fit.refinement is None:
         steps.append(
-            Step("Refine the estimate: leave out --no-refinement.", "The search's own need be no optimum.")
+            Step(
+                "Refine the estimate: leave out --no-refinement.",
+                "The search's own estimate need not be an optimum.",
+            )
         )
     elif not fit.converged:
         what = "Let the refinement finish: allow more iterations (refinement.iterations), or another seed."
@@ -32,7 +35,7 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Sect
     steps += [] if suggested is None else suggested_steps(problem, suggested)
     unseen = Step(
         "Predict a log that this fit has not seen: hydroid validate OTHER.csv --fit RUN.",
-        "It shows how large the error is elsewhere, and whether the noise or the model limits it.",
+        "It shows how large the error is elsewhere, and whether the fitted logs lead to expect it.",
     )
     return Section(
         "Do next", steps=tuple([*steps[: MOST_STEPS - 1], unseen, *steps[MOST_STEPS - 1 :]][:MOST_STEPS])

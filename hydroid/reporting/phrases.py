@@ -111,7 +111,7 @@ def _direction_phrase(problem: Problem, direction: Direction) -> str:
         return f"{name}: {what} cannot be determined{count}"
     percent = 100 * direction.relative_sd
     digits = f"{percent:.2g}" if percent < 10 else f"{percent:.0f}"
-    return f"{name}: {what} is known only to ±{digits} %{count}"
+    return f"{name}: {what} is known only weakly (standard deviation {digits} %){count}"
 
 
 def _direction_name(problem: Problem, direction: Direction) -> str:

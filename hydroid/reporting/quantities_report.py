@@ -41,7 +41,8 @@ def quantity_section(problem: Problem, quantities: Quantities) -> Section:
     logs, source = problem.logs, "logs and priors" if len(problem.priors) else "logs"
     text = (
         f"The {source} determine these quantities. They follow from all parameters together, and can be "
-        "known well although no single parameter is: all parameter sets that explain the logs agree on them."
+        "known well although no single parameter is: parameter sets that explain the logs mostly agree on "
+        "them."
     )
     speeds = any(name.endswith("_speed") for name in quantities.curves)
     plots = (Plot("speed", _CAPTION, partial(draw_speeds, quantities, logs)),) if speeds else ()
@@ -66,12 +67,18 @@ def quantity_table(quantities: Quantities) -> Table:
         if (within := _within(one)) <= DETERMINED_WITHIN:
             rows.append((one.joint, one.label, one.unit, one.value, *one.interval, 100 * within))
     note = (
-        "from, to: 95 % interval, to first order; ±: half of it. It is only right if the model is right. "
+        "from, to: 95 % interval, to first order; ±: half of the interval, about two standard deviations. "
+        "The interval is only right if the model is right. "
         "Speeds: in the middle of the logged travel. Dead time: from a step of the command until a tenth of "
         "the final speed. Time constant: from there to 63 % of it. docs/quantities.md defines every quantity."
     )
     header = ("joint", "quantity", "unit", "value", "from", "to", "± [%]")
     return Table("Quantities", header, tuple(rows), note, ("± [%]",))
+
+
+def known_quantities(quantities: Quantities) -> int:
+    """Return how many quantities have a 95 % interval within BEST_WITHIN."""
+    return sum(_within(q) <= BEST_WITHIN for q in quantities.scalars.values())
 
 
 def best_known(quantities: Quantities) -> list[str]:

@@ -1,6 +1,7 @@
 """Suggestions: what the model lacks, what the residual shows, what to do next; a page, and sections."""
 
 import math
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +14,9 @@ from hydroid.reporting.page import Verdict as Strip
 from hydroid.reporting.phrases import listed
 from hydroid.reporting.residual_chart import UNITS, residual_tabs
 from hydroid.reporting.table import Cell, Table, number, plain
+from hydroid.settings.problem import MECHANICAL_UNITS
 from hydroid.suggestion.actions import STATED_SD, WEIGHED_SD, Action, ActionKind
+from hydroid.suggestion.freeing import SHORT
 from hydroid.suggestion.missing import LEVEL, MIN_GAIN, MissingTerms, TermTest, Verdict
 from hydroid.suggestion.residuals import LONG_S, Binned, Regressor, ResidualCheck
 from hydroid.suggestion.suggest import Suggestions
@@ -46,8 +49,9 @@ def suggested_steps(problem: Problem, result: Suggestions) -> list[Step]:
     """Return the quantity to free, and the actions, the best first."""
     steps = [
         Step(
-            f"Free {test.term.name}: add to the settings file parameters: {{{setting_line(test)}}}",
-            f"The rms error is predicted to fall {fall_phrase(result.missing, test)}.",
+            f"Free {test.term.name}.",
+            f"The rms error is predicted to fall {fall_phrase(result.missing, test)}. "
+            f"With RUN the folder of this fit, run: {freeing_command(problem, test)}",
         )
         for test in result.missing.free[:1]
     ]
@@ -75,7 +79,9 @@ def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section,
         ),
         Section(
             "What the residual shows",
-            ("The largest errors first." if several else "") if seen else "Nothing beyond the noise.",
+            ("The largest errors first." if several else "")
+            if seen
+            else "No trend against angle, speed or command.",
             points=() if several else seen,
             tabs=residual_tabs(problem, result.residuals, notes),
             more={"residuals": residual_table(problem, result.residuals)},
@@ -107,14 +113,20 @@ def term_phrases(problem: Problem, result: Suggestions) -> tuple[str, ...]:
     if not free:
         return ()
     first, others = free[0], [test.term.name for test in free[1:]]
-    said = [f"Add to the settings file: parameters: {{{setting_line(first)}}}"]
+    said = [
+        f"To free {first.term.name}, with RUN the folder of this fit, run: {freeing_command(problem, first)}"
+    ]
     if others:
         said.append(
             f"{listed(others)} would also lower the error, but may describe the same error. Free one "
-            "quantity, fit again, and ask again."
+            "quantity at a time, and look at the report of the new fit."
         )
     if not result.thorough:
-        said.append("The error with a quantity freed is that of one step. hydroid suggest refines it.")
+        said.append(
+            "Each predicted error is that of the best of a few steps with the quantity freed. "
+            "hydroid suggest refines the parameters from there, in up to "
+            f"{SHORT.iterations} iterations, and tests more quantities."
+        )
     return tuple(said)
 
 
@@ -123,12 +135,30 @@ def fall_phrase(missing: MissingTerms, test: TermTest) -> str:
     return f"from {number(math.degrees(missing.rms))} to {number(math.degrees(test.rms))} deg"
 
 
+def freeing_command(problem: Problem, test: TermTest) -> str:
+    """Return the command that fits the same logs again from the estimate, with a term freed."""
+    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    name, _, parameter = setting_line(test).partition(": ")
+    return (
+        f"hydroid fit-{problem.settings.stage} {given} --config RUN/config.yaml --from RUN "
+        f"--set {shlex.quote(f'parameters.{name}={parameter}')} --out AGAIN"
+    )
+
+
 def setting_line(test: TermTest) -> str:
-    """Return the parameter that frees a term, as a line of YAML without braces around it."""
+    """Return the parameter that frees a term, as a line of YAML without braces around it.
+
+    Stage 2 asks for a start of every mechanical parameter that no run of stage 1 gives.
+    """
     p, (low, high) = test.term.settings, proposed_bounds(test)
+    start = (
+        f", start: {plain(min(max(test.term.value, low), high))}" if p.quantity in MECHANICAL_UNITS else ""
+    )
     where = f"link: {p.link}" if p.link else f"joints: [{', '.join(map(str, p.joints or ()))}]"
     where = "" if p.link is None and p.joints is None else f"{where}, "
-    return f"{test.term.name}: {{quantity: {p.quantity}, {where}bounds: [{plain(low)}, {plain(high)}]}}"
+    return (
+        f"{test.term.name}: {{quantity: {p.quantity}, {where}bounds: [{plain(low)}, {plain(high)}]{start}}}"
+    )
 
 
 def proposed_bounds(test: TermTest) -> tuple[float, float]:
@@ -163,11 +193,12 @@ def missing_table(missing: MissingTerms) -> Table:
             )
         )
     header = ("quantity", "unit", "held at", "freed", "rms [deg]", "score", "verdict")
+    free = _VERDICTS[Verdict.FREE]
     note = (
         f"rms without any of them: {number(math.degrees(missing.rms))} deg. score: how clearly the residual "
-        "shows the effect, in standard deviations; what the free parameters can do as well is left out. "
-        f"'{_VERDICTS[Verdict.FREE]}' needs two things: chance would name any of these quantities in "
-        f"{100 * LEVEL:.0f} % of fits at most, and in simulation the rms error falls by "
+        "shows the effect, in standard deviations; effects that the free parameters can reproduce are "
+        f"removed first. '{free}' needs two things. (1) If the model lacked nothing, any of these quantities "
+        f"would be named in {100 * LEVEL:.0f} % of fits at most. (2) In simulation the rms error falls by "
         f"{100 * MIN_GAIN:.0f} % at least."
     )
     return Table("Quantities that the fit holds", header, tuple(rows), note, ("unit", "score"))
@@ -266,12 +297,21 @@ def action_name(problem: Problem, action: Action) -> str:
 def action_effect(action: Action) -> str:
     """Say what an action would do."""
     before, after = action.known
-    share = f"{after} of {action.total} parameters are then known to {100 * WEAK_ABOVE:.0f} %"
-    change = f"{share}, as before" if before == after else f"{share}, {before} before"
-    improved = [(action.parameter, action.deviations)]
-    improved += [(action.quantity, action.quantity_deviations)] if action.quantity else []
-    most = [f"{name} from ±{100 * low:.2g} % to ±{100 * high:.2g} %" for name, (low, high) in improved]
-    return f"{change}; most improves {'; of the quantities, '.join(most)}"
+    share = (
+        f"{after} of {action.total} parameters get a standard deviation of {100 * WEAK_ABOVE:.0f} % or less"
+    )
+    change = f"{share}, as without it" if before == after else f"{share}, {before} without it"
+    stated = action.kind in (ActionKind.STATE, ActionKind.WEIGH)
+    beside = f"Besides {action.subject} itself, " if stated else ""
+    most = f"{beside}{action.parameter} improves most: {_fall(action.deviations)}"
+    if action.quantity:
+        most += f". Of the quantities, {action.quantity} improves most: {_fall(action.quantity_deviations)}"
+    return f"{change} (assuming ±100 % on each before any log). {most}"
+
+
+def _fall(deviations: tuple[float, float]) -> str:
+    before, after = (f"{100 * deviation:.2g}" for deviation in deviations)
+    return f"standard deviation {before} % to {after} %"
 
 
 def action_table(actions: Sequence[Action]) -> Table:
@@ -288,7 +328,9 @@ def action_table(actions: Sequence[Action]) -> Table:
     header += ("quantity", "quantity from ± [%]", "quantity to ± [%]")
     note = (
         f"known: number of parameters whose relative standard deviation is at most {100 * WEAK_ABOVE:.0f} %. "
-        "Predicted at the estimate, with the noise that the residuals show, from ±100 % without any log."
+        "Predicted at the estimate, with the noise that the residuals show, assuming ±100 % on each "
+        "parameter before any log. The noise counts as known exactly. The verdict assumes neither, so it can "
+        "count fewer parameters."
     )
     return Table("Predicted effect of each action", header, rows, note)
 

@@ -17,22 +17,23 @@ from hydroid.quantities.band import Band
 from hydroid.reporting.fit_tables import INDICES, INDICES_NOTE, index_cells
 from hydroid.reporting.page import Light, Page, Section, Verdict, file_name, log_names, short_name, unique
 from hydroid.reporting.responses import JointResponse, logged_pressures, response_data, response_tabs
-from hydroid.reporting.table import Cell, Table, number
+from hydroid.reporting.table import Cell, Table
 
 _BANDS = "Prediction bands"
 _BAND_HEADER = (
     "noise [deg]",
     "expected error [deg]",
     "error [deg]",
-    "error of the model [deg]",
+    "further error [deg]",
     "inside [%]",
 )
+_EXPECTED = "As the fitted logs lead to expect"
 _NOTES = {True: "Unseen: the fit was not made from this log.", False: "The fit was made from this log."}
 _BAND_NOTE = (
-    "noise: standard deviation that the fit saw in its own residuals. expected error: rms, of this noise and "
-    "of the parameters' uncertainty together. error: rms. error of the model: the part of the error that the "
-    "expected one does not explain. inside: samples within the 95 % band; 95 % are expected if the model is "
-    "right, and slow noise may leave it for a while."
+    "noise: standard deviation, estimated from the error on the fitted logs; the model's error there is part "
+    "of it. expected error: rms, of this noise and of the parameters' uncertainty together. error: rms. "
+    "further error: the part of the error that the expected one does not explain. inside: samples within the "
+    "95 % band; 95 % are expected if the model is right, and slow noise may leave it for a while."
 )
 
 
@@ -94,7 +95,7 @@ def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedMod
     tabs = sorted(response_tabs(responses, notes), key=lambda tab: tab.note != _NOTES[True])
     section = Section("Prediction", tabs=tuple(tabs), tables={"validation": table})
     bands = {"bands": Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)}
-    limits = Section("What limits the prediction", points=tuple(verdicts), more=bands)
+    limits = Section("Error that the fitted logs lead to expect", points=tuple(verdicts), more=bands)
     sections = [section, limits] if band_rows else [section]
     if folds:
         sections.append(Section("Without one log", tables={"folds": _fold_table(folds)}))
@@ -173,7 +174,7 @@ def _rank(results: Sequence[Validation]) -> dict[str, float]:
 
 
 def _strip(results: Sequence[Validation]) -> Verdict:
-    """The verdict: the best fit's error on unseen logs, the others', and what limits it."""
+    """The verdict: the best fit's error on unseen logs, the others', and whether it is as expected."""
     judged, errors = _judged(results), _rank(results)
     logs = list(dict.fromkeys(result.log.source for result in judged))
     unseen = judged[0].unseen
@@ -188,13 +189,12 @@ def _strip(results: Sequence[Validation]) -> Verdict:
         outside = [band for band in bands if band.model_limits]
         inside = f"{min(100 * band.inside for band in bands):.0f} %"
         if outside:
-            words = f"The model: in {len(outside)} of {len(bands)} responses its error exceeds the noise."
-            lights.append(Light("What limits it", "fair", words))
+            words = f"No: in {len(outside)} of {len(bands)} responses the error is clearly larger."
+            lights.append(Light(_EXPECTED, "fair", words))
         else:
-            words = (
-                f"Noise and parameters explain the error: at least {inside} of the samples lie in the band."
-            )
-            lights.append(Light("What limits it", "good", words))
+            which = "" if len(bands) == 1 else "at least "
+            words = f"Yes: {which}{inside} of the samples lie inside the band."
+            lights.append(Light(_EXPECTED, "good", words))
     return Verdict(prediction, parameters, tuple(lights))
 
 
@@ -238,9 +238,11 @@ def _band_cells(band: Band) -> tuple[Cell, ...]:
 
 
 def _verdict(band: Band) -> str:
-    """Say what limits the prediction."""
-    inside = f"{100 * band.inside:.0f} % of the samples lie inside the band."
-    if not band.model_limits:
-        return f"{inside} The noise and the uncertainty of the parameters explain the error."
-    ratio = number(band.model_error / band.noise)
-    return f"{inside} The model limits the prediction, not the noise: its error is {ratio} times the noise."
+    """Compare the error with the expected one, which the error on the fitted logs need not make small."""
+    inside = f"{100 * band.inside:.0f} % of the samples lie inside the band"
+    error, expected = f"{degrees(band.error):.2g}°", f"{degrees(band.expected):.2g}°"
+    than = f"than the fitted logs lead to expect ({expected})"
+    if band.model_limits:
+        return f"{inside}. The error ({error}) is clearly larger {than}: the model limits the prediction."
+    larger = "no larger" if band.error <= band.expected else "not clearly larger"
+    return f"{inside}: the error ({error}) is {larger} {than}."

@@ -9,7 +9,7 @@ from hydroid.problem.problem import Problem
 from hydroid.reporting.arm_picture import arm_picture
 from hydroid.reporting.page import Light, Verdict
 from hydroid.reporting.phrases import listed
-from hydroid.reporting.quantities_report import quantity_table
+from hydroid.reporting.quantities_report import known_quantities
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
 
@@ -23,14 +23,18 @@ def fit_verdict(problem: Problem, fit: Fit) -> Verdict:
     rms = f"{math.degrees(fit.best.rms):.2g}"
     prediction = f"Reproduces {logs} with an error of {rms}° rms."
     known, free = known_count(fit)
-    determined = len(quantity_table(fit.quantities).rows)
-    parameters = f"{known} of {free} parameters are known to 30 % or better"
-    if determined:
-        parameters += f", and {determined} quantities that follow from all of them together"
+    percent = f"{100 * WEAK_ABOVE:.0f} %"
+    parameters = f"{known} of {free} parameters are known with a standard deviation of {percent} or less."
+    if determined := known_quantities(fit.quantities):
+        follow = "quantity that follows" if determined == 1 else "quantities that follow"
+        has = "has" if determined == 1 else "have"
+        parameters += (
+            f" {determined} {follow} from all of them together {has} a 95 % interval within ±{percent}."
+        )
     pose = problem.logs[0].start
     lights = (_converged(fit), _validated(), *uncertainty_lights(problem, fit.uncertainty))
     picture = arm_picture(problem.settings.arm, pose, problem.settings.outputs)
-    return Verdict(prediction, f"{parameters}.", lights, picture)
+    return Verdict(prediction, parameters, lights, picture)
 
 
 def known_count(fit: Fit) -> tuple[int, int]:
@@ -52,7 +56,7 @@ def _validated() -> Light:
 
 
 def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Light]:
-    """Return the lights for identifiable, and at bounds."""
+    """Return the lights for identifiable, and away from bounds."""
     status = dict(zip(problem.parameters.names, known.status, strict=True))
     lost = [name for name, s in status.items() if s.flag in (Flag.UNIDENTIFIABLE, Flag.NO_EFFECT)]
     weak = [name for name, s in status.items() if s.flag is Flag.WEAK]
@@ -61,13 +65,13 @@ def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Lig
     if lost:
         first = Light(question, "bad", f"Not from these logs: {_some(lost)}.")
     elif weak:
-        first = Light(question, "fair", f"Only to 30–100 %: {_some(weak)}.")
+        first = Light(question, "fair", f"Weakly: {_some(weak)} (standard deviation 30 to 100 %).")
     else:
         first = Light(question, "good", "Yes: every free parameter.")
     if at:
-        words = f"{_some(at)}: widen the bounds, or the model lacks something."
-        return first, Light("At bounds", "bad", words)
-    return first, Light("At bounds", "good", "No parameter.")
+        words = f"All but {_some(at)}: widen the bounds, or the model lacks something."
+        return first, Light("Away from bounds", "bad", words)
+    return first, Light("Away from bounds", "good", "All parameters.")
 
 
 def _some(names: list[str]) -> str:

@@ -161,7 +161,7 @@ def test_lights_name_what_is_not_known_and_what_lies_at_a_bound():
     assert lights["Converged"].state == "good"
     assert lights["Validated on unseen logs"].state == "open"
     assert (lights["Identifiable"].state, "M1" in lights["Identifiable"].answer) == ("bad", True)
-    assert lights["At bounds"].state == "good"
+    assert lights["Away from bounds"].state == "good"
 
 
 def test_svg_figures_are_well_formed_and_undated(written):

@@ -170,7 +170,7 @@ def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncert
     page = suggestion_page(problem, result, "here")
     assert "Freeing delay would lower the rms error" in page.lead
     write_page(page, tmp_path)
-    assert "delay: {quantity: delay" in (tmp_path / "suggestions.html").read_text(encoding="utf-8")
+    assert "parameters.delay={quantity: delay" in (tmp_path / "suggestions.html").read_text(encoding="utf-8")
     content = suggestion_content(result)
     assert content["missing"][0]["name"] == "delay"
     assert len(content["actions"]) == len(result.actions)

@@ -137,6 +137,9 @@ class FitSummary(Settings):
         return self.model_dump(mode="json", by_alias=True)
 
 
+_GIVE = "give the run folder, its estimate.yaml, or a YAML file of values by name"
+
+
 def write_estimate(folder: Path, summary: FitSummary) -> None:
     """Write `estimate.yaml`.
 
@@ -190,11 +193,18 @@ def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:
         SettingsError: the file cannot be read, or is no mapping.
     """
     file = estimate_file(source)
-    content, _ = read_yaml(file)
+    try:
+        content, _ = read_yaml(file)
+    except SettingsError:
+        if file.suffix in (".yaml", ".yml", ".json") or not is_file(file):
+            raise
+        raise SettingsError("is no estimate", where=str(file), hint=_GIVE) from None
     if "estimate" in content:
         summary = read_estimate(file)
         return dict(summary.values), summary
     values = content.get("parameters", content)
+    if isinstance(values, dict) and any(isinstance(value, dict) for value in values.values()):
+        raise SettingsError("these are settings, not an estimate", where=str(file), hint=_GIVE)
     if not isinstance(values, dict):
         raise SettingsError("parameters must be a mapping", where=str(file), hint="write `K: 0.2` lines")
     return values, None

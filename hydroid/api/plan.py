@@ -64,7 +64,10 @@ def run_logs(model: ModelSource) -> list[Path]:
     """Logs that a run folder was fitted to."""
     source = Path(model.source).parent if isinstance(model, IdentifiedModel) else Path(model)
     if not is_file(source / "run.json"):
-        raise SettingsError("no log is given", hint="name at least one, or the run folder of a fit")
+        raise SettingsError(
+            "no log is given",
+            hint="name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit",
+        )
     from hydroid.run.folder import RunFolder
 
     logs = [Path(name) for name in RunFolder(source).identity().get("logs", {})]

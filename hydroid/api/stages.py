@@ -10,8 +10,10 @@ from hydroid.api.fit import FitResult, Silent, fit
 from hydroid.api.look import load_settings, read_with_findings
 from hydroid.api.mechanics import with_mechanics
 from hydroid.api.study import Study
+from hydroid.assets import find_config
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import read_values
+from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:
@@ -79,7 +81,10 @@ def fit_mech(
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
-    return _fit_files(logs, out, config, dict(overrides or {}), options)
+    changes = dict(overrides or {})
+    if logs:
+        _refuse_other_stage(config, changes, "mech")
+    return _fit_files(logs, out, config, changes, options)
 
 
 def fit_hyd(
@@ -109,6 +114,7 @@ def fit_hyd(
     """
     changes = dict(overrides or {})
     if logs:
+        _refuse_other_stage(config, changes, "hyd")
         changes = with_mechanics(mech, config, changes, [Path(log).name for log in logs])
     return _fit_files(logs, out, config, changes, options)
 
@@ -176,6 +182,15 @@ def _fit_files(
     return FitRuns(folder, tuple(results), _spread(folder, results) if several else None)
 
 
+def _refuse_other_stage(config: str | Path, overrides: Mapping[str, Any], stage: str) -> None:
+    """Refuse settings of the other stage."""
+    own, _ = read_yaml(find_config(config))
+    given = overrides.get("stage", own.get("stage", "mech"))
+    if given != stage and given in ("mech", "hyd"):
+        what = f"has stage: {given}, but hydroid fit-{stage} needs stage: {stage}"
+        raise SettingsError(what, where=str(config), hint=f"use hydroid fit-{given}, or another --config")
+
+
 def _started(settings: FitSettings, start: Path) -> dict[str, Any]:
     """Return overrides that start the free parameters at the values of an estimate, which must have one."""
     values, _ = read_values(start)
@@ -211,7 +226,10 @@ def _own_inputs(
 ) -> tuple[list[Path], FitSettings]:
     """The logs and settings of a run that is resumed by its folder alone."""
     if not options.resume or out is None:
-        raise SettingsError("no log is given", hint="name at least one, or the folder of a run to resume")
+        raise SettingsError(
+            "no log is given",
+            hint="name one, as in hydroid fit-mech LOG.csv, or continue a run with --resume --out RUN",
+        )
     if options.runs > 1:
         raise SettingsError("several runs are resumed with their logs named", where=str(out))
     from hydroid.run.folder import RunFolder

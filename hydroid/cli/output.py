@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import re
 import sys
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
@@ -26,6 +27,9 @@ FLAGS = {
     "design.criterion": "--criterion",
 }
 """settings that have an option of their own"""
+
+PYMOO = "search.pymoo.algorithm"
+"""setting whose values --algorithm gives as pymoo:NAME"""
 
 FORMER_OPTIONS = {"--gif": "`hydroid render RUN -o arm.gif`"}
 """options of earlier versions, and what became of them"""
@@ -98,7 +102,8 @@ def _in_flags(error: "HydroidError") -> tuple[str, str]:
     key = error.where.removeprefix("--set ")
     flag = FLAGS.get(key, "")
     if flag and any(a == flag or a.startswith(f"{flag}=") for a in sys.argv[1:]):
-        return flag, error.what.removeprefix(f"{key}: ")
+        what = error.what.removeprefix(f"{key}: ")
+        return flag, re.sub(r"'(\w+)'", r"pymoo:\1", what) if key == PYMOO else what
     return error.where, error.what
 
 

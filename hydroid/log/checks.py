@@ -89,7 +89,8 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[Finding]:
         return
     duration = time[-1] - time[0] if len(time) else 0.0
     if len(time) < 2 or duration < settings.shortest_s:
-        what = f"holds {len(time)} samples over {duration:.6g} s, fewer than {settings.shortest_s:g} s"
+        samples = "1 sample" if len(time) == 1 else f"{len(time)} samples"
+        what = f"lasts {duration:.6g} s ({samples}); at least {settings.shortest_s:g} s is needed"
         hint = "give a longer log, set log.time.unit if it is wrong, or lower log.shortest_s"
         hint = time_hint(recording, sample_period(time)) or hint
         yield recording.finding("error", what, hint, kind="duration")

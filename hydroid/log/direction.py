@@ -57,9 +57,9 @@ def direction_findings(log: Log, column: Callable[[int], str]) -> list[Finding]:
     if not found:
         return []
     share = ", ".join(f"{d.against:.0%} of {d.travel:.3g} deg" for d in found.values())
-    what = f"angle of {numbered([*found])} moves against the command ({share})"
+    what = f"angle of {numbered([*found])} moves against the command (for {share} of travel)"
     first = next(iter(found))
-    hint = f"set a negative scale, log.joints.{first}.command.scale: -1, if it is logged the other way around"
+    hint = f"if the command is logged with the opposite sign, set log.joints.{first}.command.scale: -1"
     return [Finding("warning", what, log.source, hint, column=column(first), kind="direction")]
 
 
@@ -73,6 +73,6 @@ def disagreements(logs: Sequence[Log]) -> list[Finding]:
         if turned and others:
             odd = min(turned, others, key=len)
             what = f"joint {joint} moves against its command in {len(turned)} of {len(turned + others)} logs"
-            hint = "the sign of the logging has changed: mend these logs, or give them settings of their own"
+            hint = "the sign of the command or the angle differs between the logs: correct it in these logs"
             findings.append(Finding("warning", what, odd[0], hint, kind="directions differ"))
     return findings

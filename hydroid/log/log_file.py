@@ -116,6 +116,8 @@ def _mapping_faults(
         if joint > joints
     ] + [
         Finding("error", f"output joint {joint} has no angle column", source, hint)
+        if joint <= joints
+        else Finding("error", f"outputs: there is no joint {joint}; the arm has joints 1 to {joints}", source)
         for joint in outputs
         if joint not in measured
     ]

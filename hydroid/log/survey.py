@@ -42,8 +42,8 @@ def motion_findings(log: Log) -> list[Finding]:
     stops = {j: seconds for j, seconds in stops.items() if seconds >= AT_STOP}
     if stops:
         parts = ", ".join(f"joint {j} for {seconds:.3g} s" for j, seconds in stops.items())
-        what = f"pushed on at the end of its travel: {parts}"
-        hint = "this time tells of the stop and the pump, not of the valve; the arm's range should end there"
+        what = f"is driven against the end of its travel: {parts}"
+        hint = "this time says nothing about the valve; the joint's range in the arm's file should end there"
         findings.append(Finding("note", what, log.source, hint, kind="at a stop"))
     first = int(np.argmax(log.command.any(axis=1)))
     if log.driven.any() and first * log.period < REST:
@@ -69,8 +69,9 @@ def survey(logs: Sequence[Log]) -> list[Finding]:
     source = logs[0].source if len(logs) == 1 else f"{len(logs)} logs"
     if gaps:
         more = f"; and of {len(gaps) - _MAX_LISTED} more joints" if len(gaps) > _MAX_LISTED else ""
-        what = f"no command [%] of {'; '.join(gaps[:_MAX_LISTED])}{more}: the valve curve is open there"
-        hint = "add logs with such commands, or hold the parameters of the curve"
+        where = f"{'; '.join(gaps[:_MAX_LISTED])}{more}"
+        what = f"no command [%] of {where}: nothing is known about the valve curve there"
+        hint = "add logs with such commands, or keep the parameters of the curve fixed"
         findings.append(Finding("note", what, source, hint, kind="open valve curve"))
     if one_way:
         what = f"never commanded: {', '.join(one_way)}"

@@ -82,7 +82,20 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
         if not isinstance(error, yaml.YAMLError):
             deep = isinstance(error, RecursionError)
             problem = "it is nested too deeply" if deep else "a value does not fit its type"
-        raise SettingsError(f"is not YAML ({problem})", where=where) from None
+        raise SettingsError(f"is not YAML: {_plainly(str(problem))}", where=where) from None
+
+
+def _plainly(problem: str) -> str:
+    """Say in plain words what the YAML reader stumbled over."""
+    if problem.startswith("mapping values are not allowed"):
+        return "there is a second ': ' in this line, or the line is indented too far"
+    if "\\t" in problem:
+        return "a line is indented by a tab; use spaces"
+    if problem.startswith("expected ',' or ']'"):
+        return "a list [a, b] is not closed with ']'"
+    if problem.startswith("expected ',' or '}'"):
+        return "a mapping {a: 1} is not closed with '}'"
+    return problem
 
 
 def _collect_lines(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> None:

@@ -131,7 +131,9 @@ def validate(
             (o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), ""
         )
         where = f"--set {at}" if at else source + _line(loc, lines or {})
-        raise SettingsError(what.removeprefix(f"{at}: "), where=where, hint=hint) from None
+        for name in (at, key) if at.startswith(f"{key}.") else (at,):
+            what = what.removeprefix(f"{name}: ")
+        raise SettingsError(what, where=where, hint=hint) from None
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -174,7 +176,9 @@ def _explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
         allowed = _allowed(kind, fault["loc"][:-1])
         near = difflib.get_close_matches(name, allowed, n=1)
         choice = f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(allowed)}"
-        choice = f"it {FORMER[name]}" if name in FORMER else choice if allowed else ""
+        choice = choice if allowed else ""
+        if name in FORMER and not (near and FORMER[name].startswith("was removed")):
+            choice = f"it {FORMER[name]}"
         return f"unknown setting {_shown(key)}" + (f"; {choice}" if choice else "")
     if fault["type"] == "missing":
         return f"setting {key!r} is missing"

@@ -104,9 +104,10 @@ def prior(machine: Machine, parameter: ParameterSettings) -> Prior | None:
         return None
     nominal = nominal_value(machine, parameter)
     if nominal is None:
+        word = "sd" if parameter.within is None else "within"
         raise ValueError(
-            f"a prior on {parameter.quantity} needs nominal: value; neither `hydraulics` nor the arm's file "
-            "has one for all its joints"
+            f"{word}: needs a nominal value; the settings and the arm's file have none for this "
+            f"{parameter.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
         )
     if parameter.bounds is not None and not parameter.bounds[0] <= nominal <= parameter.bounds[1]:
         raise ValueError(f"the nominal value {nominal:g} {parameter.unit} lies outside the bounds")

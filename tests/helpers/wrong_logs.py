@@ -137,7 +137,7 @@ WRONG = (
     Wrong(
         "a command wired the other way",
         "warning",
-        "angle of joint 2 moves against the command (100% of",
+        "angle of joint 2 moves against the command (for 100% of",
         lambda: of("u2", np.negative),
     ),
     Wrong(
@@ -204,11 +204,11 @@ WRONG = (
     Wrong(
         "a joint that is pushed against its stop",
         "note",
-        "pushed on at the end of its travel: joint 2 for",
+        "driven against the end of its travel: joint 2 for",
         lambda: [boom([60, -60, 100, -100], seconds=8)],
     ),
     Wrong(
-        "constant duties with gaps",
+        "constant command levels with gaps",
         "note",
         "joint 2 between 40 and 60",
         lambda: [boom([40, 60, 80, -40, -60, -80])],

@@ -89,7 +89,7 @@ def test_a_fault_in_many_rows_is_one_finding_that_counts_them(tmp_path: Path) ->
         (lambda t: np.delete(t, np.s_[30:60], axis=0), 32, "cut the log into two"),
         (lambda t: np.insert(t, 30, t[29], axis=0), 32, "does not increase"),
         (lambda t: t[::-1], 3, "does not increase"),
-        (lambda t: t[:20], None, "fewer than 0.5 s"),
+        (lambda t: t[:20], None, "at least 0.5 s is needed"),
         (lambda t: t[:0], None, "0 samples"),
         (lambda t: t * [1000, 1, 1, 1, 1], None, "log.time.unit"),
         (lambda t: t * [0.001, 1, 1, 1, 1], None, "log.time.unit"),

@@ -201,3 +201,11 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, mes
     path.write_text(NAMED.replace(old, new))
     with pytest.raises(SettingsError, match=message):
         Stage(hydroid.load_settings(path))
+
+
+def test_a_removed_setting_near_another_is_a_misspelling_and_a_column_is_named_once(tmp_path: Path):
+    path = written(tmp_path, MINIMAL + "parameter: {}\n")
+    with pytest.raises(SettingsError, match=r"unknown setting 'parameter'; did you mean 'parameters'\?"):
+        load(path, FitSettings)
+    with pytest.raises(SettingsError, match=r"^--set log\.angle\.column: column 'foo' is meant"):
+        load(written(tmp_path, MINIMAL), FitSettings, {"log.angle.column": "foo"})

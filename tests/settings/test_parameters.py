@@ -25,7 +25,7 @@ def test_nominal_values_come_from_the_arm_and_the_hydraulics():
     assert parameter(name="A", quantity="onset_a", joints=[2], sd=0.2).start == 1.4
     # joints 2 and 3 agree, joint 1 does not
     assert parameter(quantity="area_a", joints=[2, 3], within=2).start == 1000
-    with pytest.raises(SettingsError, match=r"parameters.A_A: a prior on area_a needs nominal"):
+    with pytest.raises(SettingsError, match=r"parameters.A_A: within: needs a nominal value"):
         parameter(quantity="area_a", joints=[1, 2], within=2)
     own = parameter(quantity="area_a", joints=[1, 2], nominal=700, within=2)
     assert own.start == 700

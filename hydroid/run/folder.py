@@ -106,9 +106,6 @@ class RunFolder:
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
-            if isinstance(error, FileNotFoundError) and self.path.is_dir():
-                hint = "name a folder that a fit has made"
-                raise RunError("holds no run", where=str(self.path), hint=hint) from None
             what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
             raise RunError(what, where=str(file), hint="name a folder that a fit has made") from None
         hashes = [content.get(key, {}) for key in ("logs", "files")] if isinstance(content, dict) else [None]

@@ -55,7 +55,7 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
     page = validation_page([Validation("one", log, response, indices, {2: band})])
     (verdict,) = page.sections[1].points
-    assert ("The model limits the prediction" in verdict) is limits
+    assert ("is clearly larger than the fitted logs" in verdict) is limits
 
 
 def test_values_that_no_fit_gave_have_no_band(fitted):

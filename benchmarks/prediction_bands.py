@@ -14,7 +14,7 @@ import numpy as np
 from hydroid import load_settings
 from hydroid.estimate import FitSummary
 from hydroid.fitting.refinement import refine
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem

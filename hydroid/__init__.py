@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from hydroid.api.studies import study as study
     from hydroid.api.study import Study as Study
     from hydroid.errors import HydroidError as HydroidError
-    from hydroid.identified import IdentifiedModel as IdentifiedModel
-    from hydroid.identified import identified as identified
-    from hydroid.identified import load_identified as load_identified
-    from hydroid.identified import start_values as start_values
+    from hydroid.identified_model import IdentifiedModel as IdentifiedModel
+    from hydroid.identified_model import identified as identified
+    from hydroid.identified_model import load_identified as load_identified
+    from hydroid.identified_model import start_values as start_values
     from hydroid.log import Log as Log
     from hydroid.log import write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
@@ -82,7 +82,7 @@ _NAMES = {
     "hydroid.api.studies": "StudyOptions article study",
     "hydroid.api.study": "Study",
     "hydroid.errors": "HydroidError",
-    "hydroid.identified": "IdentifiedModel identified load_identified start_values",
+    "hydroid.identified_model": "IdentifiedModel identified load_identified start_values",
     "hydroid.log": "Log write_log",
     "hydroid.parallel.cluster": "open_workers",
     "hydroid.plant": "Plant load_plant",

@@ -9,7 +9,7 @@ import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
-from hydroid.identified import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.problem import make_simulation

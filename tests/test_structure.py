@@ -1,4 +1,4 @@
-"""Data walks one way: no room imports one that stands after it."""
+"""Data goes one way: no package imports one that stands after it."""
 
 import ast
 from pathlib import Path
@@ -7,12 +7,12 @@ import pytest
 
 ROOT = Path(__file__).parents[1] / "hydroid"
 
-# a room may import rooms of a lower layer, and itself
+# a package may import packages of a lower layer, and itself
 LAYERS = [
     {"errors"},
     {"assets", "files", "parameters", "progress", "settings"},
     {"estimate"},
-    {"identified"},
+    {"identified_model"},
     {"log", "arm", "hydraulics"},
     {"simulation", "search", "parallel", "cad"},
     {"problem"},
@@ -30,15 +30,15 @@ LAYERS = [
     {"cli"},
     {"__init__", "__main__"},
 ]
-LEVEL = {room: level for level, rooms in enumerate(LAYERS) for room in rooms}
+LEVEL = {package: level for level, packages in enumerate(LAYERS) for package in packages}
 FILES = sorted(ROOT.rglob("*.py"))
 
 
-def room(path: Path) -> str:
+def package(path: Path) -> str:
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
-def imported_rooms(path: Path) -> set[str]:
+def imported_packages(path: Path) -> set[str]:
     tree = ast.parse(path.read_text())
     names: set[str] = set()
     for node in ast.walk(tree):
@@ -51,31 +51,31 @@ def imported_rooms(path: Path) -> set[str]:
     return {name.split(".")[1] for name in names if name.startswith("hydroid.")} & LEVEL.keys()
 
 
-def test_every_file_belongs_to_a_room():
-    assert {room(path) for path in FILES} <= LEVEL.keys()
+def test_every_file_belongs_to_a_package():
+    assert {package(path) for path in FILES} <= LEVEL.keys()
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_no_upward_import(path: Path):
-    here = room(path)
-    upward = {other for other in imported_rooms(path) if LEVEL[other] > LEVEL[here]}
-    beside = {other for other in imported_rooms(path) if LEVEL[other] == LEVEL[here] and other != here}
+    here = package(path)
+    upward = {other for other in imported_packages(path) if LEVEL[other] > LEVEL[here]}
+    beside = {other for other in imported_packages(path) if LEVEL[other] == LEVEL[here] and other != here}
     assert not upward, f"{here} imports {upward}"
-    # within a layer rooms do not know each other, but for the small ones at the bottom
+    # within a layer packages do not know each other, but for the small ones at the bottom
     assert not beside or LEVEL[here] <= 1, f"{here} imports its neighbour {beside}"
 
 
 def test_the_search_knows_no_robot():
     allowed = {"errors", "settings", "search"}
     for path in (ROOT / "search").glob("*.py"):
-        assert imported_rooms(path) <= allowed, path
+        assert imported_packages(path) <= allowed, path
         text = path.read_text()
         assert "mujoco" not in text, path
 
 
 def test_the_workers_know_no_robot():
     for path in (ROOT / "parallel").glob("*.py"):
-        assert imported_rooms(path) <= {"errors", "settings", "parallel"}, path
+        assert imported_packages(path) <= {"errors", "settings", "parallel"}, path
 
 
 def test_the_command_line_imports_nothing_heavy():

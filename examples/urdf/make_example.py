@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 import hydroid
-from hydroid.identified import identified
+from hydroid.identified_model import identified
 from hydroid.log import Log
 
 SIZES = {"swing": (0.6, 0.5, 0.4), "boom": (1.8, 0.15, 0.25), "stick": (1.4, 0.12, 0.18)}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hydroid.api.look import read_logs
 from hydroid.errors import RunError, SettingsError, Stopped
 from hydroid.estimate import FitSummary
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:

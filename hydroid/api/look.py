@@ -10,7 +10,7 @@ import numpy as np
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.identified import IdentifiedModel, load_identified
+from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 

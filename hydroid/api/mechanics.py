@@ -8,7 +8,7 @@ from hydroid.assets import find_config
 from hydroid.errors import SettingsError
 from hydroid.estimate import estimate_file, read_values
 from hydroid.files import is_file
-from hydroid.identified import ARM, CONFIG
+from hydroid.identified_model import ARM, CONFIG
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
 from hydroid.settings.problem import MECHANICAL_UNITS

@@ -10,7 +10,7 @@ from hydroid.api.look import ModelSource, open_model, require_hydraulics
 from hydroid.api.plan import run_logs
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.progress import Progress, no_progress
 

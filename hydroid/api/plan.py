@@ -10,7 +10,7 @@ from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import write_log
 from hydroid.progress import Progress, no_progress
 

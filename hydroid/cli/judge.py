@@ -12,7 +12,7 @@ from hydroid.cli.output import rows, show
 from hydroid.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from hydroid.identified import IdentifiedModel
+    from hydroid.identified_model import IdentifiedModel
     from hydroid.quantities.band import Band
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
     from hydroid.reporting.validation_report import Validation
@@ -50,7 +50,7 @@ def validate(
 ) -> None:
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots."""
     from hydroid.api.judge import validate
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
 
     models = [load_identified(path, overrides=overrides(setting)) for path in fit]
     study = validate(models, logs, out, repair=repair, leave_one_out=leave_one_out)
@@ -98,7 +98,7 @@ def identifiability(
     """
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
-    from hydroid.identified import load_identified, start_values
+    from hydroid.identified_model import load_identified, start_values
     from hydroid.reporting.phrases import direction_phrases
 
     default, changes = f"fit-{stage.value}", overrides(setting)
@@ -188,7 +188,7 @@ def surface(
 
 
 def _model(estimate: Estimate) -> "IdentifiedModel":
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
 
     return load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
 

@@ -42,7 +42,7 @@ def simulate(
     from hydroid.api.arms import read_arms, simulate_arms
     from hydroid.api.model import simulate
     from hydroid.errors import SettingsError
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
 
     target = out or Path("runs") / f"{commands.stem}-simulated.csv"
     if target.resolve() == commands.resolve():

@@ -21,7 +21,7 @@ from hydroid.cli.progress import Progress
 
 if TYPE_CHECKING:
     from hydroid.arm.collision import Clearance
-    from hydroid.identified import IdentifiedModel
+    from hydroid.identified_model import IdentifiedModel
 
 Source = typer.Argument(
     metavar="RUN|LOG.csv", help="A run folder, whose first log drives the arm; or a log, with --fit."

@@ -12,7 +12,7 @@ from hydroid.cli import stopping
 from hydroid.cli.output import log_lines
 
 if TYPE_CHECKING:
-    from hydroid.identified import IdentifiedModel
+    from hydroid.identified_model import IdentifiedModel
 
 Logs = Annotated[
     list[Path],
@@ -117,7 +117,7 @@ class NominalEstimate:
 
 def nominal_model(estimate: NominalEstimate, output: Output) -> "IdentifiedModel":
     """Return the model that the options name, and say which values are nominal."""
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
 
     changes = overrides(estimate.setting)
     model = load_identified(estimate.fit, estimate.config, changes, default="fit-hyd", nominal=True)

@@ -30,7 +30,7 @@ def suggest(
     to a new experiment, how much each would reduce the uncertainty.
     """
     from hydroid.api.plan import suggest
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
     from hydroid.reporting.suggestion_report import suggestion_content
 
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
@@ -80,7 +80,7 @@ def design(
     """
     from hydroid.api.look import read_logs
     from hydroid.api.plan import design
-    from hydroid.identified import load_identified
+    from hydroid.identified_model import load_identified
 
     driven = None if joints is None else [int(n) if n.isdigit() else n for n in names(joints)]
     flags = {"design.duration_s": duration, "design.criterion": criterion, "design.joints": driven}

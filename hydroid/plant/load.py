@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hydroid.errors import SettingsError
-from hydroid.identified import load_identified
+from hydroid.identified_model import load_identified
 from hydroid.plant.plant import Plant
 
 

@@ -15,7 +15,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.hydraulics.actuator import ActuatorState
 from hydroid.hydraulics.records import JOINT_STATE, drawing_values, has_force_curve
-from hydroid.identified import IdentifiedModel, write_settings
+from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.problem.stage import Stage
 from hydroid.simulation.hydraulic import ArmActuators
 from hydroid.simulation.rollout import HydraulicArm, SingleArm, compile_rollout

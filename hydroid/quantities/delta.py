@@ -16,7 +16,7 @@ from scipy.stats import norm as normal
 
 from hydroid.errors import RunError
 from hydroid.estimate import Covariance
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
 from hydroid.uncertainty.covariance import COVERAGE, NULL_COMPONENT, RANK_TOLERANCE, Uncertainty
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE

@@ -10,7 +10,7 @@ import numpy as np
 
 from hydroid.estimate import finite
 from hydroid.fitting.validation import ErrorIndices
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.quantities.band import Band

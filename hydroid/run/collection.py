@@ -11,7 +11,7 @@ from typing import Any
 
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, NamedEstimate, read_estimate
-from hydroid.identified import ARM, CONFIG
+from hydroid.identified_model import ARM, CONFIG
 from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings

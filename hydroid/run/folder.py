@@ -19,7 +19,7 @@ from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState
-from hydroid.identified import CONFIG, IdentifiedModel, write_settings
+from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.problem.problem import Problem

@@ -13,7 +13,7 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.files import is_file
-from hydroid.identified import ARM, CONFIG, MODEL, portable
+from hydroid.identified_model import ARM, CONFIG, MODEL, portable
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings

@@ -17,7 +17,7 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import fit
-from hydroid.identified import IdentifiedModel, portable
+from hydroid.identified_model import IdentifiedModel, portable
 from hydroid.log import Log
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem

@@ -7,7 +7,7 @@ import numpy as np
 
 from hydroid.arm.machine import ALONE, Machine, load_machine
 from hydroid.errors import SettingsError
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.prediction import predict_log

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.identified import IdentifiedModel
+from hydroid.identified_model import IdentifiedModel
 from hydroid.plant import Plant
 from hydroid.viewer.film import add_ghost, place
 from hydroid.viewer.motion import Motion

@@ -9,7 +9,7 @@ from small_fits import TRUTH
 
 import hydroid
 from hydroid import load_settings
-from hydroid.identified import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem

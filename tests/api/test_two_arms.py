@@ -12,7 +12,7 @@ import hydroid
 from hydroid import load_settings
 from hydroid.cli.app import app
 from hydroid.errors import LogError, SettingsError
-from hydroid.identified import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.two_arms import columns_of

@@ -14,7 +14,7 @@ import hydroid
 from hydroid.api.mechanics import with_mechanics
 from hydroid.cli.app import GROUPS, app, main
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
-from hydroid.identified import write_settings
+from hydroid.identified_model import write_settings
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"

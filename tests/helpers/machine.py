@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import hydroid
-from hydroid.identified import identified
+from hydroid.identified_model import identified
 from hydroid.log import Log
 
 FACTORS = {"open_A": 1.3, "open_B": 0.8, "dead_A": 1.6, "dead_B": 2.2, "lag": 2.0, "size": 1.2, "D": 0.7}

@@ -10,7 +10,7 @@ from hydroid import fit, load_settings, read_logs
 from hydroid.arm.machine import load_machine
 from hydroid.arm.model import load_model
 from hydroid.errors import RunError, SettingsError
-from hydroid.identified import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.plant import Plant, load_plant
 from hydroid.problem.problem import make_simulation

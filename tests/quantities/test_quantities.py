@@ -9,7 +9,7 @@ from conftest import step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
-from hydroid.identified import IdentifiedModel, identified
+from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
 from hydroid.problem.stage import Stage
 from hydroid.quantities.bench import Bench, make_bench

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hydroid.errors import SettingsError
-from hydroid.identified import load_identified
+from hydroid.identified_model import load_identified
 from hydroid.problem.stage import Stage
 from hydroid.reporting.actuator_report import (
     JointActuator,

@@ -12,7 +12,7 @@ from conftest import step_log
 from PIL import Image
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.identified import IdentifiedModel, load_identified
+from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.settings.arm import Arm

@@ -1,13 +1,15 @@
 """An estimate with its settings is resolved in one way, and `estimate.yaml` comes back as it was written."""
 
+import pkgutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import hydroid
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, read_estimate, write_estimate
-from hydroid.identified import load_identified, start_values, write_settings
+from hydroid.identified_model import load_identified, start_values, write_settings
 from hydroid.problem.stage import Stage
 from hydroid.settings.arm import Arm
 
@@ -99,3 +101,9 @@ def test_an_estimate_comes_back_as_it_was_written(tmp_path: Path):
     write_estimate(tmp_path, summary)
     assert read_estimate(tmp_path / "estimate.yaml") == summary
     assert summary.plain()["schema"] == 1
+
+
+def test_no_public_name_is_a_module_too():
+    """Importing the module would put it in the place of the name."""
+    modules = {module.name for module in pkgutil.iter_modules(hydroid.__path__)}
+    assert not modules & set(hydroid.__all__)

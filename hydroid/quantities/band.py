@@ -37,6 +37,11 @@ class Band:
     expected: float
 
     @property
+    def exists(self) -> bool:
+        """Whether the parameters are known well enough for a band."""
+        return bool(np.isfinite(self.expected))
+
+    @property
     def model_error(self) -> float:
         """Rms error that neither noise nor parameters explain [rad]."""
         return float(np.sqrt(max(self.error**2 - self.expected**2, 0.0)))

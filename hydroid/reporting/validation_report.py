@@ -187,10 +187,14 @@ def _strip(results: Sequence[Validation]) -> Verdict:
     lights = [_seen_light(results)]
     if bands := [band for r in judged if r.fit == best for band in r.bands.values()]:
         outside = [band for band in bands if band.model_limits]
+        lacking = sum(not band.exists for band in bands)
         inside = f"{min(100 * band.inside for band in bands):.0f} %"
         if outside:
             words = f"No: in {len(outside)} of {len(bands)} responses the error is clearly larger."
             lights.append(Light(_EXPECTED, "fair", words))
+        elif lacking:
+            words = f"Not known: {lacking} of {len(bands)} responses have no band; the fit leaves them open."
+            lights.append(Light(_EXPECTED, "open", words))
         else:
             which = "" if len(bands) == 1 else "at least "
             words = f"Yes: {which}{inside} of the samples lie inside the band."
@@ -239,6 +243,8 @@ def _band_cells(band: Band) -> tuple[Cell, ...]:
 
 def _verdict(band: Band) -> str:
     """Compare the error with the expected one, which the error on the fitted logs need not make small."""
+    if not band.exists:
+        return f"The error is {degrees(band.error):.2g}°. There is no band: the fit leaves this angle open."
     inside = f"{100 * band.inside:.0f} % of the samples lie inside the band"
     error, expected = f"{degrees(band.error):.2g}°", f"{degrees(band.expected):.2g}°"
     than = f"than the fitted logs lead to expect ({expected})"

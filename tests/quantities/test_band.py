@@ -9,7 +9,7 @@ import hydroid
 from hydroid.fitting.validation import error_indices
 from hydroid.log import Log
 from hydroid.prediction import predict, simulate_log
-from hydroid.quantities.band import prediction_bands
+from hydroid.quantities.band import Band, prediction_bands
 from hydroid.reporting.validation_report import Validation, validation_page
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -81,3 +81,15 @@ def test_leaving_out_each_log_predicts_it(fitted):
     assert max(spread) < 5
     with pytest.raises(hydroid.errors.SettingsError, match="two logs"):
         hydroid.validate(model, logs[:1], None, leave_one_out=True)
+
+
+def test_without_a_band_nothing_is_called_as_expected(fitted):
+    settings, model = fitted
+    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
+    response = predict(model, log, settings.outputs)
+    band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf)
+    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
+    page = validation_page([Validation("one", log, response, indices, {2: band})])
+    assert page.sections[1].points[0].endswith("There is no band: the fit leaves this angle open.")
+    assert page.verdict is not None
+    assert [light.state for light in page.verdict.lights][-1] == "open"

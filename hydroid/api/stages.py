@@ -84,7 +84,7 @@ def fit_mech(
     changes = dict(overrides or {})
     if logs:
         _refuse_other_stage(config, changes, "mech")
-    return _fit_files(logs, out, config, changes, options)
+    return _fit_files("mech", logs, out, config, changes, options)
 
 
 def fit_hyd(
@@ -116,7 +116,7 @@ def fit_hyd(
     if logs:
         _refuse_other_stage(config, changes, "hyd")
         changes = with_mechanics(mech, config, changes, [Path(log).name for log in logs])
-    return _fit_files(logs, out, config, changes, options)
+    return _fit_files("hyd", logs, out, config, changes, options)
 
 
 def collect(runs: Sequence[str | Path], out: str | Path = "runs/collected") -> "Study[Collection]":
@@ -143,6 +143,7 @@ def collect(runs: Sequence[str | Path], out: str | Path = "runs/collected") -> "
 
 
 def _fit_files(
+    stage: str,
     logs: Sequence[str | Path],
     out: str | Path | None,
     config: str | Path,
@@ -159,6 +160,9 @@ def _fit_files(
             )
     else:
         logs, settings = _own_inputs(out, overrides, options)
+        if settings.stage != stage:
+            hint = f"use hydroid fit-{settings.stage}"
+            raise RunError(f"is a run of fit-{settings.stage}, not of fit-{stage}", where=str(out), hint=hint)
     folder = Path(out or Path("runs") / f"{Path(logs[0]).stem}-{settings.stage}-{settings.search.name}")
     read, findings = read_with_findings(logs, settings, repair=options.repair)
     results: list[FitResult] = []

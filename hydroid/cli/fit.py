@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Config, Folder, Output, Repair, Set, overrides
+from hydroid.cli.options import Config, DaskInsecure, Folder, Output, Repair, Set, overrides
 from hydroid.cli.output import rows, show
 
 if TYPE_CHECKING:
@@ -82,13 +82,7 @@ class FitFlags:
             "the workers of the Dask scheduler at ADDRESS. The result is the same.",
         ),
     ] = None
-    dask_insecure: Annotated[
-        bool,
-        typer.Option(
-            "--dask-insecure",
-            help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.",
-        ),
-    ] = False
+    dask_insecure: DaskInsecure = False
     workers: Annotated[str | None, typer.Option("--workers", hidden=True, callback=_renamed)] = None
     setting: Set = None
     repair: Repair = False

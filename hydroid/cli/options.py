@@ -58,6 +58,13 @@ Repair = Annotated[
     ),
 ]
 
+DaskInsecure = Annotated[
+    bool,
+    typer.Option(
+        "--dask-insecure",
+        help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.",
+    ),
+]
 Arm = Annotated[
     str | None,
     typer.Option(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hydroid.cli.options import Folder, Output
+from hydroid.cli.options import DaskInsecure, Folder, Output
 from hydroid.cli.output import show
 
 if TYPE_CHECKING:
@@ -39,13 +39,7 @@ class StudyFlags:
             help="Run on the workers of a Dask scheduler instead. The result is the same.",
         ),
     ] = None
-    dask_insecure: Annotated[
-        bool,
-        typer.Option(
-            "--dask-insecure",
-            help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.",
-        ),
-    ] = False
+    dask_insecure: DaskInsecure = False
 
     def options(self, progress: "Progress") -> "StudyOptions":
         """Return them as the function's options."""

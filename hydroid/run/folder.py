@@ -146,11 +146,13 @@ class RunFolder:
             return ""
         self.status("interrupted")
         checkpoint = self.checkpoint()
-        if checkpoint is None:
+        if checkpoint is not None:
+            after = f"{len(checkpoint.state.history)} generations"
+        elif started := len(self.refinements()):
+            after = f"{started} started refinement{'s' if started > 1 else ''}"
+        else:
             return f"{self.path} holds no checkpoint yet, and resuming begins again"
-        return (
-            f"{self.path} holds a checkpoint after {len(checkpoint.state.history)} generations to resume from"
-        )
+        return f"{self.path} holds a checkpoint after {after} to resume from"
 
     def save(self, state: SearchState, memo: Memo) -> None:
         """Write the checkpoint; the one before it is kept (see `checkpoint`)."""

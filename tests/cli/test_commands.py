@@ -127,6 +127,8 @@ def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, tmp_path: Path):
     assert "--resume" in errors
     assert json.loads((tmp_path / "parts" / "run.json").read_text())["status"] == "interrupted"
     hydroid(*arguments, "--out", "parts", cwd=tmp_path, code=2)  # not twice by mistake
+    other = hydroid("fit-hyd", "--resume", "--out", "parts", cwd=tmp_path, code=2)
+    assert "is a run of fit-mech, not of fit-hyd" in other.stderr
     hydroid("fit-mech", "--resume", "--out", "parts", "--quiet", cwd=tmp_path)
     for name in ("history.csv", "estimate.yaml", "pareto.csv", "tables/parameters.csv"):
         assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

@@ -209,6 +209,15 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
+def test_a_fit_stopped_in_a_refinement_says_that_it_kept_one(made, tmp_path):
+    settings, _arm, path, _ = made
+    folder = RunFolder(tmp_path)
+    folder.begin(settings, read_logs([path], settings))
+    assert "holds no checkpoint yet" in folder.interrupt()
+    folder.refinements()["start 1"] = {"point": np.zeros(2)}
+    assert folder.interrupt() == f"{tmp_path} holds a checkpoint after 1 started refinement to resume from"
+
+
 def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
     settings, _arm, path, _ = made
     (tmp_path / "file").write_text("")

@@ -1,6 +1,10 @@
 """Does `hydroid suggest` name what a model lacks, and is it silent where it lacks nothing?
 
-    python benchmarks/suggest_study.py [--logs 20] [--seconds 15] [--only delay none]
+    python benchmarks/suggest_study.py [--logs 20] [--only delay none] [--results runs/suggest_study.jsonl]
+
+Each log appends one line to the results; a log that has one is not repeated, so the study can be stopped and
+continued, and processes of different terms may share the file. The table is of all that the file holds: after
+a change of the code, begin a new file.
 
 Stage 2 of the shoulder: areas and openings of both sides, the damping and the third link's mass are free,
 with the priors of configs/fit-hyd.yaml, and all else is held at the truth. Each log is simulated with one
@@ -12,9 +16,12 @@ named where the verdict is to free it, on one side or both. It is first where no
 """
 
 import argparse
+import json
 import time
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +36,7 @@ from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import HydraulicSimulation
-from hydroid.suggestion.missing import MissingTerms, missing_terms
+from hydroid.suggestion.missing import missing_terms
 from hydroid.uncertainty.covariance import uncertainty
 
 NOISE = np.deg2rad(0.1)
@@ -37,8 +44,6 @@ REST = 100
 """samples without a command at the start"""
 FIRST_SEED = 100
 """of the logs of each case; those below 100 were used while the test was written"""
-EVERY = 5
-"""logs of each case after which the table is printed"""
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "open_A": 0.4, "open_B": 0.4, "D": 150.0, "M3": 22.5}
 QUANTITIES = {"A_A": "area_a", "A_B": "area_b", "open_A": "opening_a", "open_B": "opening_b"}
 WITHIN = {"area_a": 1.5, "area_b": 1.5, "opening_a": 2.0, "opening_b": 2.0}
@@ -103,39 +108,9 @@ def largest_flow(truth: FitSettings, log: Log) -> float:
     return 6e4 * float(np.quantile(np.maximum(flow[:, 0], -flow[:, 1]), 0.99))
 
 
-@dataclass
-class Tally:
-    """Counts over the logs of one case."""
-
-    logs: int = 0
-    named: int = 0
-    first: int = 0
-    anything: int = 0
-    others: Counter[str] = field(default_factory=Counter[str])
-    rms: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
-
-    def add(self, case: str, result: MissingTerms) -> None:
-        """Count the result of one log."""
-        quantities = [test.term.settings.quantity for test in result.free]
-        mine = [q.removesuffix("_a").removesuffix("_b") == case for q in quantities]
-        least = [t.rms for t in result.tests if t.term.settings.quantity == case] or [np.nan]
-        self.logs += 1
-        self.named += any(mine)
-        self.first += bool(mine and mine[0])
-        self.anything += bool(quantities)
-        self.others.update(q for q, own in zip(quantities, mine, strict=True) if not own)
-        self.rms.append((float(np.degrees(result.rms)), float(np.degrees(least[0]))))
-
-    def row(self, case: str) -> str:
-        """One row of the table."""
-        before, after = np.median(self.rms, axis=0)
-        also = ", ".join(f"{q} {n}" for q, n in self.others.most_common()) or "–"
-        counts = (f"{n} of {self.logs}" for n in (self.named, self.first, self.anything))
-        return f"| {case} | {' | '.join(counts)} | {also} | {before:.3f} | {after:.3f} |"
-
-
-def one(case: str, k: int, seconds: float) -> MissingTerms:
-    """Simulate a log, fit the model without the term, and test it."""
+def one(case: str, k: int, seconds: float) -> dict[str, Any]:
+    """Simulate a log, fit the model without the term, test it, and return what the table needs of it."""
+    began = time.process_time()
     model = make_settings({})
     log = make_log(TERMS[case], seconds, 1000 * list(TERMS).index(case) + FIRST_SEED + k)
     problem = Problem(model, [log])
@@ -144,27 +119,68 @@ def one(case: str, k: int, seconds: float) -> MissingTerms:
     assert model.refinement is not None
     found = refine(problem, start, model.refinement, lambda n, rms: None)
     theta = problem.parameters.from_unit(found.point[None])[0]
-    return missing_terms(problem, uncertainty(problem, theta))
+    result = missing_terms(problem, uncertainty(problem, theta))
+    mine = [t for t in result.tests if own(t.term.settings.quantity) == case]
+    return {
+        "case": case,
+        "log": k,
+        "named": [test.term.settings.quantity for test in result.free],
+        "rms_deg": float(np.degrees(result.rms)),
+        "freed_rms_deg": min((float(np.degrees(t.rms)) for t in mine), default=np.nan),
+        "chance": min((t.chance for t in mine), default=np.nan),
+        "tests": len(result.tests),
+        "cpu_s": time.process_time() - began,
+    }
+
+
+def row(case: str, results: list[dict[str, Any]]) -> str:
+    """One row of the table."""
+    named = [[own(q) for q in each["named"]] for each in results]
+    others = Counter(q for each in results for q in each["named"] if own(q) != case)
+    also = ", ".join(f"{q} {n}" for q, n in others.most_common()) or "–"
+    yes = (
+        sum(case in each for each in named),
+        sum(each[:1] == [case] for each in named),
+        sum(map(bool, named)),
+    )
+    counts = " | ".join(f"{n} of {len(results)}" for n in yes)
+    before, after = (np.median([each[key] for each in results]) for key in ("rms_deg", "freed_rms_deg"))
+    return f"| {case} | {counts} | {also} | {before:.3f} | {after:.3f} |"
+
+
+def own(quantity: str) -> str:
+    """A quantity without its side."""
+    return quantity.removesuffix("_a").removesuffix("_b")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--logs", type=int, default=20)
+    parser.add_argument("--logs", type=int, default=20, help="of each term, from the first one on")
     parser.add_argument("--seconds", type=float, default=15.0)
-    parser.add_argument("--only", nargs="*", default=list(TERMS))
+    parser.add_argument("--only", nargs="*", default=list(TERMS), choices=list(TERMS))
+    parser.add_argument("--results", type=Path, default=Path("runs/suggest_study.jsonl"))
     arguments = parser.parse_args()
-    tallies = {case: Tally() for case in arguments.only}
-    began = time.process_time()
+    arguments.results.parent.mkdir(parents=True, exist_ok=True)
+    done = {(each["case"], each["log"]) for each in read(arguments.results)}
     for k in range(arguments.logs):
-        for case, tally in tallies.items():
-            tally.add(case, one(case, k, arguments.seconds))
-        if (k + 1) % EVERY == 0 or k + 1 == arguments.logs:
-            print(f"\n{k + 1} logs of each, {time.process_time() - began:.0f} s of CPU\n")
-            print(
-                "| present | named | first | anything named | also named | rms without it [deg] | with it |"
-            )
-            print("| --- | --- | --- | --- | --- | --- | --- |")
-            print("\n".join(tally.row(case) for case, tally in tallies.items()), flush=True)
+        for case in arguments.only:
+            if (case, k) not in done:
+                line = json.dumps(one(case, k, arguments.seconds))
+                with arguments.results.open("a") as file:
+                    file.write(line + "\n")
+                print(line, flush=True)
+    results = read(arguments.results)
+    print(f"\n{len(results)} logs, {sum(each['cpu_s'] for each in results):.0f} s of CPU\n")
+    print("| present | named | first | anything named | also named | rms without it [deg] | with it |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for case in TERMS:
+        if mine := [each for each in results if each["case"] == case]:
+            print(row(case, mine))
+
+
+def read(results: Path) -> list[dict[str, Any]]:
+    """Return the lines of a results file, none if there is no file."""
+    return [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
 
 
 if __name__ == "__main__":

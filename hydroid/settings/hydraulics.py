@@ -43,6 +43,7 @@ SPANS = {
     "pump_rise": (0.0, 5.0),
     "bulk_modulus": (500.0, 20000.0),
     "dry_friction": (0.0, 1e5),
+    "start_pressure": (5.0, 150.0),
     "delay": (0.0, 2.0),
     "dead_band": (0.0, 90.0),
     "sensor_lag": (0.0, 1.0),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, SPANS, TARGETS, actuator_values
@@ -88,6 +89,8 @@ def terms(problem: Problem, *, sides: bool = True) -> tuple[Term, ...]:
         pump = quantity in OF_THE_PUMP
         if pump and len(joints) == 1:
             continue  # the pump of one actuator is no more than its flow limit
+        if quantity == "start_pressure" and any(log.pressure is not None for log in problem.logs):
+            continue  # the logs may say it
         for joint in (None,) if pump else joints:
             values = {_nominal(problem, target, joint or 1) for target in targets}
             if len(values) == 1 and not any((target, joint or 1) in taken for target in targets):
@@ -131,6 +134,8 @@ def _nominal(problem: Problem, quantity: str, joint: int) -> float:
         return 0.0
     settings = problem.settings
     value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
+    if quantity == "start_pressure" and value is None:
+        return START_PRESSURE / QUANTITIES[quantity].factor
     return math.inf if value is None else value
 
 

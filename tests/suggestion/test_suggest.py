@@ -74,6 +74,10 @@ def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
     freed = problem.extended({"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))})
     assert not {"delay", "delay_a"} & {term.name for term in terms(freed)}
     assert "delay_b" in {term.name for term in terms(freed)}
+    (log,) = problem.logs
+    gauged = replace(log, pressure=np.zeros((*log.angle.shape, 2)))
+    assert "start_pressure" in names
+    assert "start_pressure" not in {term.name for term in terms(Problem(problem.settings, [gauged]))}
 
 
 def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: tuple[Problem, Uncertainty]):

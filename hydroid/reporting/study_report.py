@@ -80,9 +80,9 @@ def index_page(studies: Sequence[StudyRuns], seconds: float) -> Page:
 def study_table(
     table: StudyTable, rows: Sequence[Row], cells: Sequence[str], units: Mapping[str, str]
 ) -> Table:
-    """Return a table with our median and spread of every cell, and the article's values below it."""
+    """Return a table with our median and spread of its cells, and the article's values below it."""
     lines: list[tuple[Cell, ...]] = []
-    for cell in cells:
+    for cell in table.cells or cells:
         mine = [row for row in rows if row.cell == cell]
         good = [row for row in mine if not row.failed]
         count = f"{len(good)}" if len(good) == len(mine) else f"{len(good)} of {len(mine)}"

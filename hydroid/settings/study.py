@@ -78,6 +78,8 @@ class StudyTable(Settings):
     """measures, by name (docs/studies.md)"""
     article: dict[str, tuple[float | None, ...]] = Field(default_factory=dict[str, Any])
     """printed values by cell, in the order of the columns; null where the article prints none"""
+    cells: tuple[str, ...] = ()
+    """cells in the table; none: all"""
     note: str = ""
     """below the table"""
 

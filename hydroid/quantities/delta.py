@@ -8,7 +8,7 @@ quantity undetermined where it does.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,19 +89,11 @@ class Precision:
         """
         free = self.parameters.free
         varied = free if concerned is None else free & concerned
-        table = ParameterSet(
-            tuple(
-                parameter if varies else replace(parameter, fixed=float(value))
-                for parameter, value, varies in zip(
-                    self.parameters.parameters, self.theta, varied, strict=True
-                )
-            )
-        )
         value = function(self.theta[None])[0]
         slopes = np.zeros((int(free.sum()), len(value)))
         if varied.any():
-            found = slopes_of(function, table, self.theta, value, STEP * self.scale)
-            slopes[varied[free]] = found * self.scale[varied, None]
+            found = slopes_of(function, self.parameters, self.theta, value, (STEP * self.scale, varied))
+            slopes[varied[free]] = (found * self.scale[:, None])[varied]
         return self.known(value, slopes, positive)
 
     def deviation(self, slopes: Array) -> Array:

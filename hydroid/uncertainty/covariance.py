@@ -110,6 +110,7 @@ def uncertainty_from(
     unidentifiable = widened > UNIDENTIFIABLE_ABOVE
     shares = np.ones(len(theta))
     shares[free] = data_shares(derivatives.prior_slopes[free], relative[free] ** 2)
+    unidentifiable &= shares == 1.0  # no prior limits it
     relative[unidentifiable] = np.inf
     interval = ends(problem.parameters, theta, derivatives.scale, widths * relative)
     status: list[ParameterStatus] = []
@@ -166,14 +167,22 @@ def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, N
 def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Array, Array]:
     """Return V, D, U of J = V D U: directions (p, p), singular values (p,), effects (p, R + M).
 
-    The effects are unit rows of residuals with the M priors behind them. A singular value that is no larger
-    than the difference between two steps' derivatives is 0.
+    The effects are unit rows of residuals with the M priors behind them. Along a direction whose effect on
+    the residuals is no larger than the difference between two steps' derivatives, only the priors count: they
+    are exact.
     """
-    rows = np.hstack([derivatives.slopes, derivatives.prior_weight * derivatives.prior_slopes])[free]
-    directions, values, effects = np.linalg.svd(np.nan_to_num(rows), full_matrices=False)
-    error = np.linalg.norm(directions.T @ np.nan_to_num(derivatives.error[free]), axis=1)
-    values[values <= np.maximum(error, RANK_TOLERANCE * values[0])] = 0.0
-    return directions, values, effects
+    slopes, error = np.nan_to_num(derivatives.slopes[free]), np.nan_to_num(derivatives.error[free])
+    directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
+    doubt = np.linalg.norm(directions.T @ error, axis=1)
+    values[values <= np.maximum(doubt, RANK_TOLERANCE * values[0])] = 0.0
+    priors = derivatives.prior_weight * derivatives.prior_slopes[free]
+    if priors.any():
+        rows = np.hstack([directions * values, priors])
+        directions, values, mixed = np.linalg.svd(rows, full_matrices=False)
+        values[values <= RANK_TOLERANCE * values[0]] = 0.0
+        size = len(effects)
+        return directions, values, np.hstack([mixed[:, :size] @ effects, mixed[:, size:]])
+    return directions, values, np.hstack([effects, np.zeros((len(effects), priors.shape[1]))])
 
 
 def quantile(spread: float) -> float:

@@ -12,10 +12,11 @@ from hydroid.uncertainty.noise import prior_weight
 
 STEP = 1e-4
 """relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""
-CHECK_FACTOR = 10.0
-"""the step that checks it is this many times wider"""
+WIDER_STEPS = (1e-3, 1e-2, 3e-2)
+"""steps that check the one before, as far as needed; the response is not smooth where oil cavitates: such
+jumps, of about 1e-5 rad, change a wide step's derivative less"""
 STEPS_DISAGREE_ABOVE = 0.02
-"""relative difference of two steps' derivatives above which the wider one counts: it averages small jumps"""
+"""relative difference of two steps' derivatives above which a wider one is tried"""
 MIN_SCALE = 0.01
 """part of the bounds' width: a smaller value is changed by parts of this instead of its own"""
 NO_EFFECT_BELOW = 1e-6
@@ -63,22 +64,33 @@ class Jacobian:
 def jacobian(problem: Problem, theta: Array) -> Jacobian:
     """Return the derivatives at theta, shape (P,), from 1 + 4 p simulations, p parameters being free.
 
-    Differences are central, or one-sided and of second order at a bound. Each is taken with two steps; where
-    these disagree the wider one counts, and `doubt` is their difference.
+    Differences are central, or one-sided and of second order at a bound. Each is taken with two steps. Where
+    these disagree, wider ones follow, two simulations each, until two in a row agree; then the wider one of
+    those that agree best counts, and `doubt` is their difference.
     """
     problem = problem.with_open_start(theta)
-    scale, free = relative_scale(problem.parameters, theta), problem.parameters.free
+    scale, left = relative_scale(problem.parameters, theta), problem.parameters.free
     residual = problem.residuals(theta[None])[0]
-    fine, wide = (
-        slopes_of(problem.residuals, problem.parameters, theta, residual, step * scale)
-        for step in (STEP, CHECK_FACTOR * STEP)
-    )
-    error = fine - wide
-    length = np.linalg.norm(wide, axis=1)
-    agree = np.linalg.norm(error, axis=1) <= STEPS_DISAGREE_ABOVE * length
-    slopes, errors = np.full((2, len(theta), residual.size), np.nan)
-    slopes[free] = np.where((~agree & np.isfinite(length))[:, None], wide, fine) * scale[free, None]
-    errors[free] = error * scale[free, None]
+
+    def derivatives(step: float) -> Array:
+        found = slopes_of(problem.residuals, problem.parameters, theta, residual, (step * scale, left))
+        return found * scale[:, None]
+
+    slopes = derivatives(STEP)
+    effect = np.linalg.norm(slopes, axis=1)
+    felt = ~(effect <= NO_EFFECT_BELOW * np.nanmax(effect, initial=0.0))
+    errors, finer, least = np.full_like(slopes, np.nan), slopes.copy(), np.full(len(theta), np.inf)
+    for step in WIDER_STEPS:
+        wider = derivatives(step)
+        error, length = finer - wider, np.linalg.norm(wider, axis=1)
+        disagreement = np.linalg.norm(error, axis=1) / np.maximum(length, np.finfo(float).tiny)
+        agree, closer = disagreement <= STEPS_DISAGREE_ABOVE, disagreement < least
+        taken = closer & ~(agree & (step == WIDER_STEPS[0]))
+        slopes[taken] = wider[taken]
+        errors[closer], least[closer] = error[closer], disagreement[closer]
+        left, finer = left & ~agree & felt & np.isfinite(length), wider
+        if not left.any():
+            break
     change = np.diag(STEP * scale)
     scores = problem.priors.scores(np.vstack([theta + change, theta - change]))
     prior_slopes = (scores[: len(theta)] - scores[len(theta) :]) / (2 * STEP)
@@ -96,21 +108,28 @@ def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
 
 
 def slopes_of(
-    function: Callable[[Array], Array], parameters: ParameterSet, theta: Array, value: Array, step: Array
+    function: Callable[[Array], Array],
+    parameters: ParameterSet,
+    theta: Array,
+    value: Array,
+    steps: tuple[Array, NDArray[np.bool_]],
 ) -> Array:
-    """Derivatives of a function, (n, P) -> (n, R), by each free parameter at theta, (P,), shape (p, R).
+    """Derivatives of a function, (n, P) -> (n, R), at theta, (P,), shape (P, R).
 
-    They are those of the parabola through `value`, the function there, and two other points. The two lie on
-    both sides, a step (P,) away, or both on one side where a bound is near.
+    `steps` are a step by each parameter, (P,), and which parameters are changed, (P,): those of the others
+    are NaN. A derivative is that of the parabola through `value`, the function there, and two other points.
+    The two lie on both sides, a step away, or both on one side where a bound is near.
     """
-    free = parameters.free
+    step, which = steps
     above = theta + step > np.maximum(parameters.upper, theta)
     below = theta - step < np.minimum(parameters.lower, theta)
     first = np.where(above, -step, step)
     second = np.where(above, -2 * step, np.where(below, 2 * step, -step))
-    rows = function(theta + np.vstack([np.diag(first)[free], np.diag(second)[free]]))
-    first, second = first[free, None], second[free, None]
+    rows = function(theta + np.vstack([np.diag(first)[which], np.diag(second)[which]]))
+    first, second = first[which, None], second[which, None]
     near, far = (rows[: len(first)] - value) / first, (rows[len(first) :] - value) / second
     both = (near * second - far * first) / (second - first)
     one_side = np.where(np.isfinite(near), near, far)  # where the other one diverges
-    return np.where(np.isfinite(both), both, one_side)
+    slopes = np.full((len(theta), value.size), np.nan)
+    slopes[which] = np.where(np.isfinite(both), both, one_side)
+    return slopes

@@ -103,17 +103,44 @@ def test_a_bound_takes_the_interval():
     assert np.isfinite(found.interval[:2]).all()
 
 
-def test_a_derivative_that_depends_on_its_step_is_doubted():
+def jumping(size):
+    """A linear problem whose response jumps at the estimate, with the estimate and the jump."""
     problem, theta = white_problem()
-    smooth = problem.residuals
-    jump = 1e-5 * problem.columns[0]
+    smooth, jump = problem.residuals, size * problem.columns[0]
     problem.residuals = lambda t: smooth(t) + np.where(t[:, :1] > theta[0], 1.0, 0.0) * jump
+    return problem, theta, jump
+
+
+def test_a_wider_step_counts_where_the_response_jumps():
+    problem, theta, jump = jumping(1e-5)
+    before = problem.simulated
     found = jacobian(problem, theta)
-    assert found.doubt[0] > 0.01
-    assert (found.doubt[1:] < 1e-6).all()
-    # the wider of the two steps counts: the jump changes it less
     error = found.slopes[0] + theta[0] * problem.columns[0]
-    np.testing.assert_allclose(error, -jump / 2e-3 * np.sign(error @ -jump), rtol=1e-3, atol=1e-6)
+    # steps 1e-4, 1e-3 and 1e-2: the wider one of the first two in a row that agree
+    np.testing.assert_allclose(error, jump / 2e-2, rtol=1e-6)
+    assert np.linalg.norm(error) <= np.linalg.norm(found.error[0])
+    assert (found.doubt[1:] < 1e-6).all()
+    assert problem.simulated - before == 1 + 4 * 3 + 2  # a wider step of one parameter only
+
+
+def test_a_derivative_that_depends_on_its_step_is_doubted():
+    problem, theta, _ = jumping(1e-2)
+    found = uncertainty(problem, theta)
+    assert found.status[0].derivative_doubt > 0.1
+    assert found.status[1].derivative_doubt is None
+
+
+def test_what_a_prior_says_holds_where_derivatives_are_doubtful():
+    columns = slow(3)
+    theta, rng = np.array([1.0, 2.0, 4.0]), np.random.default_rng(4)
+    measured = theta @ columns + rng.normal(0, 0.1 * DEG, 1000)
+    known = {"a": {"of": ["a"], "value": 1.0, "sd": 0.05}}
+    problem = Linear(columns, measured, theta, known=known, noise_deg=0.1)
+    at = jacobian(problem, theta)
+    nothing = np.where(np.arange(3)[:, None] == 0, 1.0, 0.0)
+    found = uncertainty_from(problem, theta, replace(at, error=at.slopes * nothing))
+    assert found.standard_deviation[0] == pytest.approx(0.05, rel=0.05)
+    assert np.isfinite(found.interval).all()
 
 
 def test_derivatives_at_a_bound_stay_inside():

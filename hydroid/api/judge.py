@@ -77,7 +77,8 @@ def validate(
             }
             bands = prediction_bands(model, log, response)
             seen = False if leave_one_out else was_fitted(Path(original.source).parent, log)
-            results.append(Validation(model.name, log, response, indices, bands, seen))
+            arm = model.settings.arm
+            results.append(Validation(model.name, log, response, indices, bands, seen, arm))
     return Study(results, validation_page(results, folds)).write(out)
 
 

@@ -24,13 +24,13 @@ def arm_picture(arm: Arm, pose: Array, marked: Collection[int]) -> str:
     joints = [model.joint(name) for name in arm.joint_names]
     data.qpos[[joint.qposadr[0] for joint in joints]] = pose
     mujoco.mj_kinematics(model, data)
-    view = _view()
+    view = side_view()
     shapes: list[tuple[float, int, Array]] = []
     for geom in range(model.ngeom):
-        points = _points(model, geom)
+        points = corners(model, geom)
         if len(points):
             seen = (data.geom_xpos[geom] + points @ data.geom_xmat[geom].reshape(3, 3).T) @ view.T
-            shapes.append((float(seen[:, 2].mean()), int(model.geom_bodyid[geom]), _outline(seen[:, :2])))
+            shapes.append((float(seen[:, 2].mean()), int(model.geom_bodyid[geom]), outline(seen[:, :2])))
     if not shapes:
         return ""
     anchors = np.array([data.xanchor[joint.id] for joint in joints]) @ view.T
@@ -61,7 +61,7 @@ def arm_picture(arm: Arm, pose: Array, marked: Collection[int]) -> str:
     )
 
 
-def _view() -> Array:
+def side_view() -> Array:
     """Rows: to the right, up, and towards the viewer, in the world's frame."""
     a, e = _AZIMUTH, _ELEVATION
     towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -69,7 +69,7 @@ def _view() -> Array:
     return np.stack([right, np.cross(towards, right), towards])
 
 
-def _points(model: mujoco.MjModel, geom: int) -> Array:
+def corners(model: mujoco.MjModel, geom: int) -> Array:
     """Corners of a shape in its own frame, shape (n, 3); none of a plane."""
     mesh = int(model.geom_dataid[geom])
     if mesh >= 0:
@@ -78,7 +78,7 @@ def _points(model: mujoco.MjModel, geom: int) -> Array:
     return np.empty((0, 3)) if shape is None else np.asarray(shape.vertices, float)
 
 
-def _outline(points: Array) -> Array:
+def outline(points: Array) -> Array:
     """The convex outline of points, shape (n, 2)."""
     try:
         return points[ConvexHull(points).vertices]

@@ -224,6 +224,7 @@
     const content = JSON.parse(await unpack("content"));
     for (const image of document.querySelectorAll("img[data-image]"))
       image.src = "data:image/svg+xml," + encodeURIComponent(content.images[image.dataset.image]);
+    for (const host of document.querySelectorAll("[data-moving]")) moveArm(host, content.moving[host.dataset.moving]);
     charts = content.charts;
     if (charts.length) {
       const library = await unpack("library");

@@ -19,6 +19,8 @@ from hydroid.reporting.actuator_report import KnownActuator, actuator_plot, join
 from hydroid.reporting.by_log_report import by_log_warning
 from hydroid.reporting.estimates import estimates as draw_estimates
 from hydroid.reporting.fit_tables import objective_table, parameter_table
+from hydroid.reporting.motion_report import motion_section
+from hydroid.reporting.moving_arm import Movement
 from hydroid.reporting.names import plain_name
 from hydroid.reporting.next_steps import fit_steps
 from hydroid.reporting.objectives import learning, pareto
@@ -91,6 +93,7 @@ def fit_page(
         *_known(last, fit),
         _unknown(last, fit, suggested),
         *_actuators(last, fit),
+        *motion_section(problem.settings.arm, _movements(problem, fit)),
         *_folded(last, fit, suggested),
         Section("Reproduce", facts=_facts(identity, problem)),
     )
@@ -190,6 +193,13 @@ def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:
         tabs.append(Tab(actuator.title, (plot,)))
     text = "What its parameters mean in steady state, from the command to the torque at the joint."
     return (Section("The actuator", text, tabs=tuple(tabs)),) if tabs else ()
+
+
+def _movements(problem: Problem, fit: Fit) -> list[Movement]:
+    """How the arm moves in each log, measured and simulated with the final estimate."""
+    joints = problem.settings.outputs
+    logs = zip(log_names(problem.logs), problem.logs, fit.best.responses, strict=True)
+    return [Movement.of(name, log, joints, response) for name, log, response in logs]
 
 
 def _records(problem: Problem, joint: int, theta: Array) -> Any:

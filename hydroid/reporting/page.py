@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 
 from hydroid.log import Log
 from hydroid.reporting.chart import Chart
+from hydroid.reporting.moving_arm import MovingArm
 from hydroid.reporting.table import Table
 
 PAGE, FILE = frozenset({"page"}), frozenset({"file"})
 """where a figure is shown"""
+Drawing = Figure | Chart | MovingArm
 _LONGEST_NAME = 40
 
 
@@ -22,13 +24,13 @@ _LONGEST_NAME = 40
 class Plot:
     """A figure: the name of its files, what it shows in words, and the function that draws it.
 
-    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`; a matplotlib figure is an image there.
-    `where` says where it is shown: in the page, as a file, or both.
+    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`. A `MovingArm` is drawn there only. A
+    matplotlib figure is an image there. `where` says where it is shown: in the page, as a file, or both.
     """
 
     name: str
     caption: str
-    draw: Callable[[], Figure | Chart]
+    draw: Callable[[], Drawing]
     zoom: bool = False
     where: frozenset[str] = PAGE | FILE
 
@@ -150,6 +152,12 @@ class Page:
     data: Mapping[str, str] = field(default_factory=dict[str, str])
     verdict: Verdict | None = None
     numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def plots(self) -> Iterator[Plot]:
+        """All figures."""
+        for section in self.sections:
+            yield from section.all_plots
 
     @property
     def tables(self) -> dict[str, Table]:

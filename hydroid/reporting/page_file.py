@@ -19,18 +19,20 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
 from hydroid.reporting.chart import Chart, figure
-from hydroid.reporting.page import FILE, PAGE, Page, Plot, Section
+from hydroid.reporting.moving_arm import MovingArm
+from hydroid.reporting.page import FILE, PAGE, Drawing, Page, Plot, Section
 from hydroid.reporting.style import rendered, style
 from hydroid.reporting.table import Table, shown
 
 SCHEMA = 1
 """version of the content that a page carries"""
 _CONTENT = re.compile(rb'<script type="text/plain" id="content">([A-Za-z0-9+/=]*)</script>')
-_OWN = ("template.html.j2", "page.css", "charts.js")
+_OWN = ("template.html.j2", "page.css", "moving_arm.js", "charts.js")
 _SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
 
 
@@ -47,36 +49,46 @@ def write_page(page: Page, out: Path) -> list[Path]:
             f"tables/{name}.md": table.markdown(),
             f"tables/{name}.tex": table.latex(),
         }
-    images, charts = dict[str, bytes](), dict[str, Chart]()
+    images = dict[str, bytes]()
     with style():
-        for plot in (plot for section in page.sections for plot in section.all_plots):
-            drawn = plot.draw()
-            if isinstance(drawn, Chart):
-                charts[plot.name] = drawn
-                if not plot.where >= FILE:
-                    continue
-                drawn = figure(drawn)
-            png, svg = rendered(drawn)
-            content |= {f"figures/{plot.name}.png": png, f"figures/{plot.name}.svg": svg}
-            if plot.name not in charts and plot.where >= PAGE:
-                images[plot.name] = svg
-    html = content_html(page_content(page, charts, images))
-    content |= {**page.data, f"{page.name}.html": html}
+        drawn = drawings(page)
+        for plot in page.plots:
+            drawing = drawn[plot.name]
+            if isinstance(drawing, Chart) and plot.where >= FILE:
+                drawing = figure(drawing)
+            if isinstance(drawing, Figure):
+                png, images[plot.name] = rendered(drawing)
+                if plot.where >= FILE:
+                    content |= {
+                        f"figures/{plot.name}.png": png,
+                        f"figures/{plot.name}.svg": images[plot.name],
+                    }
+    content |= {**page.data, f"{page.name}.html": content_html(page_content(page, drawn, images))}
     for name, text in content.items():
         write_atomic(out / name, text)
     return [out / name for name in content]
 
 
-def page_content(page: Page, charts: Mapping[str, Chart], images: Mapping[str, bytes]) -> dict[str, Any]:
+def drawings(page: Page) -> dict[str, Drawing]:
+    """Return all that a page and its files draw, by name."""
+    return {plot.name: plot.draw() for plot in page.plots}
+
+
+def page_content(
+    page: Page, drawn: Mapping[str, Drawing], images: Mapping[str, bytes] | None = None
+) -> dict[str, Any]:
     """Return all that a page shows as mappings, lists, text and numbers; images are SVG."""
-    order = list(charts)
+    charts = {name: one.plain() for name, one in drawn.items() if isinstance(one, Chart)}
+    moving = {name: one.plain() for name, one in drawn.items() if isinstance(one, MovingArm)}
+    place = {name: {"chart": i} for i, name in enumerate(charts)}
+    place |= {name: {"moving": i} for i, name in enumerate(moving)}
+    shown = {plot.name for plot in page.plots if plot.where >= PAGE} - charts.keys() - moving.keys()
 
     def plots(some: Sequence[Plot]) -> list[dict[str, Any]]:
         return [
-            {"name": p.name, "caption": p.caption, "zoom": p.zoom}
-            | ({"chart": order.index(p.name)} if p.name in charts else {})
+            {"name": p.name, "caption": p.caption, "zoom": p.zoom} | place.get(p.name, {})
             for p in some
-            if p.name in charts or p.name in images
+            if p.where >= PAGE
         ]
 
     def section(one: Section) -> dict[str, Any]:
@@ -102,8 +114,9 @@ def page_content(page: Page, charts: Mapping[str, Chart], images: Mapping[str, b
         "verdict": None if page.verdict is None else asdict(page.verdict),
         "warnings": list(page.warnings),
         "sections": [section(one) for one in page.sections],
-        "charts": [chart.plain() for chart in charts.values()],
-        "images": {name: svg.decode() for name, svg in images.items()},
+        "charts": list(charts.values()),
+        "moving": list(moving.values()),
+        "images": {name: svg.decode() for name, svg in (images or {}).items() if name in shown},
         "versions": dict(page.versions),
         "numbers": dict(page.numbers),
     }

@@ -15,9 +15,12 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.quantities.band import Band
 from hydroid.reporting.fit_tables import INDICES, INDICES_NOTE, index_cells
+from hydroid.reporting.motion_report import motion_section
+from hydroid.reporting.moving_arm import Movement
 from hydroid.reporting.page import Light, Page, Section, Verdict, file_name, log_names, short_name, unique
 from hydroid.reporting.responses import JointResponse, logged_pressures, response_data, response_tabs
 from hydroid.reporting.table import Cell, Table
+from hydroid.settings.arm import Arm
 
 _BANDS = "Prediction bands"
 _BAND_HEADER = (
@@ -48,6 +51,7 @@ class Validation:
         indices: of the error by joint, numbered from 1.
         bands: prediction bands by joint; empty of a model that is no fit.
         fitted: whether the fit was made from this log; None: not known.
+        arm: which moves in the page; None: it is not shown.
     """
 
     fit: str
@@ -56,6 +60,7 @@ class Validation:
     indices: Mapping[int, ErrorIndices]
     bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
     fitted: bool | None = None
+    arm: Arm | None = None
 
     @property
     def unseen(self) -> bool:
@@ -96,7 +101,7 @@ def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedMod
     section = Section("Prediction", tabs=tuple(tabs), tables={"validation": table})
     bands = {"bands": Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)}
     limits = Section("Error that the fitted logs lead to expect", points=tuple(verdicts), more=bands)
-    sections = [section, limits] if band_rows else [section]
+    sections = [section, *([limits] if band_rows else []), *_motion(results, names, notes)]
     if folds:
         sections.append(Section("Without one log", tables={"folds": _fold_table(folds)}))
     numbers = {"kind": "validation", "errors": _errors(results, names)}
@@ -109,6 +114,17 @@ def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedMod
         verdict=verdict,
         numbers=numbers,
     )
+
+
+def _motion(
+    results: Sequence[Validation], names: Mapping[str, str], notes: Mapping[str, str]
+) -> tuple[Section, ...]:
+    """The arm in motion as the best fit simulates it."""
+    best = min(_rank(results).items(), key=lambda item: item[1])[0]
+    shown = {names[r.log.source]: r for r in results if r.fit == best and r.arm is not None}
+    movements = [Movement.of(name, r.log, tuple(r.indices), r.response) for name, r in shown.items()]
+    arm = next((r.arm for r in shown.values()), None)
+    return () if arm is None else motion_section(arm, movements, notes)
 
 
 def validation_responses(results: Sequence[Validation]) -> dict[str, JointResponse]:

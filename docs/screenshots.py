@@ -29,7 +29,7 @@ ALL_JOINTS = str(ROOT / "examples/logs/rig_all_joints_1.csv")
 MECH = ("fit-mech", LOG, "--set", "refinement.iterations=12")
 KINDS = {
     "fit-mech": MECH,
-    "fit-mech-2": (*MECH, "--set", "search.seed=2", "--algorithm", "ga"),
+    "fit-mech-2": (*MECH, "--set", "search.seed=2"),
     "fit-hyd": ("fit-hyd", LOG, "--mech", "fit-mech"),
     "validate": ("validate", OTHER, LOG, "--fit", "fit-hyd", "--fit", "fit-mech"),
     "identifiability": ("identifiability", LOG, "--fit", "fit-mech", "--profile", "K,D"),

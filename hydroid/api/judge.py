@@ -1,5 +1,6 @@
 """Judge a fit: `validate` on other logs; `identifiability`, `sensitivity`, `surface` at its estimate."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
 from hydroid.errors import RunError, SettingsError
-from hydroid.identified_model import IdentifiedModel
+from hydroid.files import is_file, write_atomic
+from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
@@ -18,9 +20,12 @@ if TYPE_CHECKING:
     from hydroid.log import Log
     from hydroid.parameters import Array
     from hydroid.problem.problem import Problem
+    from hydroid.reporting.page import Page
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
     from hydroid.reporting.validation_report import Validation
     from hydroid.uncertainty.sweep import Surface, Sweep
+
+_log = logging.getLogger(__name__)
 
 
 def validate(
@@ -45,7 +50,7 @@ def validate(
         leave_one_out: refine the model without one log and test it on that log, for every log.
 
     Returns:
-        The study, with one result for each fit and log.
+        The study, with one result for each fit and log. The report of each run shows its unseen logs too.
 
     Raises:
         LogError: a log cannot be used.
@@ -62,9 +67,9 @@ def validate(
     from hydroid.reporting.validation_report import Validation, validation_page
     from hydroid.run.identity import was_fitted
 
-    results: list[Validation] = []
     folds: list[IdentifiedModel] = []
-    for model, each in zip(opened, read, strict=True):
+    own: list[list[Validation]] = [[] for _ in opened]
+    for model, each, found in zip(opened, read, own, strict=True):
         outputs, original = model.settings.outputs, model
         for i, log in enumerate(each):
             if leave_one_out:
@@ -78,8 +83,31 @@ def validate(
             bands = prediction_bands(model, log, response)
             seen = False if leave_one_out else was_fitted(Path(original.source).parent, log)
             arm = model.settings.arm
-            results.append(Validation(model.name, log, response, indices, bands, seen, arm))
-    return Study(results, validation_page(results, folds)).write(out)
+            found.append(Validation(model.name, log, response, indices, bands, seen, arm))
+    results = [result for found in own for result in found]
+    study = Study(results, validation_page(results, folds)).write(out)
+    if out is not None and not leave_one_out:
+        for model, found in zip(opened, own, strict=True):
+            _show_in_report(model, validation_page(found))
+    return study
+
+
+def _show_in_report(model: IdentifiedModel, page: "Page") -> None:
+    """Add a validation to the report of the run that a model is from, if its settings are the run's."""
+    from hydroid.estimate import NAME
+    from hydroid.reporting.page_file import content_html, drawings, page_content, read_page
+    from hydroid.reporting.validated import with_validation
+
+    source = Path(model.source)
+    file = source.parent / "report.html"
+    if source.name != NAME or not is_file(file) or load_identified(source).settings != model.settings:
+        return
+    try:
+        content = with_validation(read_page(file), page_content(page, drawings(page)))
+        for name, text in {**page.data, file.name: content_html(content)}.items():
+            write_atomic(source.parent / name, text)
+    except RunError as error:
+        _log.warning("the fit's own report does not show the validation: %s", error)
 
 
 def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: int) -> IdentifiedModel:

@@ -98,7 +98,8 @@ def _errors(contents: Mapping[str, Content]) -> dict[str, Any]:
         for error in numbers.get("errors", ()):
             seen = "unseen" if error["unseen"] else "fitted"
             rms = "–" if error["rms_deg"] is None else number(error["rms_deg"])
-            rows.append([f"{error['fit']} (in {name})", error["log"], seen, rms])
+            row = [error["fit"], error["log"], seen, rms]
+            rows += [row] if row not in rows else []  # a fit's report may show its validation too
     return _table("Errors", ("report", "log", "log is", "rms [deg]"), rows)
 
 

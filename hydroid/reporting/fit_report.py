@@ -46,6 +46,8 @@ from hydroid.reporting.verdict import fit_verdict
 from hydroid.suggestion.suggest import Suggestions
 from hydroid.uncertainty.by_log import by_log
 
+FITTED = "Prediction of the fitted logs"
+"""title of a section"""
 _FILES = (
     "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
     "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
@@ -86,7 +88,7 @@ def fit_page(
     sections = (
         fit_steps(problem, fit, suggested),
         Section(
-            "Prediction of the fitted logs",
+            FITTED,
             tabs=response_tabs(responses),
             more={"errors": objective_table(problem, fit)},
         ),

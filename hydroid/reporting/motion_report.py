@@ -9,6 +9,8 @@ from hydroid.reporting.moving_arm import MOST, Movement, moving_arm
 from hydroid.reporting.page import PAGE, Plot, Section, Tab
 from hydroid.settings.arm import Arm
 
+MOTION = "The arm in motion"
+"""title of the section"""
 _FEWEST = 100
 """moments of a log at least"""
 _CAPTION = (
@@ -32,4 +34,4 @@ def motion_section(
             f"motion_{i + 1}", f"{movement.log}. {_CAPTION}", lambda moving=moving: moving, where=PAGE
         )
         tabs.append(Tab(movement.log, (plot,), (notes or {}).get(movement.log, "")))
-    return (Section("The arm in motion", tabs=tuple(tabs)),)
+    return (Section(MOTION, tabs=tuple(tabs)),)

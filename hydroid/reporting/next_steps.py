@@ -8,6 +8,8 @@ from hydroid.reporting.suggestion_report import MOST_STEPS, suggested_steps
 from hydroid.suggestion.suggest import Suggestions
 from hydroid.uncertainty.flags import Flag
 
+PREDICT_UNSEEN = "Predict a log that this fit has not seen: hydroid validate OTHER.csv --fit RUN."
+
 
 def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Section:
     """Return what to do after a fit."""
@@ -34,7 +36,7 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Sect
         )
     steps += [] if suggested is None else suggested_steps(problem, suggested)
     unseen = Step(
-        "Predict a log that this fit has not seen: hydroid validate OTHER.csv --fit RUN.",
+        PREDICT_UNSEEN,
         "It shows how large the error is elsewhere, and whether the fitted logs lead to expect it.",
     )
     return Section(

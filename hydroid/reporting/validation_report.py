@@ -31,7 +31,10 @@ _BAND_HEADER = (
     "inside [%]",
 )
 _EXPECTED = "As the fitted logs lead to expect"
-_NOTES = {True: "Unseen: the fit was not made from this log.", False: "The fit was made from this log."}
+PREDICTION = "Prediction"
+"""title of a section"""
+FROM_FIT = "The fit was made from this log."
+_NOTES = {True: "Unseen: the fit was not made from this log.", False: FROM_FIT}
 _BAND_NOTE = (
     "noise: standard deviation, estimated from the error on the fitted logs; the model's error there is part "
     "of it. expected error: rms, of this noise and of the parameters' uncertainty together. error: rms. "
@@ -68,6 +71,13 @@ class Validation:
         return self.fitted is False
 
     @property
+    def as_expected(self) -> bool | None:
+        """Whether the error is no larger than the fitted logs lead to expect; None: a band is missing."""
+        if any(band.model_limits for band in self.bands.values()):
+            return False
+        return True if self.bands and all(band.exists for band in self.bands.values()) else None
+
+    @property
     def rms(self) -> float:
         """Rms error over all joints [deg]."""
         return degrees(math.sqrt(sum(i.rms**2 for i in self.indices.values()) / len(self.indices)))
@@ -98,7 +108,7 @@ def validation_page(results: Sequence[Validation], folds: Sequence[IdentifiedMod
     notes = {names[r.log.source]: _NOTES[r.unseen] for r in results if r.fitted is not None}
     verdict = _strip(results)
     tabs = sorted(response_tabs(responses, notes), key=lambda tab: tab.note != _NOTES[True])
-    section = Section("Prediction", tabs=tuple(tabs), tables={"validation": table})
+    section = Section(PREDICTION, tabs=tuple(tabs), tables={"validation": table})
     bands = {"bands": Table(_BANDS, ("fit", "log", "joint", *_BAND_HEADER), tuple(band_rows), _BAND_NOTE)}
     limits = Section("Error that the fitted logs lead to expect", points=tuple(verdicts), more=bands)
     sections = [section, *([limits] if band_rows else []), *_motion(results, names, notes)]
@@ -231,7 +241,13 @@ def _seen_light(results: Sequence[Validation]) -> Light:
 
 def _errors(results: Sequence[Validation], names: Mapping[str, str]) -> list[dict[str, object]]:
     return [
-        {"fit": r.fit, "log": names[r.log.source], "unseen": r.unseen, "rms_deg": finite(r.rms)}
+        {
+            "fit": r.fit,
+            "log": names[r.log.source],
+            "unseen": r.unseen,
+            "rms_deg": finite(r.rms),
+            "as_expected": r.as_expected,
+        }
         for r in results
     ]
 

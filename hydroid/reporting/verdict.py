@@ -13,6 +13,8 @@ from hydroid.reporting.quantities_report import known_quantities
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
 
+VALIDATED = "Validated on unseen logs"
+"""question of a light"""
 _MOST_NAMES = 4
 
 
@@ -52,7 +54,7 @@ def _converged(fit: Fit) -> Light:
 
 
 def _validated() -> Light:
-    return Light("Validated on unseen logs", "open", "Not yet: hydroid validate OTHER.csv --fit RUN.")
+    return Light(VALIDATED, "open", "Not yet: hydroid validate OTHER.csv --fit RUN.")
 
 
 def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Light]:

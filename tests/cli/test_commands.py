@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from hydroid.reporting.page_file import read_page
+
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
 QUICK = [
@@ -66,6 +68,9 @@ def test_fit_validate_and_simulate_walk_through(short: Path, tmp_path: Path):
     assert done.stdout == "sim.csv\n"
     done = hydroid("validate", "sim.csv", "--fit", "run", "--json", "--out", "val2", cwd=tmp_path)
     assert json.loads(done.stdout)["results"][0]["max_deg"] < 1e-6  # its own prediction
+    (seen,) = read_page(run / "report.html")["numbers"]["errors"]  # the fit's own report shows the unseen log
+    assert seen["log"] == "sim.csv"
+    assert (run / "responses" / "validation_sim_joint_2.csv").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 

@@ -91,6 +91,7 @@ def _verdicts(contents: Mapping[str, Content]) -> dict[str, Any]:
 def _errors(contents: Mapping[str, Content]) -> dict[str, Any]:
     """All errors on logs: of fits on their own, of validations on theirs."""
     rows: list[list[str]] = []
+    found: dict[tuple[str, ...], str] = {}  # in which report each stands first: a fit's own may show it too
     for name, content in contents.items():
         numbers = content["numbers"]
         if numbers.get("kind") == "fit" and numbers["rms_deg"] is not None:
@@ -98,8 +99,8 @@ def _errors(contents: Mapping[str, Content]) -> dict[str, Any]:
         for error in numbers.get("errors", ()):
             seen = "unseen" if error["unseen"] else "fitted"
             rms = "–" if error["rms_deg"] is None else number(error["rms_deg"])
-            row = [error["fit"], error["log"], seen, rms]
-            rows += [row] if row not in rows else []  # a fit's report may show its validation too
+            found.setdefault((error["fit"], error["log"], seen, rms), name)
+    rows += [[fit if fit == name else f"{fit} (in {name})", *rest] for (fit, *rest), name in found.items()]
     return _table("Errors", ("report", "log", "log is", "rms [deg]"), rows)
 
 

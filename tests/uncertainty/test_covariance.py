@@ -127,7 +127,8 @@ def test_a_derivative_that_depends_on_its_step_is_doubted():
     problem, theta, _ = jumping(1e-2)
     found = uncertainty(problem, theta)
     doubts = [status.derivative_doubt for status in found.status]
-    assert doubts[0] is not None and doubts[0] > 0.1
+    assert doubts[0] is not None
+    assert doubts[0] > 0.1
     assert doubts[1:] == [None, None]
 
 

@@ -173,6 +173,16 @@ def _fills(c: NDArray[np.void], angle: Array) -> tuple[Array, Array]:
     return chosen[0], chosen[1]
 
 
+def swallowed(c: NDArray[np.void], angle: Array, velocity: Array) -> Array:
+    """Flow [m³/s] that the chamber behind the motion takes in at an angle [rad] and velocity [rad/s].
+
+    Elementwise over COEFFICIENTS; 0 of a joint without actuator.
+    """
+    speed = np.where(c["kind"] == LINEAR, rod_motion(c, angle)[1], 1.0) * velocity
+    flow = np.where(speed > 0, c["area_a"], -c["area_b"]) * speed
+    return np.where(c["kind"] == NONE, 0.0, flow)
+
+
 def rod_motion(c: NDArray[np.void], angle: Array) -> tuple[Array, Array, Array]:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
 

@@ -13,7 +13,8 @@ load leaves of P, add up to what the pump gives, and no equation has to be solve
 and comes up after a demand: φ is `pump_idle` at rest, and from `pump_delay` after the first command on it
 rises to 1 with the time constant `pump_rise`. Every section of the valve has a load check valve: oil never
 runs back to the pump. A joint whose own supply pressure is lower than the line's has a reducing valve.
-Joints without an actuator, such as those that follow a log, take nothing.
+Joints without an actuator take nothing. One that follows a log takes what its actuator's chamber swallows at
+the logged speed, however low P falls.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
 P changes by
@@ -63,6 +64,7 @@ def begin_line(line: Any, c: Any, z: Any, demanded: bool, step: float) -> None:
     line.pressure, line.share, line.demand = z.line, z.share, z.demand
     line.demanded = 1.0 if demanded else 0.0
     line.decay = np.exp(-step / c.pump_rise) if c.pump_rise > 0.0 else 0.0
+    line.drawn = line.taken
 
 
 @compilable
@@ -101,4 +103,4 @@ def fill(line: Any, w: Any, step: float) -> None:
 def close_line(line: Any, c: Any) -> None:
     """Take over the line's change, and be ready for the next sub-step."""
     line.pressure = min(max(line.pressure + line.change, 0.0), c.relief)
-    line.drawn, line.softness, line.swept = 0.0, 0.0, 0.0
+    line.drawn, line.softness, line.swept = line.taken, 0.0, 0.0

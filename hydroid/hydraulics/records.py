@@ -83,7 +83,8 @@ SCRATCH = np.dtype(
 
 LINE = np.dtype(
     _fields(
-        "pressure share demand demanded decay "  # of the step: state, whether there is a command, decay of φ
+        # of the step: state, whether there is a command, decay of φ, flow into joints that follow a log [m³/s]
+        "pressure share demand demanded decay taken "
         "drawn softness swept change"  # of a sub-step: as `pump` sums them; change of pressure
     )
 )

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
 from hydroid.arm.model import quiet_mujoco
-from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation
-from hydroid.hydraulics.records import JOINT_STATE, Records, has_force_curve, linkages
+from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation, swallowed
+from hydroid.hydraulics.records import JOINT_STATE, Records, coefficients, has_force_curve, linkages
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout
@@ -46,11 +46,15 @@ class Trace:
 
 @dataclass(frozen=True)
 class _Start:
-    """Candidates at the start of a log: what they change in the model, and their actuators."""
+    """Candidates at the start of a log: what they change in the model, and their actuators.
+
+    taken: flow from the pump into the joints that follow the log [m³/s], shape (n, steps); or (n, 0).
+    """
 
     values: dict[str, Array]
     actuator: Actuator
     state: ActuatorState
+    taken: Array
 
 
 class ArmActuators:
@@ -144,6 +148,7 @@ class HydraulicSimulation:
         self._threads = scenario.settings.threads or os.cpu_count() or 1
         prescribed = scenario.prescribed
         self._follows = np.array([], np.intp) if prescribed is None else prescribed.columns
+        self._arm_settings = arm
         self._actuators = ArmActuators(arm, scenario.arm, scenario.active, hydraulics, self._follows)
         self._pressures = np.searchsorted(self._actuators.joints, np.array(pressures, int))
         self._command = np.ascontiguousarray(scenario.command[:, self._actuators.columns])
@@ -203,7 +208,19 @@ class HydraulicSimulation:
         values, pose = self.scenario.values(candidates), self.scenario.arm.pose
         balance = np.array([arm.start(values, row, pose) for row in range(len(candidates))])
         started = self._actuators.start(candidates, pose, balance, self.scenario.pressure)
-        return _Start(values, *started)
+        return _Start(values, *started, self._taken(candidates))
+
+    def _taken(self, candidates: Candidates) -> Array:
+        """What the joints that follow the log take from the pump [m³/s], shape (n, steps)."""
+        prescribed, actuators = self.scenario.prescribed, candidates.actuators
+        assert actuators is not None
+        if prescribed is None or np.isinf(actuators.pump_flow).all():
+            return np.empty((len(candidates), 0))
+        joints = [int(j) for j in self.scenario.arm.columns[prescribed.columns]]
+        with_actuator = [j for j in joints if self._arm_settings.joints[j].actuator is not None]
+        chosen: Records = actuators[:, joints]  # pyright: ignore[reportAssignmentType]
+        c = coefficients(chosen, linkages(self._arm_settings, joints, with_actuator, chosen))
+        return swallowed(c[:, None], prescribed.angle, prescribed.velocity).sum(axis=2)
 
     def _follow(
         self, arm: HydraulicArm, start: _Start, row: int, *, observe: bool
@@ -222,7 +239,7 @@ class HydraulicSimulation:
         angle[0], seen[0] = pose, state
         commands = np.concatenate([start.state.commands[1:], self._command])
         arm.attach(start.actuator, state, row)
-        arm.roll(commands, angle[1:], seen[1:], self._servo)
+        arm.roll(commands, angle[1:], seen[1:], self._servo, start.taken[row])
         if not observe:
             return angle, None
         states, one = ActuatorState(seen, commands), slice(row, row + 1)

@@ -32,6 +32,12 @@ class Prescribed:
         joints: prescribed joints among the arm's, 0-based.
         columns: their positions among the moving joints.
         settings: low-pass of the motion, steps per sample.
+
+    Attributes:
+        columns: as given.
+        angle: at the start of each step [rad], shape (steps, P).
+        velocity: during it [rad/s], shape (steps, P).
+        torque: [N·m], shape (steps, P).
     """
 
     def __init__(
@@ -54,9 +60,11 @@ class Prescribed:
         fine = np.stack([np.interp(samples, log.time, angle) for angle in motion.T], axis=1)
         velocity = np.diff(fine, axis=0, prepend=fine[:1]) / step
         acceleration = np.diff(velocity, axis=0) / step
+        self.angle: Array = fine[:-1]
+        self.velocity: Array = velocity[1:]
         # semi-implicit Euler: the step from k to k+1 has the new velocity and the old angle
         self.torque: Array = (
-            armature * acceleration + self.damping * velocity[1:] + self.stiffness * fine[:-1]
+            armature * acceleration + self.damping * self.velocity + self.stiffness * self.angle
         )
 
 

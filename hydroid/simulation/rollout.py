@@ -123,7 +123,14 @@ class HydraulicArm(SingleArm):
         """Take the actuators of one candidate of a population; steps change `state`, (J,) of JOINT_STATE."""
         self._plugin, self._state, self._row = actuator.plugin, state, row
 
-    def roll(self, commands: Array, angle: Array, seen: NDArray[np.void], servo: Array) -> None:
+    def roll(
+        self,
+        commands: Array,
+        angle: Array,
+        seen: NDArray[np.void],
+        servo: Array,
+        taken: Array = np.empty(0),
+    ) -> None:
         """Step the arm, up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
 
         Args:
@@ -131,9 +138,10 @@ class HydraulicArm(SingleArm):
             angle: receives the angles after each of T samples [rad], shape (T, V).
             seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
             servo: torque of the joints that follow a log at each step [N·m], shape (T steps, P).
+            taken: flow from the pump into these joints at each step [m³/s], shape (T steps,); or it is empty.
         """
         plugin, state = self._plugin, self._state
-        roll(self._handles, plugin, self._row, state, commands, servo, self._steps, angle, seen)
+        roll(self._handles, plugin, self._row, state, commands, servo, taken, self._steps, angle, seen)
 
 
 def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
@@ -160,6 +168,7 @@ def roll(
     state: Any,
     commands: Any,
     servo: Any,
+    taken: Any,
     steps: int,
     angle: Any,
     seen: Any,
@@ -177,6 +186,8 @@ def roll(
     for k in range(angle.shape[0] * steps):
         for j in range(joints):
             here[j], speed[j] = arm.angle[columns[j]], arm.velocity[columns[j]]
+        if taken.size:
+            pad.line[0].taken = taken[k]
         look_ahead(plugin, candidate, state, commands[: past + k + 1], exchange, pad)
         for j in range(joints):
             arm.applied[columns[j]] = exchange.torque[j]
@@ -220,6 +231,6 @@ def compile_rollout() -> None:
     arm = Handles(0, 0, one, one, one, one, one, warnings, column, one, column)
     table, square = np.ones((1, 1), COEFFICIENTS), np.ones((1, 1))
     plugin = Plugin(table, square, order=column, entries=column[None], idle=0, period=0.01, substeps=1)
-    state, nothing = np.zeros(1, JOINT_STATE), np.empty((0, 1))
+    state, nothing, none = np.zeros(1, JOINT_STATE), np.empty((0, 1)), np.empty(0)
     with event.install_listener("numba:compile", _Announcement()):
-        roll(arm, plugin, 0, state, nothing, nothing, 1, nothing, np.empty((0, 1), JOINT_STATE))
+        roll(arm, plugin, 0, state, nothing, nothing, none, 1, nothing, np.empty((0, 1), JOINT_STATE))

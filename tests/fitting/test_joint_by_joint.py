@@ -72,6 +72,22 @@ def test_a_lone_joint_moves_as_with_all_others():
         assert np.rad2deg(np.sqrt(np.mean(error**2))) < 0.1  # the logged motion passes a low-pass
 
 
+def test_joints_that_follow_the_log_take_their_part_of_the_pump():
+    """Two joints share a pump that cannot serve both: each alone is as slow as beside the other.
+
+    What is left is the low-pass of the motion that is followed, less than half of the pump's effect.
+    """
+    settings, log = make(**{"hydraulics.pump_flow": 1.5, "hydraulics.line_volume": 20.0})
+    _, own_pumps = make()
+    problem = Problem(settings, [log])
+    truth = problem.parameters.vector(TRUTH | {"D": 100.0}, "truth")
+    for joint in problem.lone_joints:
+        error = problem.alone(joint, truth).residuals(truth[None])
+        effect = (own_pumps.angle - log.angle)[:, joint - 1]
+        assert np.rad2deg(np.sqrt(np.mean(effect**2))) > 1
+        assert np.mean(error**2) < 0.25 * np.mean(effect**2)
+
+
 def test_the_start_pose_is_the_recordings_not_the_joints():
     """Joint 3 rests for longer than joint 2: its lone log must not start amid joint 2's motion."""
     _, log = make(noise_deg=0.1)

@@ -27,6 +27,8 @@ from hydroid.settings.search import RefinementSettings, SearchSettings
 
 DRAWS = 16
 """candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
+MOVES = 0.01
+"""part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
 
 
 class Multistart:
@@ -164,9 +166,19 @@ class Multistart:
         return results[-1], simulated
 
     def _parts(self, problem: Problem) -> list[Problem]:
-        """The problem's first seconds, more and more of them, and at last all of it."""
+        """The problem's first seconds, more and more of them, and at last all of it.
+
+        A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
+        """
         longest = max(log.duration for log in problem.logs)
-        return [*(problem.first(h) for h in self._settings.horizons if h < longest), problem]
+        parts = [problem.first(h) for h in self._settings.horizons if h < longest]
+        return [*(part for part in parts if _moves(part, problem)), problem]
+
+
+def _moves(part: Problem, whole: Problem) -> bool:
+    """Whether any signal moves in the first part of the records."""
+    both = zip(part.channels, whole.channels, strict=True)
+    return any(np.ptp(first.measured) > MOVES * np.ptp(all_.measured) for first, all_ in both)
 
 
 def _rms(rows: Array) -> float:

@@ -89,7 +89,7 @@ class MultistartSettings(Settings):
     """number of start points"""
     horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0, 20.0)
     """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
-    command on [s]"""
+    command on [s]; those in which nothing moves yet are left out"""
     iterations: Count = 100
     """largest number of steps of each of these fits"""
     gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4

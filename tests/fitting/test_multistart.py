@@ -70,6 +70,24 @@ def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time():
     np.testing.assert_array_equal(part.residuals(theta).reshape(2, -1), whole[:, :151])
 
 
+def test_a_horizon_in_which_nothing_moves_is_left_out():
+    """A joint at its stop leaves it 0.6 s after the command: a quarter of a second of that teaches nothing."""
+    settings, log = make()
+    late = replace(log, command=np.roll(log.command, -60, axis=0) * (np.arange(850) < 790)[:, None])
+    names: dict[str, dict] = {}
+    problem = Problem(settings, [late])
+    search = settings.search.model_copy(
+        update={
+            "multistart": settings.search.multistart.model_copy(
+                update={"starts": 1, "iterations": 1, "horizons": (0.25, 2.0)}
+            )
+        }
+    )
+    memo = Memo(problem)
+    Multistart(problem, search, memo, lambda n, rms: None, names).run(None, lambda *_: None, lambda _: None)
+    assert len(names) == 2  # two seconds, and all
+
+
 def test_starts_fill_positive_bounds_evenly_by_decades():
     settings, log = make(factor=100.0, **{"parameters.S2.bounds": [0.0, 500.0]})
     problem = Problem(settings, [log])

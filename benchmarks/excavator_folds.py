@@ -1,10 +1,10 @@
-"""Models of the real excavator compared within its fit_* logs: fitted without three logs, judged on these three.
+"""Models of the real excavator compared within its fit_* logs: each predicts logs that its fit left out.
 
     python benchmarks/excavator_folds.py [VARIANT ...] [--joints 2 3 4 1] [--folds 4]
 
-Each joint is fitted alone with all that acts on it, pump and masses included. The other joints follow their
-logged motion and take their part of the pump. So one row costs minutes, not hours, and the six check_* logs stay
-unseen. Prints the mean absolute error over whole logs [deg] by joint: on the logs of the fit, and on those left
+Each joint is fitted alone with all that acts on it, pump and masses included. The other joints follow
+their logged motion and take their part of the pump. So a row costs minutes, not hours, and the six check_* logs
+stay unseen. Prints the mean absolute error over whole logs [deg] by joint: on fitted logs, and on those left
 out.
 """
 
@@ -25,7 +25,7 @@ from hydroid.settings.search import RefinementSettings
 FOLDER = Path(__file__).parents[1] / "examples" / "excavator"
 JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
 
-COARSE = {"simulation.steps_per_sample": 1, "hydraulics.substeps": 8}
+COARSE: dict[str, object] = {"simulation.steps_per_sample": 1, "hydraulics.substeps": 8}
 """as the shipped steps to 0.02 deg, in two thirds of the time"""
 ENDING = RefinementSettings(iterations=10, gain_tolerance=0.003)
 
@@ -61,7 +61,7 @@ VARIANTS: dict[str, dict[str, object]] = {
 
 def lone(joint: int, changes: dict[str, object]) -> FitSettings:
     """Settings under which one joint is fitted alone."""
-    alone: dict[str, object] = {"outputs": [joint], "simulation.other_joints": "measured"} | COARSE
+    alone = {"outputs": [joint], "simulation.other_joints": "measured"} | COARSE
     if joint != 1:
         alone["parameters.D_swing.fixed"] = 20000
     return hydroid.load_settings(FOLDER / "fit.yaml", changes | alone)
@@ -103,10 +103,8 @@ def main() -> None:
             logs = logs or hydroid.read_logs(sorted(FOLDER.glob("fit_*.csv")), settings)
             found = folded(settings, [log.driving(joint) for log in logs], arguments.folds)
             spent = time.process_time() - began
-            print(
-                f"{name:28}{JOINTS[joint]:>8}{found[2]:4d} free{found[0]:8.2f}{found[1]:8.2f} deg{spent:7.0f} s",
-                flush=True,
-            )
+            row = f"{JOINTS[joint]:>8}{found[2]:4d} free{found[0]:8.2f}{found[1]:8.2f} deg"
+            print(f"{name:28}{row}{spent:7.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ SCRATCH = np.dtype(
 
 LINE = np.dtype(
     _fields(
-        # of the step: state, whether there is a command, decay of φ, flow into joints that follow a log [m³/s]
+        # of the step: state, whether there is a command, decay of φ, flow into joints that follow a log
         "pressure share demand demanded decay taken "
         "drawn softness swept change"  # of a sub-step: as `pump` sums them; change of pressure
     )

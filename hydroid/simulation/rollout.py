@@ -29,6 +29,8 @@ from hydroid.simulation.scenario import Array
 
 _log = logging.getLogger(__name__)
 
+NOTHING = np.empty(0)
+
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
 _library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
 llvmlite.binding.add_symbol("mj_step", ctypes.cast(_library.mj_step, ctypes.c_void_p).value)
@@ -129,7 +131,7 @@ class HydraulicArm(SingleArm):
         angle: Array,
         seen: NDArray[np.void],
         servo: Array,
-        taken: Array = np.empty(0),
+        taken: Array = NOTHING,
     ) -> None:
         """Step the arm, up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
 

@@ -71,7 +71,7 @@ def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time():
 
 
 def test_a_horizon_in_which_nothing_moves_is_left_out():
-    """A joint at its stop leaves it 0.6 s after the command: a quarter of a second of that teaches nothing."""
+    """A joint leaves its stop 0.6 s after the command: its first quarter of a second teaches nothing."""
     settings, log = make()
     late = replace(log, command=np.roll(log.command, -60, axis=0) * (np.arange(850) < 790)[:, None])
     names: dict[str, dict] = {}

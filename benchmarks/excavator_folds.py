@@ -3,9 +3,8 @@
     python benchmarks/excavator_folds.py [VARIANT ...] [--joints 2 3 4 1] [--folds 4]
 
 Each joint is fitted alone with all that acts on it, pump and masses included. The other joints follow
-their logged motion and take their part of the pump. So a row costs minutes, not hours, and the six check_* logs
-stay unseen. Prints the mean absolute error over whole logs [deg] by joint: on fitted logs, and on those left
-out.
+their logged motion and take their part of the pump. A row costs minutes, not hours, and the six check_* logs
+stay unseen. Prints the mean absolute error over whole logs [deg] by joint: on fitted logs, and on others.
 """
 
 import argparse

@@ -141,7 +141,8 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
         if result.best.usable
         else None
     )
-    write_page(fit_page(folder.identity(), problem, result, suggested), folder.path)
+    page = fit_page(folder.identity(), problem, result, suggested, str(folder.path))
+    write_page(page, folder.path)
     folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
     return result
 

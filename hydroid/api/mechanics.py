@@ -1,17 +1,24 @@
 """What stage 2 takes from stage 1: its estimate, and the arm and log layout that it was made with."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.estimate import estimate_file, read_values
+from hydroid.estimate import ParameterEstimate, estimate_file, read_values
 from hydroid.files import is_file
 from hydroid.identified_model import ARM, CONFIG
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
+from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import MECHANICAL_UNITS
+from hydroid.uncertainty.flags import Flag
+
+MOVED = 0.05
+"""relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""
+_log = logging.getLogger(__name__)
 
 
 def with_mechanics(
@@ -57,7 +64,22 @@ def with_mechanics(
         for name in wanted
         if name in values and name not in own and f"parameters.{name}.fixed" not in changes
     ]
+    for name in given if summary is not None else ():
+        assert summary is not None
+        _doubt(name, summary.estimate[name], nominal_value(settings, settings.parameters[name]))
     return changes | {f"parameters.{name}.fixed": values[name] for name in given}
+
+
+def _doubt(name: str, known: ParameterEstimate, nominal: float | None) -> None:
+    """Warn of a mass that stage 1 moved from its nominal value although its logs do not determine it."""
+    if known.unit != "kg" or not nominal or known.flag in (None, Flag.IDENTIFIABLE, Flag.FIXED):
+        return
+    if abs(known.value - nominal) > MOVED * nominal:
+        _log.warning(
+            "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it (%s). "
+            "Without --mech it is estimated here",
+            *(name, known.value, nominal, known.flag),
+        )
 
 
 def _inherited(folder: Path, config: str | Path, logs: Sequence[str]) -> dict[str, Any]:

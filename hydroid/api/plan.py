@@ -10,7 +10,7 @@ from hydroid.api.look import ModelSource, open_model, read_logs
 from hydroid.api.study import Study
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
-from hydroid.identified_model import IdentifiedModel
+from hydroid.identified_model import CONFIG, IdentifiedModel
 from hydroid.log import write_log
 from hydroid.progress import Progress, no_progress
 
@@ -57,7 +57,9 @@ def suggest(
     if not np.isfinite(problem.residuals(opened.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=opened.source)
     result = suggestions(problem, uncertainty(problem, opened.theta), progress=progress)
-    return Study(result, suggestion_page(problem, result, opened.name)).write(out)
+    source = Path(opened.source)
+    run = str(source.parent) if is_file(source.parent / CONFIG) else "RUN"
+    return Study(result, suggestion_page(problem, result, opened.name, run)).write(out)
 
 
 def run_logs(model: ModelSource) -> list[Path]:

@@ -19,7 +19,7 @@ def init(
     joints: Sequence[str] = (),
     tip: str | None = None,
 ) -> "Project":
-    """Write a project that runs: arm file, model, settings of both stages, a picture of the arm, next steps.
+    """Write a project that runs: arm file, model, settings of a fit, a picture of the arm, next steps.
 
         project = hydroid.init("mine", "robot.urdf", ["a.csv", "b.csv"])
         print(*project.notes, *project.columns, *project.commands, sep="\\n")

@@ -39,7 +39,7 @@ def suggest(
     lines = [study.page.tables["missing_terms"]]
     for section in study.page.sections:
         lines += [f"{section.title}", *([section.text] if section.text else [])]
-        lines += [f"- {point}" for point in section.points]
+        lines += [f"- {point}" for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
     show(output, lambda: suggestion_content(study.result), [*lines, str(out / "suggestions.html")])
 
 

@@ -42,14 +42,14 @@ def init(
 ) -> None:
     """Write a project that runs, from your arm's CAD and your log.
 
-    It has the arm's file and model, settings of both stages with starts and priors from the arm's size, a
+    It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
     picture to check the arm by, and the commands to run next. Nothing is overwritten.
     """
     from hydroid.api.start import init
 
     project = init(folder, arm, log or [], joints=names(joints or ""), tip=tip)
     lines = [f"{project.folder}: {', '.join(project.files)}"]
-    guessed = "The log's columns, guessed. Check them, and correct them in fit-mech.yaml and fit-hyd.yaml:"
+    guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
     for heading, group in (("The arm:", project.notes), (guessed, project.columns)):
         lines += ["", heading, *(f"  {line}" for line in group)] if group else []
     if project.unused:

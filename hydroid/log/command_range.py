@@ -12,6 +12,10 @@ LEAST_USE = 0.1  # part of half a range that a log uses on each side of its midd
 RESTING = 0.05  # part of the samples that has the same value, for this to be the value at rest
 SYMMETRIC = {1.0: "±1", 10.0: "±10 V", 100.0: "%", 1000.0: "±1000", 32767.0: "±32767"}
 """ranges about 0, by their end"""
+LOOP = (4.0, 20.0)
+"""a current loop of one direction [mA]: no command, and all of it"""
+MOST = 0.95
+"""part of the samples in which one of the two directions rests, if they are those of one command"""
 RAISED = {
     "4 to 20 mA": (4.0, 20.0),
     "0 to 5 V": (0.0, 5.0),
@@ -47,6 +51,17 @@ def likely_range(values: Floats) -> CommandRange | None:
     largest = max(-low, high)
     end = next((end for end in SYMMETRIC if largest <= end * (1 + TOLERANCE)), None)
     return None if end is None else CommandRange(SYMMETRIC[end], 100 / end, 0.0)
+
+
+def likely_pair(positive: Floats, negative: Floats) -> CommandRange | None:
+    """Return the range that fits the cells of a command of two columns, one for each direction."""
+    low, high = LOOP
+    slack = TOLERANCE * (high - low)
+    both = np.concatenate([positive, negative])
+    at_rest = np.mean((abs(positive - low) <= slack) | (abs(negative - low) <= slack))
+    if both.min() >= low - slack and both.max() <= high + slack and at_rest > MOST:
+        return CommandRange("4 to 20 mA on each side", 100 / (high - low), -100 * low / (high - low))
+    return likely_range(positive - negative)
 
 
 def _raised(low: float, high: float, rests: list[float]) -> Iterator[CommandRange]:

@@ -1,8 +1,9 @@
 """Bytes -> lines -> table: the CSV dialects that loggers and spreadsheets write.
 
-Accepted: `,` `;` tab (and what a first line `sep=;` says), decimal commas where the separator is no comma,
-comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted cells, blank lines, and
-what `hydroid.log.csv_layout` finds: a preamble, several rows of names, a row of units.
+Accepted: `,` `;` tab (and what a first line `sep=;` says), spaces where nothing else parts the numbers,
+decimal commas where the separator is no comma, comment lines `#`, a byte order mark, UTF-8, UTF-16 or
+Latin-1, any line ends, quoted cells, blank lines, and what `hydroid.log.csv_layout` finds: a preamble,
+several rows of names, a row of units.
 """
 
 import codecs
@@ -21,7 +22,7 @@ from hydroid.log.table import Cells
 MAX_BYTES = 2**28
 MAX_LINE = 100_000  # characters; also below the csv module's own limit for one cell
 _PLAIN = "CSV in UTF-8 separated by commas"
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +129,14 @@ def _is_clock(rows: Sequence[Sequence[str]], column: int) -> bool:
 
 def _plain_numbers(rows: Sequence[str], columns: Sequence[int], width: int, separator: str) -> Floats | None:
     """Read all rows at once; None where a row or a cell is unusual and must be looked at by itself."""
-    if not rows or any(row.count(separator) != width - 1 or '"' in row or "_" in row for row in rows):
+    spaces = separator == " "
+    widths = (len(row.split()) if spaces else row.count(separator) + 1 for row in rows)
+    if not rows or any(n != width for n in widths) or any('"' in row or "_" in row for row in rows):
         return None
     try:
-        return np.loadtxt(rows, delimiter=separator, usecols=columns, comments=None, ndmin=2)
+        return np.loadtxt(
+            rows, delimiter=None if spaces else separator, usecols=columns, comments=None, ndmin=2
+        )
     except ValueError:
         return None
 

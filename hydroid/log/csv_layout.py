@@ -8,6 +8,7 @@ below the names is left out only if it holds no number: any other fault there is
 
 import csv
 import re
+import shlex
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -120,7 +121,8 @@ def _separator(sample: Sequence[str]) -> str:
         mixed = _usual([n if len(row) > 1 else 0 for n, row in zip(counts, rows, strict=True)])
         return usual * counts.count(usual), mixed * counts.count(mixed), len(rows[0]) > 1
 
-    return max("\t;,", key=merit)
+    best = max("\t;,", key=merit)
+    return " " if merit(best)[1] == 0 and merit(" ")[0] > 0 else best  # cells may hold spaces, or be blank
 
 
 def _usual(counts: Sequence[int]) -> int:
@@ -136,7 +138,9 @@ def is_content(line: str, separator: str = ",") -> bool:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line."""
+    """Return the cells of a line; of a line in columns of spaces, however many part them."""
+    if separator == " ":
+        return shlex.split(line) if line.count('"') % 2 == 0 and '"' in line else line.split()
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from hydroid.errors import LogError
 from hydroid.log.clock import likely_unit
 from hydroid.log.column_words import Kind, direction, joint_of, kind_of, number_in, unit_of
-from hydroid.log.command_range import likely_range
+from hydroid.log.command_range import likely_pair, likely_range
 from hydroid.log.log import Floats
 from hydroid.log.table import Table
 from hydroid.settings.log import SECONDS
@@ -202,7 +202,7 @@ def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
     """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
     parts = [np.nan_to_num(column.values) for column in columns]
-    likely = likely_range(parts[0] if len(parts) == 1 else parts[0] - parts[1])
+    likely = likely_range(parts[0]) if len(parts) == 1 else likely_pair(parts[0], parts[1])
     entry: dict[str, Any] = {"column": names[0] if len(names) == 1 else names}
     if likely is None or (columns[0].unit in ("%", "pct", "percent") and likely.name != "%"):
         return entry, f"{' and '.join(names)}: command in %"

@@ -43,7 +43,11 @@ def open_mat(path: Path, *, hdf5: bool) -> ArrayTable:
 
 def _objects(variables: Mapping[str, Any]) -> str:
     if any(value is None for value in variables.values()):
-        return "objects such as timeseries can only be read by MATLAB: save their Time and Data as arrays"
+        name = next(name for name, value in variables.items() if value is None)
+        return (
+            "objects such as timeseries can only be read by MATLAB: there, save their arrays with "
+            f"time = {name}.Time; data = {name}.Data; save('arrays.mat', 'time', 'data')"
+        )
     return "save commands, angles and time as arrays or structs"
 
 

@@ -1,4 +1,4 @@
-"""A new project: arm file, model, settings of both stages and a picture, from a robot's file and logs."""
+"""A new project: arm file, model, settings of a fit and a picture, from a robot's file and logs."""
 
 from hydroid.project.project import Project, Sources, write_project
 

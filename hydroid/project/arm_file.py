@@ -33,8 +33,8 @@ JOINTS = """
 # the axis as a right-handed screw does: compare them with your log.
 #
 # ACTUATORS ARE STAND-INS: each is sized to lift the arm {lift:g} times at 150 bar, at the speed of the log.
-# Stage 1 does not use them. For stage 2 give your cylinders by their two pivots, as CAD shows them with all
-# joints at 0:
+# Angles can be predicted with them. Pressures and forces need your cylinders: give their two pivots, as CAD
+# shows them with all joints at 0:
 #   actuator: {{kind: linear, pivots: {{parent: [x, y, z], child: [x, y, z], frame: arm}},
 #              area_a: 3117, area_b: 2099, max_opening: 2}}
 # area_a [mm²] pushes the rod out (bore 63 mm: 3117), area_b is what the rod (36 mm) leaves; max_opening

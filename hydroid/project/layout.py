@@ -78,7 +78,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
         reasons += motion.remarks(arm.joint_names, joint)
         if entry["command"] is None:
             followed |= motion.travel_deg > STILL_DEG
-        elif motion.sign < 0:
+        elif motion.turned:
             entry["command"] = turned(entry["command"])
     driven = tuple(j for j, e in entries.items() if e["command"] is not None and e["angle"] is not None)
     outputs = driven or tuple(j for j, e in entries.items() if e["angle"] is not None)

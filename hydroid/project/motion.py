@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.log import Log
+from hydroid.log import Direction, Log, direction_of
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +33,7 @@ class Motion:
     Attributes:
         speed: at which it moves when it moves [rad/s].
         travel_deg: between its smallest and its largest angle [deg].
+        direction: of its travel under strong commands; None: no command, or too little travel.
         correlation: of its speed with its own command, at the lag where that is largest; 0: no command.
         lag: behind its command [s].
         dead_band: command below which it does not move, about [%].
@@ -41,15 +42,16 @@ class Motion:
 
     speed: float
     travel_deg: float
+    direction: Direction | None = None
     correlation: float = 0.0
     lag: float = 0.0
     dead_band: float = 0.0
     other: tuple[int, float] | None = None
 
     @property
-    def sign(self) -> int:
-        """1 or -1: moves with or against its command; 0: not clear."""
-        return int(np.sign(self.correlation)) if abs(self.correlation) > CLEAR else 0
+    def turned(self) -> bool:
+        """Whether it moves against its command, as `hydroid check` says it too."""
+        return self.direction is not None and self.direction.turned
 
     def remarks(self, names: Sequence[str], joint: int) -> list[str]:
         """Return what a user should know, for joint [from 1] of those with the given names."""
@@ -61,8 +63,14 @@ class Motion:
                 f"({own}): check which columns belong together"
             ]
         lines: list[str] = []
-        if self.sign < 0:
-            lines.append(f"{name} moves against its command (correlation {own}): its sign is turned round")
+        if self.turned:
+            assert self.direction is not None
+            share = f"for {self.direction.against:.0%} of {self.direction.travel:.3g} deg of travel"
+            lines.append(
+                f"{name} moves against its command ({share}): the sign of the command is reversed, as if the "
+                "valve were wired the other way round; if the angle is what counts the other way (compare "
+                "arm.png), set the angle's scale to -1 instead, because gravity follows the angle"
+            )
         if self.dead_band > 2 * STEP:
             lines.append(f"{name} does not move below about {self.dead_band:g} % of command: a dead band")
         return lines
@@ -85,7 +93,8 @@ def find_motion(log: Log, joint: int) -> Motion:
     unlike = abs(found[most][0]) > abs(correlation) + CLEAR
     dead = _dead_band(log.command[: len(moved) - late, joint - 1], moved[late:])
     lag = (late + apart / 2) * log.period
-    return Motion(speed, travel, correlation, lag, dead, (most, found[most][0]) if unlike else None)
+    direction, other = direction_of(log, joint), (most, found[most][0]) if unlike else None
+    return Motion(speed, travel, direction, correlation, lag, dead, other)
 
 
 def _follows(log: Log, joint: int, moved: Floats) -> tuple[float, int]:

@@ -15,7 +15,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table
 from hydroid.project.arm_file import MESHES, arm_text, template_text
-from hydroid.project.fit_files import Names, hyd_text, mech_text
+from hydroid.project.fit_files import Names, fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
@@ -27,8 +27,8 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import validate
 
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
-MECH, HYD, STEPS = "fit-mech.yaml", "fit-hyd.yaml", "next-steps.md"
-FILES = (ARM, MODEL, PICTURE, MECH, HYD, STEPS, MESHES)
+FIT, STEPS = "fit.yaml", "next-steps.md"
+FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,9 @@ def write_project(folder: Path, sources: Sources) -> Project:
         arm = files.write(sizes)
         with style():
             write_atomic(stage / PICTURE, rendered(arm_figure(arm))[0])
-        for name, text in ((MECH, mech_text), (HYD, hyd_text)):
-            write_atomic(stage / name, text(arm, layout, sizes, Names(str(folder / name), files.reference)))
-            values = read_yaml(stage / name)[0] | {"arm": arm}
-            validate(values, FitSettings, name)  # what is written can be read
+        write_atomic(stage / FIT, fit_text(arm, layout, sizes, Names(str(folder / FIT), files.reference)))
+        # what is written can be read
+        validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
         steps = next_steps(folder, logs)
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
         write_atomic(stage / STEPS, steps_page(arm.name, folder, steps, notes, reasons))

@@ -37,11 +37,6 @@ class JointSize:
     speed: float
 
     @property
-    def gain(self) -> float:
-        """Torque per command [N·m/%]."""
-        return self.torque / 100
-
-    @property
     def damping(self) -> float:
         """What holds the speed at full command [N·m·s/rad]."""
         return self.torque / self.speed

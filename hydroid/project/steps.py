@@ -17,7 +17,7 @@ Then, from the folder in which you ran `hydroid init`:
 ```
 
 - `arm.yaml` is the arm: correct it, then run `hydroid build-model --arm {folder}/arm.yaml`.
-- `fit-mech.yaml` and `fit-hyd.yaml` are the settings of both stages: columns of the log, parameters, priors.
+- `fit.yaml` are the settings of the fit: columns of the log, parameters, starts, priors.
 - A log should begin with a second without a command. Record several: fit on some, validate on another.
 """
 
@@ -27,13 +27,12 @@ def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
     names = [shlex.quote(str(log)) for log in logs] or ["LOG.csv", "OTHER.csv"]
     fitted, other = " ".join(names[:-1] or names), names[-1]
     home = shlex.quote(str(folder))
-    mech, hyd = f"{home}/runs/mech", f"{home}/runs/hyd"
+    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
     return (
-        f"hydroid check {' '.join(names)} --config {home}/fit-mech.yaml",
-        f"hydroid fit-mech {fitted} --config {home}/fit-mech.yaml --out {mech}",
-        f"hydroid fit-hyd {fitted} --config {home}/fit-hyd.yaml --mech {mech} --out {hyd}",
-        f"hydroid validate {other} --fit {mech} --fit {hyd} --out {home}/runs/validation",
-        f"hydroid suggest {fitted} --fit {hyd} --out {home}/runs/suggestions",
+        f"hydroid check {' '.join(names)} {config}",
+        f"hydroid fit-hyd {fitted} {config} --out {run}",
+        f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
+        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
     )
 
 

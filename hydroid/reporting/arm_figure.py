@@ -45,6 +45,7 @@ def arm_figure(arm: Arm) -> Figure:
     for place, (across, names) in enumerate(((1, "xz"), (2, "xy"))):
         axes = drawing.add_subplot(grid[0, place])
         _view(axes, arm, links, across)
+        _skeleton(axes, arm, data, {name for name, *_ in links}, across)
         _pivots(axes, model, data, across)
         _axes_of_joints(axes, arm, data, across)
         axes.set_xlabel(f"{names[0]} [m]")
@@ -52,7 +53,8 @@ def arm_figure(arm: Arm) -> Figure:
         axes.set_title("from the right (-y)" if place == 0 else "from above")
         axes.set_aspect("equal", adjustable="datalim")
         axes.autoscale_view()
-    drawing.axes[0].legend(loc="best", fontsize=8)
+    if drawing.axes[0].get_legend_handles_labels()[0]:
+        drawing.axes[0].legend(loc="best", fontsize=8)
     if linear:
         _lengths(drawing.add_subplot(grid[1, 0]), linear, arm, moment=False)
         _lengths(drawing.add_subplot(grid[1, 1]), linear, arm, moment=True)
@@ -89,6 +91,18 @@ def _view(axes: Axes, arm: Arm, links: list[tuple[str, str, Array]], across: int
         labelled.add(name)
         faces = list(triangles[:, :, shown])
         axes.add_collection(PolyCollection(faces, facecolor=color, edgecolor="none", alpha=0.45, label=label))
+
+
+def _skeleton(axes: Axes, arm: Arm, data: mujoco.MjData, drawn: set[str], across: int) -> None:
+    """Draw each link without a shape as a line from its joint to the next, the last to its centre of mass."""
+    if set(arm.link_names) <= drawn:
+        return
+    last = data.body(arm.link_names[len(arm.joints) - 1]).xipos
+    places = np.vstack([data.body("base").xpos, data.xanchor, last])[:, [0, 3 - across]]
+    for place, name in enumerate(("base", *arm.link_names[: len(arm.joints)])):
+        if name not in drawn:
+            color = style.GREY if name == "base" else _color(place - 1)
+            axes.plot(*places[place : place + 2].T, "-", color=color, linewidth=3, label=name)
 
 
 def _axes_of_joints(axes: Axes, arm: Arm, data: mujoco.MjData, across: int) -> None:

@@ -53,9 +53,9 @@ _FILES = (
     "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
 )
 _SAME = {
-    "mech": "with the same versions. RUN/config.yaml holds all settings, and the seed.",
-    "hyd": "with the same versions. RUN/config.yaml holds all settings, the seed, and the values of stage 1: "
-    "the command needs no --mech.",
+    "mech": "with the same versions. This config.yaml holds all settings, and the seed.",
+    "hyd": "with the same versions. This config.yaml holds all settings, the seed, and the values of stage 1 "
+    "if it used any: the command needs no --mech.",
 }
 _CITATION = (
     "A. Montazeri, C. West, S. Monk and C. J. Taylor, Dynamic modelling and parameter estimation of a "
@@ -74,9 +74,13 @@ _SEVERAL = "Among these candidates, a better fit of one segment goes with a wors
 
 
 def fit_page(
-    identity: Mapping[str, Any], problem: Problem, fit: Fit, suggested: Suggestions | None = None
+    identity: Mapping[str, Any],
+    problem: Problem,
+    fit: Fit,
+    suggested: Suggestions | None = None,
+    run: str = "RUN",
 ) -> Page:
-    """Return the page of a fit; `identity` holds the run's versions and log hashes."""
+    """Return the page of a fit; `identity` holds the run's versions and log hashes, `run` is its folder."""
     found = joint_responses(problem, fit)
     outputs = len(problem.outputs)
     names = [
@@ -86,7 +90,7 @@ def fit_page(
     responses = dict(zip(names, found, strict=True))
     last = problem.freed() if fit.final == "joint" else problem
     sections = (
-        fit_steps(problem, fit, suggested),
+        fit_steps(problem, fit, suggested, run),
         Section(
             FITTED,
             tabs=response_tabs(responses),
@@ -96,8 +100,8 @@ def fit_page(
         _unknown(last, fit, suggested),
         *_actuators(last, fit),
         *motion_section(problem.settings.arm, _movements(problem, fit)),
-        *_folded(last, fit, suggested),
-        Section("Reproduce", facts=_facts(identity, problem)),
+        *_folded(last, fit, suggested, run),
+        Section("Reproduce", facts=_facts(identity, problem, run)),
     )
     versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
     title = f"Fit of {problem.settings.arm.name}, stage {STAGES[problem.settings.stage][:1]}"
@@ -208,10 +212,10 @@ def _records(problem: Problem, joint: int, theta: Array) -> Any:
     return joint_records(problem.settings.arm, problem.stage.candidates(theta), joint)
 
 
-def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None) -> tuple[Section, ...]:
+def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None, run: str) -> tuple[Section, ...]:
     objective = problem.settings.objective
     lacks, residual, actions = (
-        suggestion_sections(problem, suggested) if suggested is not None else (None, None, None)
+        suggestion_sections(problem, suggested, run) if suggested is not None else (None, None, None)
     )
     text = _SEVERAL if _has_segment_objectives(problem, fit) else _SINGLE
     hidden = (
@@ -232,7 +236,7 @@ def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None) -> tuple[
     return (replace(residual, tabs=tabs), *folded)
 
 
-def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, str], ...]:
+def _facts(identity: Mapping[str, Any], problem: Problem, run: str) -> tuple[tuple[str, str], ...]:
     settings = problem.settings
     hashes = list(identity.get("logs", {}).values())
     logs: list[tuple[str, str]] = []
@@ -242,8 +246,9 @@ def _facts(identity: Mapping[str, Any], problem: Problem) -> tuple[tuple[str, st
         label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
         logs.append((label, f"{name}, {number(seconds)} s, {samples} samples{digest}"))
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    config, again = shlex.quote(f"{run}/config.yaml"), shlex.quote(f"{run}-again")
     return (
-        ("command", f"hydroid fit-{settings.stage} {given} --config RUN/config.yaml --out AGAIN"),
+        ("command", f"hydroid fit-{settings.stage} {given} --config {config} --out {again}"),
         ("same bits", _SAME[settings.stage]),
         ("arm", f"{settings.arm.name}; its geometry is not estimated but read from arm.yaml"),
         ("stage", STAGES[settings.stage]),

@@ -11,7 +11,7 @@ from hydroid.parameters import Array, Parameter
 from hydroid.problem.problem import Problem
 from hydroid.reporting.table import number, plain
 from hydroid.settings.problem import ObjectiveSettings, PriorSettings
-from hydroid.uncertainty.covariance import at_bounds
+from hydroid.uncertainty.covariance import Uncertainty, at_bounds
 from hydroid.uncertainty.directions import Direction, Identifiability
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, ParameterStatus, Source
 from hydroid.uncertainty.intervals import Profile
@@ -193,11 +193,17 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
         for name, refinement in fit.refinements.items()
         if not refinement.ending.converged
     ]
+    if nothing := at_zero(problem, fit.uncertainty):
+        said.append(
+            f"At 0, the least that is possible: {listed(nothing)}. The logs show none of it. Such an "
+            "estimate has no interval."
+        )
+    limited = at_limits(problem, fit.uncertainty)
     for side in ("lower", "upper"):
         at_bound = [
-            f"{p.name} ({plain(p.lower if side == 'lower' else p.upper)} {p.unit})"
+            f"{p.name} ({plain(getattr(p, side))} {p.unit})"
             for p, status in zip(problem.parameters.parameters, fit.uncertainty.status, strict=True)
-            if status.at_bound == side and status.flag is not Flag.NO_EFFECT
+            if status.at_bound == side and p.name in limited
         ]
         if at_bound:
             said.append(
@@ -217,6 +223,22 @@ def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
             f"The refinement lowered the rms error but raised the {norm}, which the search minimised."
         )
     return tuple(said)
+
+
+def at_limits(problem: Problem, known: Uncertainty) -> list[str]:
+    """Return the parameters that lie at a bound which could be wider."""
+    nothing = at_zero(problem, known)
+    names = zip(problem.parameters.names, known.status, strict=True)
+    return [n for n, s in names if s.at_bound and s.flag is not Flag.NO_EFFECT and n not in nothing]
+
+
+def at_zero(problem: Problem, known: Uncertainty) -> list[str]:
+    """Return the parameters that lie at a lower bound of 0: no quantity can be negative."""
+    return [
+        p.name
+        for p, status in zip(problem.parameters.parameters, known.status, strict=True)
+        if status.at_bound == "lower" and p.lower == 0 and status.flag is not Flag.NO_EFFECT
+    ]
 
 
 def strain_phrase(problem: Problem, strain: Strain) -> str:

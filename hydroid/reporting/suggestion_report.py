@@ -21,7 +21,6 @@ from hydroid.suggestion.missing import LEVEL, MIN_GAIN, MissingTerms, TermTest, 
 from hydroid.suggestion.residuals import LONG_S, Binned, Regressor, ResidualCheck
 from hydroid.suggestion.suggest import Suggestions
 from hydroid.suggestion.terms import Term
-from hydroid.uncertainty.flags import WEAK_ABOVE
 
 _VERDICTS = {
     Verdict.FREE: "free it",
@@ -35,33 +34,48 @@ _AROUND = 5.0
 """proposed bounds reach from the proposed value divided by this to the value times this"""
 
 
-def suggestion_page(problem: Problem, result: Suggestions, source: str) -> Page:
-    """Return the page of all suggestions; its tables are `missing_terms`, `next_actions` and `residuals`."""
-    lead = missing_phrase(result.missing)
-    steps = tuple(suggested_steps(problem, result)[:MOST_STEPS])
+def suggestion_page(problem: Problem, result: Suggestions, source: str, run: str = "RUN") -> Page:
+    """Return the page of all suggestions; its tables are `missing_terms`, `next_actions` and `residuals`.
+
+    `source` names the estimate, and `run` is its run folder as a command takes it.
+    """
+    lead = missing_phrase(result)
+    steps = tuple(suggested_steps(problem, result, run)[:MOST_STEPS])
     first = (Section("Do next", steps=steps),) if steps else ()
     verdict = Strip(lead, f"At {source}, where the error is {math.degrees(result.missing.rms):.2g}° rms.")
-    sections = (*first, *suggestion_sections(problem, result))
+    sections = (*first, *suggestion_sections(problem, result, run))
     return Page("suggestions", f"What to change next, at {source}", lead, sections, verdict=verdict)
 
 
-def suggested_steps(problem: Problem, result: Suggestions) -> list[Step]:
-    """Return the quantity to free, and the actions, the best first."""
+def suggested_steps(problem: Problem, result: Suggestions, run: str = "RUN") -> list[Step]:
+    """Return the quantity to free, and the actions, the best first.
+
+    Only `hydroid suggest` says which quantity to free: the quick test of a fit's report sends there.
+    """
+    free = result.missing.free
     steps = [
         Step(
             f"Free {test.term.name}.",
             f"The rms error is predicted to fall {fall_phrase(result.missing, test)}. "
-            f"With RUN the folder of this fit, run: {freeing_command(problem, test)}",
+            f"Run: {freeing_command(problem, test, run)}",
         )
-        for test in result.missing.free[:1]
+        for test in free[: int(result.thorough)]
     ]
+    if free and not result.thorough:
+        steps.append(
+            Step(
+                f"Find what the model lacks: {_suggest_command(problem, run)}",
+                f"A quick test points at {listed([t.term.name for t in free])}. suggest refines each of the "
+                "promising ones, and prints the command that frees the best.",
+            )
+        )
     return steps + [
         Step(f"{action_name(problem, action)}.", f"Predicted: {action_effect(action)}.")
         for action in result.actions
     ]
 
 
-def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section, ...]:
+def suggestion_sections(problem: Problem, result: Suggestions, run: str = "RUN") -> tuple[Section, ...]:
     """Return the three sections."""
     seen, several = residual_phrases(problem, result.residuals), len(result.residuals) > 1
 
@@ -73,8 +87,8 @@ def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section,
     return (
         Section(
             "What the model lacks",
-            missing_phrase(result.missing),
-            points=term_phrases(problem, result),
+            missing_phrase(result),
+            points=term_phrases(problem, result, run),
             tables={"missing_terms": missing_table(result.missing)},
         ),
         Section(
@@ -97,35 +111,38 @@ def suggestion_sections(problem: Problem, result: Suggestions) -> tuple[Section,
     )
 
 
-def missing_phrase(missing: MissingTerms) -> str:
+def missing_phrase(result: Suggestions) -> str:
     """Say in a sentence what the model lacks."""
+    missing = result.missing
     if not missing.tests:
         return "Every quantity that could be tested is free already."
     if not missing.free:
         return f"Tested: {len(missing.tests)} quantities that the fit holds. None would lower the error much."
     first = missing.free[0]
+    if not result.thorough:
+        names = listed([test.term.name for test in missing.free])
+        return f"A quick test points at {names}: freeing one of them may lower the error."
     return f"Freeing {first.term.name} would lower the rms error {fall_phrase(missing, first)}: free it."
 
 
-def term_phrases(problem: Problem, result: Suggestions) -> tuple[str, ...]:
+def term_phrases(problem: Problem, result: Suggestions, run: str = "RUN") -> tuple[str, ...]:
     """Say how to free the best term, and what about the others."""
     free = result.missing.free
     if not free:
         return ()
+    if not result.thorough:
+        return (
+            "Each predicted error is that of the best of a few steps with the quantity freed. "
+            f"{_suggest_command(problem, run)} refines the parameters from there, in up to "
+            f"{SHORT.iterations} iterations, tests more quantities, and prints the command that frees the "
+            "best of them.",
+        )
     first, others = free[0], [test.term.name for test in free[1:]]
-    said = [
-        f"To free {first.term.name}, with RUN the folder of this fit, run: {freeing_command(problem, first)}"
-    ]
+    said = [f"To free {first.term.name}, run: {freeing_command(problem, first, run)}"]
     if others:
         said.append(
             f"{listed(others)} would also lower the error, but may describe the same error. Free one "
             "quantity at a time, and look at the report of the new fit."
-        )
-    if not result.thorough:
-        said.append(
-            "Each predicted error is that of the best of a few steps with the quantity freed. "
-            "hydroid suggest refines the parameters from there, in up to "
-            f"{SHORT.iterations} iterations, and tests more quantities."
         )
     return tuple(said)
 
@@ -135,13 +152,22 @@ def fall_phrase(missing: MissingTerms, test: TermTest) -> str:
     return f"from {number(math.degrees(missing.rms))} to {number(math.degrees(test.rms))} deg"
 
 
-def freeing_command(problem: Problem, test: TermTest) -> str:
-    """Return the command that fits the same logs again from the estimate, with a term freed."""
-    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+def _suggest_command(problem: Problem, run: str) -> str:
+    return f"hydroid suggest {_given(problem)} --fit {shlex.quote(run)}"
+
+
+def _given(problem: Problem) -> str:
+    """The logs as a command takes them."""
+    return " ".join(shlex.quote(log.source) for log in problem.logs)
+
+
+def freeing_command(problem: Problem, test: TermTest, run: str = "RUN") -> str:
+    """Return the command that fits the same logs again from a run's estimate, with a term freed."""
     name, _, parameter = setting_line(test).partition(": ")
+    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{name}"))
     return (
-        f"hydroid fit-{problem.settings.stage} {given} --config RUN/config.yaml --from RUN "
-        f"--set {shlex.quote(f'parameters.{name}={parameter}')} --out AGAIN"
+        f"hydroid fit-{problem.settings.stage} {_given(problem)} --config {config} --from {own} "
+        f"--set {shlex.quote(f'parameters.{name}={parameter}')} --out {out}"
     )
 
 
@@ -151,14 +177,20 @@ def setting_line(test: TermTest) -> str:
     Stage 2 asks for a start of every mechanical parameter that no run of stage 1 gives.
     """
     p, (low, high) = test.term.settings, proposed_bounds(test)
-    start = (
-        f", start: {plain(min(max(test.term.value, low), high))}" if p.quantity in MECHANICAL_UNITS else ""
-    )
+    start = "".join(f", {key}: {plain(value)}" for key, value in _proposed_start(test).items())
     where = f"link: {p.link}" if p.link else f"joints: [{', '.join(map(str, p.joints or ()))}]"
     where = "" if p.link is None and p.joints is None else f"{where}, "
     return (
         f"{test.term.name}: {{quantity: {p.quantity}, {where}bounds: [{plain(low)}, {plain(high)}]{start}}}"
     )
+
+
+def _proposed_start(test: TermTest) -> dict[str, float]:
+    """The start value of a mechanical parameter, within the proposed bounds."""
+    if test.term.settings.quantity not in MECHANICAL_UNITS:
+        return {}
+    low, high = proposed_bounds(test)
+    return {"start": min(max(test.term.value, low), high)}
 
 
 def proposed_bounds(test: TermTest) -> tuple[float, float]:
@@ -296,17 +328,12 @@ def action_name(problem: Problem, action: Action) -> str:
 
 def action_effect(action: Action) -> str:
     """Say what an action would do."""
-    before, after = action.known
-    share = (
-        f"{after} of {action.total} parameters get a standard deviation of {100 * WEAK_ABOVE:.0f} % or less"
-    )
-    change = f"{share}, as without it" if before == after else f"{share}, {before} without it"
     stated = action.kind in (ActionKind.STATE, ActionKind.WEIGH)
     beside = f"Besides {action.subject} itself, " if stated else ""
     most = f"{beside}{action.parameter} improves most: {_fall(action.deviations)}"
     if action.quantity:
         most += f". Of the quantities, {action.quantity} improves most: {_fall(action.quantity_deviations)}"
-    return f"{change} (assuming ±100 % on each before any log). {most}"
+    return most[0].upper() + most[1:] if stated else most
 
 
 def _fall(deviations: tuple[float, float]) -> str:
@@ -318,19 +345,17 @@ def action_table(actions: Sequence[Action]) -> Table:
     """Return one row per action."""
     rows = tuple(
         (
-            *(a.kind.value, a.subject, *a.known),
+            *(a.kind.value, a.subject),
             *(a.parameter, *(100 * d for d in a.deviations)),
             *((a.quantity, *(100 * d for d in a.quantity_deviations)) if a.quantity else ("", None, None)),
         )
         for a in actions
     )
-    header = ("action", "of", "known before", "known after", "improves most", "from ± [%]", "to ± [%]")
+    header = ("action", "of", "improves most", "from ± [%]", "to ± [%]")
     header += ("quantity", "quantity from ± [%]", "quantity to ± [%]")
     note = (
-        f"known: number of parameters whose relative standard deviation is at most {100 * WEAK_ABOVE:.0f} %. "
-        "Predicted at the estimate, with the noise that the residuals show, assuming ±100 % on each "
-        "parameter before any log. The noise counts as known exactly. The verdict assumes neither, so it can "
-        "count fewer parameters."
+        "Relative standard deviations, predicted at the estimate with the noise that the residuals show, "
+        "assuming ±100 % on each parameter before any log."
     )
     return Table("Predicted effect of each action", header, rows, note)
 
@@ -349,6 +374,7 @@ def suggestion_content(result: Suggestions) -> dict[str, Any]:
             "chance": test.chance,
             "parameter": test.term.settings.model_dump(mode="json", exclude_defaults=True)
             | {"bounds": proposed_bounds(test)}
+            | _proposed_start(test)
             if test.verdict is Verdict.FREE
             else None,
         }

@@ -8,7 +8,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.reporting.arm_picture import arm_picture
 from hydroid.reporting.page import Light, Verdict
-from hydroid.reporting.phrases import listed
+from hydroid.reporting.phrases import at_limits, at_zero, listed
 from hydroid.reporting.quantities_report import known_quantities
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag
@@ -62,7 +62,7 @@ def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Lig
     status = dict(zip(problem.parameters.names, known.status, strict=True))
     lost = [name for name, s in status.items() if s.flag in (Flag.UNIDENTIFIABLE, Flag.NO_EFFECT)]
     weak = [name for name, s in status.items() if s.flag is Flag.WEAK]
-    at = [name for name, s in status.items() if s.at_bound and s.flag is not Flag.NO_EFFECT]
+    at, nothing = at_limits(problem, known), at_zero(problem, known)
     question = "Identifiable"
     if lost:
         first = Light(question, "bad", f"Not from these logs: {_some(lost)}.")
@@ -73,7 +73,8 @@ def uncertainty_lights(problem: Problem, known: Uncertainty) -> tuple[Light, Lig
     if at:
         words = f"All but {_some(at)}: widen the bounds, or the model lacks something."
         return first, Light("Away from bounds", "bad", words)
-    return first, Light("Away from bounds", "good", "All parameters.")
+    words = f"All parameters; {_some(nothing)} {'is' if len(nothing) == 1 else 'are'} 0." if nothing else ""
+    return first, Light("Away from bounds", "good", words or "All parameters.")
 
 
 def _some(names: list[str]) -> str:

@@ -9,6 +9,7 @@ from annotated_types import Gt
 from hydroid.parameters import Parameter, Prior
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import TARGETS, HydraulicSettings, actuator_values
+from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
 
 QUANTILE = 1.96
@@ -22,6 +23,8 @@ MAY_BE_ZERO = {
     for name, field in HydraulicSettings.model_fields.items()
     if not any(isinstance(limit, Gt) for limit in field.metadata)
 }
+ROTARY_UNITS = {"mm²": "cm³/rad", "N": "N·m"}
+"""of the areas and the dry friction of a rotary actuator"""
 POSITIVE = {"mass"} | {name for name, sides in TARGETS.items() if not MAY_BE_ZERO & set(sides)}
 """quantities that must be above 0"""
 
@@ -130,7 +133,15 @@ def parameter(machine: Machine, name: str, own: ParameterSettings, log: bool, st
     start = own.start if own.start is not None else nominal_value(machine, own)
     start = min(max(start, lower), upper) if starts and start is not None else None
     on_log = lower > 0 and (log or (known is not None and known.log))
-    return Parameter(name, own.unit, lower, upper, own.fixed, on_log, start, known)
+    return Parameter(name, _unit(machine.arm, own), lower, upper, own.fixed, on_log, start, known)
+
+
+def _unit(arm: Arm, own: ParameterSettings) -> str:
+    """The unit of a parameter; areas and dry friction of rotary actuators have their own."""
+    joints = [arm.joints[j - 1] for j in own.joints or () if j <= len(arm.joints)]
+    rotary = bool(joints) and all(isinstance(joint.actuator, RotaryActuator) for joint in joints)
+    sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
+    return ROTARY_UNITS[own.unit] if rotary and sized else own.unit
 
 
 def _default_bounds(own: ParameterSettings, known: Prior | None) -> tuple[float, float]:

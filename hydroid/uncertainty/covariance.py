@@ -168,12 +168,15 @@ def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Ar
     """Return V, D, U of J = V D U: directions (p, p), singular values (p,), effects (p, R + M).
 
     The effects are unit rows of residuals with the M priors behind them. Along a direction whose effect on
-    the residuals is no larger than the difference between two steps' derivatives, only the priors count: they
-    are exact.
+    the residuals is no larger than its error, the difference between two steps' derivatives, only the priors
+    count: they are exact.
     """
     slopes, error = np.nan_to_num(derivatives.slopes[free]), np.nan_to_num(derivatives.error[free])
     directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
-    doubt = np.linalg.norm(directions.T @ error, axis=1)
+    turned = directions.T @ error
+    # a little of a stronger direction, added to a weak one, takes away what looks like its effect
+    hidden = np.sum(np.tril(turned @ effects.T, -1) ** 2, axis=1)
+    doubt = np.sqrt(np.maximum(np.sum(turned**2, axis=1) - hidden, 0.0))
     values[values <= np.maximum(doubt, RANK_TOLERANCE * values[0])] = 0.0
     priors = derivatives.prior_weight * derivatives.prior_slopes[free]
     if priors.any():

@@ -29,7 +29,7 @@ def write_log(
     project: Path, path: Path, seed: int = 0, seconds: float = 20.0, noise_deg: float = 0.05
 ) -> None:
     """Simulate the arm of a project's stage 2 at other values, and write commands in V and angles in rad."""
-    model = hydroid.start_values(hydroid.load_settings(project / "fit-hyd.yaml"))
+    model = hydroid.start_values(hydroid.load_settings(project / "fit.yaml"))
     values = {
         name: value * next((f for start, f in FACTORS.items() if name.startswith(start)), 1.0)
         for name, value in model.values.items()

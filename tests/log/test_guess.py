@@ -70,6 +70,15 @@ def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path
     assert any("by their order: check" in reason for reason in found.reasons)
 
 
+def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
+    up, down = (4 + 0.16 * part.clip(0) for part in (STEPS, -STEPS))
+    found = guess(tmp_path, ["t", "u2_up_mA", "u2_down_mA", "q2_deg"], T, up, down, SWEEP)
+    command = found.log["joints"][2]["command"]
+    assert command == {"column": ["u2_up_mA", "u2_down_mA"], "scale": 6.25, "offset": -25.0}
+    log, _ = read_log(tmp_path / "log.csv", LogSettings.model_validate(found.log), np.full((2, 2), [-9, 9]))
+    np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
+
+
 def test_numbers_from_zero_other_words_for_joints_and_derived_signals(tmp_path: Path) -> None:
     names = ["stamp", "valve0", "pos0", "valve1", "pos1", "dipper_angle", "vel1_rad", "p1_bar"]
     found = guess(tmp_path, names, T, STEPS, SWEEP, -STEPS, -SWEEP, SWEEP, SWEEP, SWEEP + 50)

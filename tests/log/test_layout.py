@@ -100,3 +100,14 @@ def test_the_format_is_said(encoding: str, tmp_path: Path) -> None:
     said = {"utf-8-sig": "UTF-8"}.get(encoding, encoding.upper())
     assert open_table(path).layout == f"CSV in {said} separated by tabs"
     assert [f.what for f in read(path)[1]] == [f"read as CSV in {said} separated by tabs"]
+
+
+@pytest.mark.parametrize("above", [[], ["# a rig, at night"]])
+def test_columns_may_be_parted_by_spaces(above: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join([*above, *(" ".join(f"{cell:>12}" for cell in row) for row in ROWS)]))
+    log, findings = read(path)
+    reference, _ = read(save(tmp_path / "plain.csv", ROWS))
+    assert "separated by spaces" in findings[-1].what
+    np.testing.assert_array_equal(log.command, reference.command)
+    np.testing.assert_array_equal(log.angle, reference.angle)

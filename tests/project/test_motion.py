@@ -26,7 +26,7 @@ def log_of(dead=0.0, lag=0.0, sign=1.0, speed=0.5):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_sign_and_lag_are_found(lag, sign):
     motion = find_motion(log_of(lag=lag, sign=sign), 1)
-    assert motion.sign == sign
+    assert motion.turned == (sign < 0)
     assert motion.lag == pytest.approx(lag, abs=0.06)
 
 
@@ -42,4 +42,4 @@ def test_the_speed_is_that_of_fast_motion():
 def test_a_joint_without_a_command_has_no_sign():
     log = log_of()
     still = Log("a", log.time, 0 * log.command, log.angle, PERIOD)
-    assert find_motion(still, 1).sign == 0
+    assert find_motion(still, 1).direction is None

@@ -19,8 +19,7 @@ from hydroid.suggestion.terms import Term
 def test_an_action_names_what_improves_beside_what_it_states():
     action = Action(ActionKind.STATE, "D", 8, (7, 8), "C", (0.015, 0.011), 1.2, "dead time", (0.2, 0.1))
     assert action_effect(action) == (
-        "8 of 8 parameters get a standard deviation of 30 % or less, 7 without it (assuming ±100 % on each "
-        "before any log). Besides D itself, C improves most: standard deviation 1.5 % to 1.1 %. Of the "
+        "Besides D itself, C improves most: standard deviation 1.5 % to 1.1 %. Of the "
         "quantities, dead time improves most: standard deviation 20 % to 10 %"
     )
 
@@ -48,8 +47,9 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
     free = held.model_copy(update={"fixed": None, "bounds": (5.0, 80.0)})
     test = TermTest(Term("M3", free, 21.17, named=True), Verdict.FREE, 9.0, 0.0, 0.001, 25.0)
     assert setting_line(test).endswith("start: 21.17}")
-    command = freeing_command(make_problem(("a b.csv",)), test)
-    assert "'a b.csv' --config RUN/config.yaml --from RUN --set 'parameters.M3={quantity: mass, " in command
+    command = freeing_command(make_problem(("a b.csv",)), test, "runs/my fit")
+    assert "'a b.csv' --config 'runs/my fit/config.yaml' --from 'runs/my fit' --set 'param" in command
+    assert command.endswith(" --out 'runs/my fit-M3'")
     key, value = parse_override(command.split("--set '")[1].split("'")[0])
     assert (key, value) == ("parameters.M3", yaml.safe_load(setting_line(test))["M3"])
     assert load_settings("fit-hyd", {key: value}).parameters["M3"].states_start

@@ -127,11 +127,12 @@ def validate(
         what = _explain(key, first, kind)
         hint = f"and {len(others)} more fault{'s' if len(others) > 1 else ''} in this file" if others else ""
         # the fault may lie in an override, below it, or in what it is a part of
+        place = key.removesuffix(".[key]") or what.partition(": ")[0]
         at = next(
-            (o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), ""
+            (o for o in overridden or () if f"{place}.".startswith(f"{o}.") or o.startswith(f"{place}.")), ""
         )
         where = f"--set {at}" if at else source + _line(loc, lines or {})
-        for name in (at, key) if at.startswith(f"{key}.") else (at,):
+        for name in (at, place, key) if at.startswith(f"{place}.") else (at,):
             what = what.removeprefix(f"{name}: ")
         raise SettingsError(what, where=where, hint=hint) from None
 

@@ -16,6 +16,10 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
 
+REVERSED = (
+    "a command is reversed as if its valve were wired the other way round; where it is the angle that counts "
+    "the other way (compare arm.png), set the angle's scale to -1 instead, because gravity follows the angle"
+)
 STILL_DEG = 1.0
 """travel below which a joint without a command counts as standing still"""
 
@@ -80,6 +84,8 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
             followed |= motion.travel_deg > STILL_DEG
         elif motion.turned:
             entry["command"] = turned(entry["command"])
+    if any(motion.turned for motion in motions.values()):
+        reasons.append(REVERSED)
     driven = tuple(j for j, e in entries.items() if e["command"] is not None and e["angle"] is not None)
     outputs = driven or tuple(j for j, e in entries.items() if e["angle"] is not None)
     return Layout(section, outputs, tuple(reasons), guess.unused, motions, followed)

@@ -66,11 +66,7 @@ class Motion:
         if self.turned:
             assert self.direction is not None
             share = f"for {self.direction.against:.0%} of {self.direction.travel:.3g} deg of travel"
-            lines.append(
-                f"{name} moves against its command ({share}): the sign of the command is reversed, as if the "
-                "valve were wired the other way round; if the angle is what counts the other way (compare "
-                "arm.png), set the angle's scale to -1 instead, because gravity follows the angle"
-            )
+            lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")
         if self.dead_band > 2 * STEP:
             lines.append(f"{name} does not move below about {self.dead_band:g} % of command: a dead band")
         return lines

@@ -160,7 +160,7 @@ def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_
     project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert [settings.log.command_of(j).scale for j in (1, 2, 3)] == [10, -10, 10]
-    (line,) = [line for line in project.columns if "is reversed" in line]
+    (line,) = [line for line in project.columns if "of the command is reversed" in line]
     assert line.startswith("boom_joint moves against its command (for 9")
 
 

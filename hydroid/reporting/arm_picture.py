@@ -31,8 +31,9 @@ def arm_picture(arm: Arm, pose: Array, marked: Collection[int]) -> str:
         if len(points):
             seen = (data.geom_xpos[geom] + points @ data.geom_xmat[geom].reshape(3, 3).T) @ view.T
             shapes.append((float(seen[:, 2].mean()), int(model.geom_bodyid[geom]), outline(seen[:, :2])))
-    if not shapes:
-        return ""
+    for body, points in () if shapes else sticks(model):
+        seen = (data.xpos[body] + points @ data.xmat[body].reshape(3, 3).T) @ view.T
+        shapes.append((float(seen[:, 2].mean()), body, seen[:, :2]))
     anchors = np.array([data.xanchor[joint.id] for joint in joints]) @ view.T
     every = np.concatenate([shape for *_, shape in shapes])
     low, high = every.min(axis=0), every.max(axis=0)
@@ -76,6 +77,19 @@ def corners(model: mujoco.MjModel, geom: int) -> Array:
         return np.asarray(model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]], float)
     shape = primitive(int(model.geom_type[geom]), model.geom_size[geom])
     return np.empty((0, 3)) if shape is None else np.asarray(shape.vertices, float)
+
+
+def sticks(model: mujoco.MjModel) -> list[tuple[int, Array]]:
+    """Bodies of an arm without shapes: number, and a line in its frame to each body that it carries, (2, 3).
+
+    The line of the last body leads to its centre of mass.
+    """
+    lines: list[tuple[int, Array]] = []
+    for body in range(1, model.nbody):
+        carried = model.body_pos[model.body_parentid == body]
+        lines += [(body, np.stack([np.zeros(3), end])) for end in carried]
+        lines += [] if len(carried) else [(body, np.stack([np.zeros(3), model.body_ipos[body]]))]
+    return lines
 
 
 def outline(points: Array) -> Array:

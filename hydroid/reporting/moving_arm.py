@@ -13,7 +13,7 @@ import numpy as np
 
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.reporting.arm_picture import corners, side_view
+from hydroid.reporting.arm_picture import corners, side_view, sticks
 
 RATE = 10.0
 """moments in a second; the page draws what lies between them"""
@@ -123,6 +123,11 @@ def moving_arm(
             world = data.geom_xpos[geom] + _outermost(points) @ data.geom_xmat[geom].reshape(3, 3).T
             own = (world - data.xpos[root]) @ data.xmat[root].reshape(3, 3)
             shapes.append((float((world @ view[2]).mean()), parts.index(root), own))
+    for body, points in () if shapes else sticks(model):
+        root = roots[body]
+        world = data.xpos[body] + points @ data.xmat[body].reshape(3, 3).T
+        own = (world - data.xpos[root]) @ data.xmat[root].reshape(3, 3)
+        shapes.append((float((world @ view[2]).mean()), parts.index(root), own))
     drawn = tuple((part, points) for _, part, points in sorted(shapes, key=lambda shape: shape[0]))
     size, placed = _fitted(drawn, seen)
     errors = np.degrees(movement.error[moments])

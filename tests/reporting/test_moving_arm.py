@@ -8,7 +8,7 @@ import pytest
 from report_fits import make_problem
 
 from hydroid.arm.model import load_model
-from hydroid.reporting.arm_picture import side_view
+from hydroid.reporting.arm_picture import side_view, sticks
 from hydroid.reporting.motion_report import motion_section
 from hydroid.reporting.moving_arm import MOST, Movement, MovingArm, moving_arm
 
@@ -77,6 +77,18 @@ def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
     worst = arm.plain()["start"]
     assert abs(arm.errors[2][worst]) == np.abs(arm.errors[2]).max()
+
+
+def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
+    inertial = '<inertial pos="0.5 0 0" mass="1" diaginertia="1 1 1"/>'
+    stick = f'<body pos="2 0 0">{inertial}<joint name="stick" axis="0 -1 0"/></body>'
+    boom = f'<body>{inertial}<joint name="boom" axis="0 -1 0"/>{stick}</body>'
+    bare = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boom}</worldbody></mujoco>")
+    lengths = [np.linalg.norm(np.diff(line, axis=0)) for _, line in sticks(bare)]
+    assert lengths == pytest.approx([2.0, 0.5])
+    movement = Movement.of("a.csv", LOG, (1, 2), LOG.angle[:, :2])
+    two = replace(movement, measured=LOG.angle[:, 1:3], simulated=LOG.angle[:, 1:3])
+    assert [len(points) for _, points in moving_arm(bare, ["boom", "stick"], two).shapes] == [2, 2]
 
 
 def test_a_log_that_diverged_is_not_shown():

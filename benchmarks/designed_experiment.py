@@ -1,6 +1,7 @@
 """A designed experiment against random ones of the same length and limits (`make design-study`; minutes).
 
     python benchmarks/designed_experiment.py [--random 20] [--improvements 200] [--fits 50] [--duration 30]
+        [--without rest slew clearance]     # limits that are switched off; with --fits 0 nothing is refitted
 
 Stage 1, joints 1 to 6 driven and measured with 0.1 deg of white noise, nine parameters (K, D, S shared by
 the joints, six masses), the total of the masses known to 42.5 ± 0.5 kg. The truth is the article's; designer
@@ -36,6 +37,8 @@ TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 MASSES = [f"M{i}" for i in range(1, 7)]
 TOTAL, TOTAL_SD, NOISE_DEG = 42.5, 0.5, 0.1
 SEED = 1
+OFF = {"rest": {"rest_s": 0.0}, "slew": {"slew_pct_s": None}, "clearance": {"clearance_m": None}}
+"""settings that switch a limit off"""
 
 
 def make_settings(values: dict, arguments: argparse.Namespace):
@@ -54,6 +57,8 @@ def make_settings(values: dict, arguments: argparse.Namespace):
             "time_limit_s": 7200,
         },
     }
+    for limit in arguments.without:
+        changes["design"] |= OFF[limit]
     changes |= {f"parameters.{name}.bounds": [v / 20, 20 * v] for name, v in values.items()}
     settings = load_settings("article-mech", changes)
     return settings, settings.arm
@@ -94,6 +99,7 @@ def main() -> None:
     parser.add_argument("--improvements", type=int, default=200)
     parser.add_argument("--fits", type=int, default=50)
     parser.add_argument("--duration", type=float, default=30.0)
+    parser.add_argument("--without", nargs="+", choices=OFF, default=[])
     arguments = parser.parse_args()
     values = read_values(TRUTH)[0]
     settings, arm = make_settings(values, arguments)
@@ -125,7 +131,12 @@ def main() -> None:
         left = violation(log.angle, period, arm, settings.design)
         said = "keeps the limits" if left is None else f"leaves the limits at {left.sample * period:.1f} s"
         print(f"the {what} one {said} when the true arm runs it", flush=True)
-    spread = [refit(arm, settings, log, truth, arguments.fits).std(axis=0, ddof=1) for log in logs]
+    spread = [
+        refit(arm, settings, log, truth, arguments.fits).std(axis=0, ddof=1)
+        if arguments.fits
+        else np.full(len(truth), np.nan)
+        for log in logs
+    ]
     print(f"relative standard deviations [%], {arguments.duration:g} s, {NOISE_DEG} deg")
     print("| parameter | random, median of predicted | median random one, predicted | refitted |", end="")
     print(" designed, predicted | refitted | ratio predicted | ratio refitted |")

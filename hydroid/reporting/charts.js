@@ -65,7 +65,7 @@
   }
 
   function axisLook(figure) {
-    const ink = color("ink"), soft = color("soft"), line = color("line");
+    const soft = color("soft"), line = color("line");
     for (const axis of [...figure.xaxes, ...figure.yaxes])
       Object.assign(axis, { axis_line_color: line, major_tick_line_color: line, minor_tick_line_color: null,
         major_label_text_color: soft, axis_label_text_color: soft, axis_label_text_font_style: "normal",
@@ -73,7 +73,6 @@
     for (const grid of figure.center.filter((one) => one.grid_line_color !== undefined))
       Object.assign(grid, { grid_line_color: line, grid_line_alpha: 0.6 });
     Object.assign(figure, { background_fill_color: null, border_fill_color: null, outline_line_color: null });
-    if (figure.title) Object.assign(figure.title, { text_color: ink, text_font_size: "14px", offset: 0 });
   }
 
   function addPanel(panel, shared, shown, narrow) {
@@ -82,9 +81,10 @@
     const n = panel.names.length;
     const y_range = new Bokeh.Range1d(n ? { start: n - 0.4, end: -0.6 } : { start: ys[0], end: ys[1] });
     const figure = Bokeh.Plotting.figure({
+      output_backend: "svg", // sharp on paper too
       height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
       x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
-      x_axis_label: panel.x || null, y_axis_label: panel.y || null, title: panel.title || null,
+      x_axis_label: panel.x || null, y_axis_label: panel.y || null,
       min_border_left: n ? 0 : 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (n) {
@@ -93,6 +93,8 @@
       axis.major_label_overrides = new Map(panel.names.map((name, i) => [i, name]));
     }
     if (narrow) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
+    if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
+    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
     axisLook(figure);
     const made = panel.marks.flatMap((mark) => addMark(figure, mark, shown));
     return { panel, figure, made, x_range, y_range, home: xs };
@@ -123,6 +125,11 @@
       const cell = cells.appendChild(document.createElement("div")), element = document.createElement("div");
       cell.className = "panel";
       element.style.minHeight = `${one.panel.height}px`;
+      if (one.panel.title) {
+        const title = cell.appendChild(document.createElement("p"));
+        title.className = "title";
+        title.textContent = one.panel.title;
+      }
       if (chart.apart) {
         const keys = cell.appendChild(document.createElement("div"));
         keys.className = "controls";

@@ -20,9 +20,9 @@ _MOST = 8
 _HEIGHT = 190
 _BINS = 300
 _CAPTION = (
-    "Measured less simulated angle over time, and its mean in intervals of angle, velocity and command, with "
-    "two standard errors of the mean for correlated samples. Shaded stretches of time: the joint stands at "
-    "its stop."
+    "Measured minus simulated angle over time, and its mean in intervals of angle, velocity and command, "
+    "with two standard errors of the mean for correlated samples. Shaded stretches of time: the joint stands "
+    "at its stop."
 )
 
 

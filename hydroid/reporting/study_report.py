@@ -73,7 +73,8 @@ def index_page(studies: Sequence[StudyRuns], seconds: float) -> Page:
         sections.append(Section(runs.plan.study.title, text=where, points=tuple(found)))
     quick = (QUICK,) if any(runs.plan.quick for runs in studies) else ()
     count = sum(len(runs.rows) for runs in studies)
-    lead = f"{count} runs of {len(studies)} studies; this call took {seconds:.0f} s."
+    of = "one study" if len(studies) == 1 else f"{len(studies)} studies"
+    lead = f"{count} runs of {of}; this call took {seconds:.0f} s."
     return Page("article", "The article, put to the test", lead, tuple(sections), quick)
 
 

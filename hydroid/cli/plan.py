@@ -38,8 +38,9 @@ def suggest(
         study = suggest(model, logs or (), out, repair=repair, progress=progress)
     lines = [study.page.tables["missing_terms"]]
     for section in study.page.sections:
-        lines += [f"{section.title}", *([section.text] if section.text else [])]
-        lines += [f"- {point}" for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
+        points = [point for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
+        if section.text or points:
+            lines += [section.title, *([section.text] if section.text else []), *(f"- {p}" for p in points)]
     show(output, lambda: suggestion_content(study.result), [*lines, str(out / "suggestions.html")])
 
 

@@ -4,6 +4,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,14 +40,14 @@ class FitResult:
     fit: "Fit"
     folder: Path | None
 
-    @property
+    @cached_property
     def summary(self) -> FitSummary:
         """The final estimate with its uncertainty, as in `estimate.yaml`."""
         from hydroid.run.summary import summarise
 
         return summarise(self.problem, self.fit)
 
-    @property
+    @cached_property
     def model(self) -> IdentifiedModel:
         """The model at the final estimate, for `Plant`, `simulate`, `validate` and the studies."""
         settings = self.problem.settings

@@ -16,6 +16,7 @@ from hydroid.search.least_squares import start, step
 from hydroid.search.least_squares_state import Ending, State
 from hydroid.settings.search import RefinementSettings
 from hydroid.uncertainty.noise import prior_weight
+from hydroid.uncertainty.open_start import with_open_start
 
 ROUNDS = 4
 """times at most that the noise is estimated, to weigh the logs against the priors"""
@@ -146,14 +147,14 @@ def refine(
 
 def _begin(problem: Problem, theta: Array) -> _Descent:
     unit = problem.parameters.to_unit(theta[None])[0]
-    row = problem.with_open_start(theta).residuals(theta[None])[0]
+    row = with_open_start(problem, theta).residuals(theta[None])[0]
     weight = _weight(problem, row)
     state = start(unit, _with_priors(problem, row[None], unit[None], weight)[0])
     return _Descent(state, weight, unit, 1, 0, 0, state.cost)
 
 
 def _opened(problem: Problem, descent: _Descent) -> Problem:
-    return problem.with_open_start(problem.parameters.from_unit(descent.anchor[None])[0])
+    return with_open_start(problem, problem.parameters.from_unit(descent.anchor[None])[0])
 
 
 def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> _Descent | None:
@@ -176,7 +177,7 @@ def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> 
     # the next round starts from a row that is known, at no simulation, unless a start angle is open
     if problem.leaves_start_open:
         theta = problem.parameters.from_unit(state.point[None])
-        row = problem.with_open_start(theta[0]).residuals(theta)[0]
+        row = with_open_start(problem, theta[0]).residuals(theta)[0]
     state = start(state.point, _with_priors(problem, row[None], state.point[None], again)[0])
     return replace(
         descent,
@@ -199,6 +200,6 @@ def _with_priors(problem: Problem, rows: Array, unit: Array, weight: float) -> A
 
 def _weight(problem: Problem, row: Array) -> float:
     """What a prior's standard deviation counts beside the noise of a residual, shape (R,) [rad]."""
-    if not len(problem.priors):
+    if not (len(problem.priors) or problem.leaves_start_open):
         return 0.0
     return prior_weight(problem.channels, row, problem.settings.objective)

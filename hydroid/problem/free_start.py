@@ -1,14 +1,15 @@
 """Start angles that a log does not show well enough: the fit leaves them open.
 
 A simulation starts from the mean of the angles before the first command. If there is no rest, or it drifts,
-this start is wrong by about the noise, and the whole response with it: an error that no other noise
-resembles. The true start of each compared joint is then one more unknown of its log. To first order it
-changes the residuals by a multiple of their derivative by the start, and what it can explain is taken out of
-them: least squares over the parameters and the start angles together (variable projection; G. H. Golub and
-V. Pereyra, 1973). Everything that is computed from such residuals, intervals too, holds for any start angle.
+this start is wrong by about the sensor's noise, and the whole response with it: an error that no other noise
+resembles. The true start of each joint is then one more unknown of its log, with a prior of that noise. To
+first order it changes the residuals by a multiple of their derivative by the start. What it can explain is
+taken out of them: least squares over the parameters and the start angles together (variable projection;
+G. H. Golub and V. Pereyra, 1973), which is to whiten the residuals for a start angle that is random. All that
+is computed from such residuals, intervals too, holds for any start angle that the prior allows.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,18 +17,38 @@ import numpy as np
 from hydroid.log import Log
 from hydroid.parameters import Array
 
-STEP = float(np.radians(0.1))
+STEP = float(np.radians(0.05))
 """of the differences by a start angle"""
 FEWEST_SAMPLES = 25.0
 """independent samples of rest, below which the start is open: its error is then above a fifth of the noise"""
-LEAST_EFFECT = 1e-6
-"""part of the residuals' change; a start angle that changes less has no effect"""
 
 
-def open_joints(log: Log, joints: list[int], free: bool | str) -> list[int]:
+def open_joints(log: Log, joints: Sequence[int], free: bool | str) -> list[int]:
     """Return which of some joints, numbered from 1, have an open start angle in a log."""
     samples = log.start_samples
     return [j for j in joints if free is True or (free == "auto" and samples[j - 1] < FEWEST_SAMPLES)]
+
+
+@dataclass(frozen=True, eq=False)
+class StartSlopes:
+    """What the start angles of one log do to its residuals.
+
+    Attributes:
+        log: index of the log.
+        rows: the log's residuals in a row of all.
+        joints: numbered from 1.
+        slopes: derivatives of these residuals by each start angle [rad/rad], shape (k, rows).
+    """
+
+    log: int
+    rows: slice
+    joints: tuple[int, ...]
+    slopes: Array
+
+    def opened(self, weights: Array) -> "OpenStart":
+        """Open the start angles. `weights`, (k,) [1]: of each, its prior's sd over the noise's level."""
+        _, values, basis = np.linalg.svd(weights[:, None] * self.slopes, full_matrices=False)
+        return OpenStart(self.rows, basis, 1 - 1 / np.sqrt(1 + values**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,34 +57,15 @@ class OpenStart:
 
     Attributes:
         rows: the log's residuals in a row of all.
-        joints: numbered from 1, those that have an effect.
-        slopes: derivatives of these residuals by each start angle, shape (k, rows).
-        basis: orthonormal rows that span the same, shape (k, rows).
+        basis: orthonormal rows that span what the start angles do to them, shape (k, rows).
+        taken: part of a residual along each that is taken out, shape (k,): 1 without a prior.
     """
 
     rows: slice
-    joints: tuple[int, ...]
-    slopes: Array
     basis: Array
+    taken: Array
 
     def close(self, residuals: Array) -> None:
         """Take what the start angles can explain out of residuals, shape (n, R)."""
         part = residuals[:, self.rows]
-        part -= (part @ self.basis.T) @ self.basis
-
-    def angles(self, residual: Array) -> Array:
-        """Return by how much the start angles were wrong [rad], shape (k,), from a residual, shape (R,)."""
-        return np.asarray(-np.linalg.lstsq(self.slopes.T, residual[self.rows])[0], dtype=np.float64)
-
-
-def open_start(rows: slice, joints: list[int], residuals: Callable[[int, float], Array]) -> OpenStart | None:
-    """Return the open start of a log, whose residuals are a function of a joint and its shift [rad]."""
-    slopes = np.array([(residuals(j, STEP) - residuals(j, -STEP)) / (2 * STEP) for j in joints])
-    length = np.linalg.norm(slopes, axis=1)
-    felt = np.isfinite(length) & (length > LEAST_EFFECT * np.sqrt(slopes.shape[1]))
-    if not felt.any():
-        return None
-    basis = np.linalg.svd(slopes[felt], full_matrices=False)[2]
-    return OpenStart(
-        rows, tuple(j for j, each in zip(joints, felt, strict=True) if each), slopes[felt], basis
-    )
+        part -= (part @ self.basis.T * self.taken) @ self.basis

@@ -20,7 +20,7 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.free_start import OpenStart, open_joints, open_start
+from hydroid.problem.free_start import STEP, OpenStart, StartSlopes, open_joints
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.stage import Stage
@@ -64,7 +64,7 @@ class Problem:
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
         measured: all channels in a row, times their weights, shape (R,).
-        open_starts: what open start angles can explain, taken out of the residuals (`with_open_start`).
+        open_starts: what open start angles can explain, taken out of the residuals (`with_open_starts`).
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
@@ -113,33 +113,48 @@ class Problem:
         """Whether the start angle of any log is open."""
         return any(self._open_joints(log) for log in self.logs)
 
-    def with_open_start(self, theta: Array) -> "Problem":
-        """Return the problem whose residuals hold for any start angle that its logs leave open.
+    def start_slopes(self, theta: Array, *, everywhere: bool = False) -> list[StartSlopes]:
+        """Differentiate the residuals at theta, shape (P,), by the start angles that logs leave open.
 
-        Their effect is that at theta, shape (P,), from two simulations for each. It is the same problem where
-        all logs show where they start.
+        Where `everywhere`, by all that are measured. One simulation for each. A start angle from which the
+        simulation diverges has no effect.
         """
-        if not self.leaves_start_open:
-            return self
-        opened, candidates = copy(self), self.stage.candidates(theta[None])
+        if not (everywhere or self.leaves_start_open):
+            return []
         spec = load_model(self.settings.arm.model, self.settings.arm)  # cannot be pickled: not kept
-        found: list[OpenStart | None] = []
+        candidates, found = self.stage.candidates(theta[None]), list[StartSlopes]()
         for i, log in enumerate(self.logs):
+            joints = self._started(log) if everywhere else self._open_joints(log)
             own = [channel for channel in self.channels if channel.log == i]
+            moved = [
+                make_simulation(spec, log.moved(j, STEP), self.outputs, self.settings, self._pressures[i])
+                for j in joints
+            ]
+            rows = [
+                np.concatenate([channel.residual({i: one.simulate(candidates)})[0] for channel in own])
+                for one in (self._simulations[i], *moved)
+            ]
+            slopes = (np.array(rows[1:]) - rows[0]) / STEP
+            slopes[~np.isfinite(slopes).all(axis=1)] = 0.0
+            if joints:
+                part = slice(own[0].rows.start, own[-1].rows.stop)
+                found.append(StartSlopes(i, part, tuple(joints), slopes))
+        return found
 
-            def residuals(joint: int, shift: float, i: int = i, own: list[Channel] = own) -> Array:
-                log = self.logs[i].moved(joint, shift)
-                one = make_simulation(spec, log, self.outputs, self.settings, self._pressures[i])
-                response = {i: one.simulate(candidates)}
-                return np.concatenate([channel.residual(response)[0] for channel in own])
-
-            rows, joints = slice(own[0].rows.start, own[-1].rows.stop), self._open_joints(log)
-            found.append(open_start(rows, joints, residuals) if joints else None)
-        opened.open_starts = tuple(each for each in found if each is not None)
+    def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":
+        """Return the problem whose residuals hold for any start angle that its logs leave open."""
+        opened = copy(self)
+        opened.open_starts = tuple(open_starts)
         return opened
 
     def _open_joints(self, log: Log) -> list[int]:
-        return open_joints(log, list(self.settings.outputs), self.settings.free_start)
+        return open_joints(log, self._started(log), self.settings.free_start)
+
+    def _started(self, log: Log) -> list[int]:
+        """Joints whose measured angle only their start is simulated from, numbered from 1."""
+        follows = self.settings.simulation.other_joints == "measured"
+        compared = np.isin(np.arange(log.joints), self.outputs)
+        return (np.flatnonzero(log.measured & (log.driven | compared | (not follows))) + 1).tolist()
 
     def first(self, seconds: float) -> "Problem":
         """Return the problem of the first seconds after each log's first command, one segment per channel."""
@@ -212,7 +227,7 @@ class Problem:
     def residuals(self, theta: Array) -> Array:
         """Weighted output errors of (17) [rad], shape (n, R): channel after channel; NaN where diverged.
 
-        What open start angles can explain is taken out (`with_open_start`).
+        What open start angles can explain is taken out (`with_open_starts`).
         """
         if self._spread is None:
             rows = self.output_errors(theta)

@@ -1,7 +1,8 @@
 """Prediction band: where the samples of a log lie if the model is right.
 
-A predicted angle errs by the uncertainty of the parameters, by the delta method, and by the noise of the
-measurement as the fit saw it. What an unseen log shows beyond both is an error of the model.
+A predicted angle errs by the uncertainty of the parameters, by the delta method, by the noise of the
+measurement as the fit saw it, and because the start of the log is measured with noise too. What an unseen log
+shows beyond these is an error of the model.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.quantities.delta import stored_precision
+from hydroid.uncertainty.open_start import start_deviations
 
 MOST_OUTSIDE = 0.1
 """part of the samples outside the band, above which the model is at fault; 5 % are expected"""
@@ -27,7 +29,7 @@ class Band:
         half: of the band's width [rad], shape (T,); infinite where the parameters leave the angle open.
         inside: part of the samples whose error lies within it.
         error: rms error [rad].
-        expected: rms error that noise and parameters explain [rad].
+        expected: rms error that noise, start and parameters explain [rad].
     """
 
     noise: float
@@ -65,13 +67,29 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     angles = precision.propagate(
         lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1), positive=False
     )
+    noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
+    start = start_variance(problem, model.theta, noises)
     bands: dict[int, Band] = {}
     for column, (joint, deviation) in enumerate(
         zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
     ):
-        noise, error = float(np.radians(levels[f"q{joint}"])), log.angle[:, joint - 1] - response[:, column]
-        variance = deviation**2 + noise**2
+        noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
+        variance = deviation**2 + start[joint] + noise**2
         half = precision.quantile * np.sqrt(variance)
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
         bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(variance.mean())))
     return bands
+
+
+def start_variance(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:
+    """Variance of each compared angle from the noise of its log's start [rad²], shape (T,), by joint.
+
+    `levels` [rad] are those of the compared angles' noise, by joint.
+    """
+    found = problem.start_slopes(theta, everywhere=True)
+    total = np.zeros(len(problem.measured))
+    for each in found:
+        deviations = start_deviations(problem.logs[each.log], each.joints, levels)
+        total[each.rows] = np.sum((deviations[:, None] * each.slopes) ** 2, axis=0)
+    angles = (channel for channel in problem.channels if channel.quantity == "angle")
+    return {channel.joint: total[channel.rows] / channel.weight**2 for channel in angles}

@@ -11,6 +11,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, SPANS, TARGETS, actuator_values
 from hydroid.settings.problem import MECHANICAL_SPANS, ParameterSettings
+from hydroid.uncertainty.open_start import with_open_start
 
 HELD_SPAN = 4.0
 """a parameter that is held without bounds is tested from a quarter to four times its value"""
@@ -159,7 +160,7 @@ class ExtendedModel:
             for part, target in zip(parts[-1], targets, strict=False):
                 if not term.named:
                     added[part] = term.settings.model_copy(update={"quantity": target}), term.value
-        self._problem = problem.with_open_start(theta).extended(
+        self._problem = with_open_start(problem, theta).extended(
             {name: settings for name, (settings, _) in added.items()}
         )
         names = self._problem.parameters.names

@@ -13,6 +13,7 @@ from hydroid.progress import Progress, no_progress
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 from hydroid.uncertainty.covariance import COVERAGE, Uncertainty, at_bounds, decompose
+from hydroid.uncertainty.open_start import with_open_start
 
 THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
@@ -189,7 +190,7 @@ def _redrawn(problem: Problem, uncertainty: Uncertainty, count: int, rng: np.ran
 
 
 def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
-    weight, problem = uncertainty.jacobian.prior_weight, problem.with_open_start(uncertainty.theta)
+    weight, problem = uncertainty.jacobian.prior_weight, with_open_start(problem, uncertainty.theta)
     return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
 
 

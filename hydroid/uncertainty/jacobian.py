@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from hydroid.parameters import Array, ParameterSet
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.noise import prior_weight
+from hydroid.uncertainty.open_start import with_open_start
 
 STEP = 1e-4
 """relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""
@@ -68,7 +69,7 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     these disagree, wider ones follow, two simulations each, until two in a row agree; then the wider one of
     those that agree best counts, and `doubt` is their difference.
     """
-    problem = problem.with_open_start(theta)
+    problem = with_open_start(problem, theta)
     scale, left = relative_scale(problem.parameters, theta), problem.parameters.free
     residual = problem.residuals(theta[None])[0]
 

@@ -19,6 +19,7 @@ class Linear:
         self, columns, measured, theta, *, fixed=(), known=None, unit=1.0, weights=(1.0,), **objective
     ):
         self.columns, self.measured, self.simulated = columns, measured, 0
+        self.leaves_start_open = False
         names = "abcdefgh"[: len(theta)]
         self.parameters = ParameterSet(
             tuple(
@@ -39,9 +40,6 @@ class Linear:
             for i, (a, b, w) in enumerate(zip(edges[:-1], edges[1:], weights, strict=True))
         )
         self.weight = np.repeat(weights, np.diff(edges))
-
-    def with_open_start(self, theta):
-        return self
 
     def residuals(self, theta):
         self.simulated += len(theta)

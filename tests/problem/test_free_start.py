@@ -9,12 +9,10 @@ from conftest import step_log
 from hydroid import load_settings
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
-from hydroid.problem.free_start import open_joints
+from hydroid.problem.free_start import StartSlopes, open_joints
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.jacobian import jacobian
 
 LEVELS = [60.0, -40.0, 80.0, -70.0]
-WRONG = np.radians(0.2)
 
 
 def clean_log(config: str) -> Log:
@@ -23,24 +21,30 @@ def clean_log(config: str) -> Log:
     return simulate_log(settings, step_log(settings.arm.pose("study"), LEVELS), values, "start")
 
 
-def with_wrong_start(log: Log) -> Log:
-    angle = log.angle.copy()
-    angle[0, 1] += WRONG
-    return replace(log, angle=angle)
+def test_an_open_start_whitens_the_residuals_for_a_random_start():
+    """By T = (1 + B' B)^-1/2, rows B being what one standard deviation of each start angle does."""
+    rng = np.random.default_rng(1)
+    slopes, weights, rows = rng.normal(size=(2, 30)), np.array([0.5, 2.0]), rng.normal(size=(3, 40))
+    effect = np.zeros((2, 40))
+    effect[:, 5:35] = weights[:, None] * slopes
+    closed = rows.copy()
+    StartSlopes(0, slice(5, 35), (2, 3), slopes).opened(weights).close(closed)
+    values, axes = np.linalg.eigh(np.eye(40) + effect.T @ effect)
+    np.testing.assert_allclose(closed, rows @ (axes / np.sqrt(values)) @ axes.T, atol=1e-12)
 
 
 @pytest.mark.parametrize("config", ["article-mech", "fit-hyd"])
-def test_a_wrong_start_leaves_no_error_where_it_is_open(config):
-    log = clean_log(config)
-    settings = load_settings(config, {"free_start": "auto"})
-    problem = Problem(settings, [with_wrong_start(log)])
+def test_the_slopes_are_what_a_wrong_start_does(config: str):
+    log, wrong = clean_log(config), np.radians(0.2)
+    problem = Problem(load_settings(config, {"free_start": "auto"}), [log])
     theta = problem.parameters.start
-    wrong = problem.output_errors(theta[None])[0]  # of the log without the error there is none
-    opened = problem.with_open_start(theta)
-    (start,) = opened.open_starts
-    assert start.angles(wrong) == pytest.approx(-WRONG, rel=0.05)
-    left = opened.residuals(theta[None])[0]
-    assert np.linalg.norm(left[1:]) < 0.1 * np.linalg.norm(wrong[1:])
+    (slopes,) = problem.start_slopes(theta)
+    angle = log.angle.copy()
+    angle[0, 1] += wrong
+    off = Problem(problem.settings, [replace(log, angle=angle)]).residuals(theta[None])[0]
+    right = problem.residuals(theta[None])[0]
+    effect = wrong * slopes.slopes[slopes.joints.index(2)]
+    assert np.linalg.norm((off - right - effect)[1:]) < 0.1 * np.linalg.norm(effect)
 
 
 def test_a_start_that_the_log_shows_is_not_open():
@@ -59,13 +63,8 @@ def test_a_start_that_the_log_shows_is_not_open():
     assert open_joints(moving, [2], False) == []
 
 
-def test_a_fit_without_open_starts_is_the_same_problem():
-    settings = load_settings("article-mech")
+def test_joints_that_follow_the_log_have_no_start_of_their_own():
+    settings = load_settings("article-mech", {"free_start": True, "simulation.other_joints": "measured"})
     problem = Problem(settings, [clean_log("article-mech")])
-    assert problem.with_open_start(problem.parameters.start) is problem
-    opened = Problem(load_settings("article-mech", {"free_start": True}), problem.logs)
-    theta = problem.parameters.start
-    # what a start angle can do, no parameter does
-    (start,) = opened.with_open_start(theta).open_starts
-    slopes = jacobian(opened, theta).slopes[opened.parameters.free]
-    assert np.abs(slopes @ start.basis.T).max() < 1e-6 * np.linalg.norm(slopes)
+    (slopes,) = problem.start_slopes(problem.parameters.start)
+    assert slopes.joints == (2,)

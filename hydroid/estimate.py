@@ -126,6 +126,8 @@ class FitSummary(Settings):
     """of the final estimate"""
     noise_deg: dict[str, float] = Field(default_factory=dict[str, float])
     """standard deviation of the noise of each compared angle, `q2` of joint 2, from the residuals [deg]"""
+    left_out_deg: dict[str, tuple[float, ...]] = Field(default_factory=dict[str, tuple[float, ...]])
+    """rms error of each compared angle on each fitted log if it is left out [deg]; none of one log"""
 
     @property
     def values(self) -> dict[str, float]:

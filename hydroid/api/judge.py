@@ -117,7 +117,7 @@ def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: in
     from hydroid.problem.problem import Problem
     from hydroid.quantities.delta import precision
     from hydroid.reporting.page import log_names
-    from hydroid.run.summary import noise_levels, parameter_estimates
+    from hydroid.run.summary import left_out_levels, noise_levels, parameter_estimates
     from hydroid.settings.search import RefinementSettings
     from hydroid.uncertainty.covariance import uncertainty
 
@@ -134,6 +134,7 @@ def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: in
         estimate=parameter_estimates(problem, known),
         covariance=precision(problem.parameters, known).covariance(),
         noise_deg=noise_levels(problem, known),
+        left_out_deg=left_out_levels(problem, known),
     )
     return IdentifiedModel(settings, theta, f"{model.name} without {Path(name).stem}", summary)
 

@@ -125,6 +125,8 @@ class Problem:
         candidates, found = self.stage.candidates(theta[None]), list[StartSlopes]()
         for i, log in enumerate(self.logs):
             joints = self._started(log) if everywhere else self._open_joints(log)
+            if not joints:
+                continue
             own = [channel for channel in self.channels if channel.log == i]
             moved = [
                 make_simulation(spec, log.moved(j, STEP), self.outputs, self.settings, self._pressures[i])
@@ -136,9 +138,8 @@ class Problem:
             ]
             slopes = (np.array(rows[1:]) - rows[0]) / STEP
             slopes[~np.isfinite(slopes).all(axis=1)] = 0.0
-            if joints:
-                part = slice(own[0].rows.start, own[-1].rows.stop)
-                found.append(StartSlopes(i, part, tuple(joints), slopes))
+            part = slice(own[0].rows.start, own[-1].rows.stop)
+            found.append(StartSlopes(i, part, tuple(joints), slopes))
         return found
 
     def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":

@@ -1,19 +1,23 @@
-"""Prediction band: where the samples of a log lie if the model is right.
+"""Prediction band: where the samples of a log lie if the model is no worse than on the fitted logs.
 
 A predicted angle errs by the uncertainty of the parameters, by the delta method, by the noise of the
-measurement as the fit saw it, and because the start of the log is measured with noise too. What an unseen log
-shows beyond these is an error of the model.
+measurement as the fit saw it, and because the start of the log is measured with noise too. Where several logs
+were fitted, each of them is predicted without it (`left_out`): an error beyond that of noise and parameters
+is the model's, as far as the fit can know it. It is known from as many errors as there are logs, hence
+Student's t. What an unseen log shows beyond all this is a further error of the model.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.quantities.delta import stored_precision
+from hydroid.uncertainty.covariance import COVERAGE
 from hydroid.uncertainty.open_start import start_deviations
 
 MOST_OUTSIDE = 0.1
@@ -29,7 +33,7 @@ class Band:
         half: of the band's width [rad], shape (T,); infinite where the parameters leave the angle open.
         inside: part of the samples whose error lies within it.
         error: rms error [rad].
-        expected: rms error that noise, start and parameters explain [rad].
+        expected: rms error that all of this explains [rad].
     """
 
     noise: float
@@ -60,8 +64,10 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     Empty where the model's values are not those of a fit, which alone knows its covariance and noise.
     """
     precision, outputs = stored_precision(model), model.settings.outputs
-    levels = {} if model.summary is None else model.summary.noise_deg
-    if precision is None or any(f"q{joint}" not in levels for joint in outputs):
+    if precision is None or model.summary is None:
+        return {}
+    levels, left_out = model.summary.noise_deg, model.summary.left_out_deg
+    if any(f"q{joint}" not in levels for joint in outputs):
         return {}
     problem = Problem(model.settings, [log])
     angles = precision.propagate(
@@ -74,8 +80,11 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
     ):
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
-        variance = deviation**2 + start[joint] + noise**2
-        half = precision.quantile * np.sqrt(variance)
+        right, unseen = deviation**2 + noise**2, np.radians(left_out.get(f"q{joint}", ()))
+        wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
+        widening = float(student.ppf(0.5 + COVERAGE / 2, unseen.size)) if wrong else 0.0
+        half = np.sqrt(precision.quantile**2 * (right + start[joint]) + widening**2 * wrong)
+        variance = right + start[joint] + wrong
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
         bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(variance.mean())))
     return bands

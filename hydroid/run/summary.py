@@ -7,6 +7,7 @@ from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.uncertainty.by_log import by_log
 from hydroid.uncertainty.covariance import Uncertainty
+from hydroid.uncertainty.left_out import left_out_errors
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
@@ -37,6 +38,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         curves=fit.quantities.curves,
         covariance=fit.quantities.precision.covariance(),
         noise_deg=noise_levels(problem, fit.uncertainty),
+        left_out_deg=left_out_levels(problem, fit.uncertainty),
     )
 
 
@@ -47,6 +49,12 @@ def noise_levels(problem: Problem, uncertainty: Uncertainty) -> dict[str, float]
         if channel.quantity == "angle":
             squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
     return {angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()}
+
+
+def left_out_levels(problem: Problem, uncertainty: Uncertainty) -> dict[str, tuple[float, ...]]:
+    """Rms error of each angle on each log if it is left out [deg]; empty for one log."""
+    errors = left_out_errors(problem, uncertainty)
+    return {f"q{joint}": tuple(np.degrees(each).tolist()) for joint, each in errors.items()}
 
 
 def parameter_estimates(problem: Problem, uncertainty: Uncertainty) -> dict[str, ParameterEstimate]:

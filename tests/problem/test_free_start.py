@@ -68,3 +68,16 @@ def test_joints_that_follow_the_log_have_no_start_of_their_own():
     problem = Problem(settings, [clean_log("article-mech")])
     (slopes,) = problem.start_slopes(problem.parameters.start)
     assert slopes.joints == (2,)
+
+
+def test_only_logs_that_do_not_show_their_start_are_differentiated_by_it():
+    settings = load_settings("article-mech", {"free_start": "auto"})
+    log, rest = clean_log("article-mech"), np.zeros((100, 7))
+    shown = replace(
+        log,
+        time=0.01 * np.arange(len(log.time) + 100),
+        command=np.vstack([rest, log.command]),
+        angle=np.vstack([rest + log.angle[0], log.angle]),
+    )
+    problem = Problem(settings, [shown, log])
+    assert [slopes.log for slopes in problem.start_slopes(problem.parameters.start)] == [1]

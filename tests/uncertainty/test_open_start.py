@@ -36,7 +36,7 @@ def test_every_joint_that_is_simulated_has_the_noise_of_its_own_sensor():
     log = noisy_log()
     deviations = start_deviations(log, (1, 2, 3), {2: NOISE})
     assert deviations[1] == NOISE
-    assert np.all((0.5 * NOISE < deviations) & (deviations <= NOISE))
+    assert np.all((deviations > 0.5 * NOISE) & (deviations <= NOISE))
     still = log.start + np.random.default_rng(5).normal(0, NOISE, log.angle.shape)
     rest = replace(log, angle=still, command=np.where(log.time[:, None] < 1.0, 0.0, log.command))
     assert start_deviations(rest, (2,), {2: NOISE})[0] < 0.2 * NOISE

@@ -8,7 +8,7 @@ free, M1, M3, M4 and M5 held as if weighed: from these angles all five are deter
 is white, or a first-order autoregression of a correlation time; each fit estimates it from its own residual.
 The refinement starts at the truth times random factors within 5 %: this is a study of the intervals, not of
 the search. The first sample is the start pose and has no noise, unless --noisy-start; with
---free-start the fits leave it open. "width" is the mean
+--free-start the fits leave it open, and width and bound are compared with those of a known start. "width" is the mean
 width of the intervals, divided by that of 95 % intervals for the true noise. "bound" is the Cramér-Rao bound
 of the true noise at the true parameters.
 """

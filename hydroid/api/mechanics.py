@@ -16,7 +16,7 @@ from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import MECHANICAL_UNITS
 from hydroid.uncertainty.flags import Flag
 
-MOVED = 0.05
+MOVED = 0.1
 """relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""
 _log = logging.getLogger(__name__)
 

@@ -13,6 +13,7 @@ from hydroid.reporting.validation_report import FROM_FIT, PREDICTION
 from hydroid.reporting.verdict import VALIDATED
 
 Content = Mapping[str, Any]
+NOTHING = "Nothing that these logs ask for. hydroid suggest also tests further sensors, logs and experiments."
 _LISTS = {"chart": "charts", "moving": "moving"}
 """where a content keeps what a plot names by number"""
 
@@ -37,7 +38,8 @@ def with_validation(fit: Content, validation: Content) -> dict[str, Any]:
             own = (tab for tab in tabs if tab["name"] not in known)
             tabs = [*(unseen | shown[title]).values(), *({**tab, "note": FROM_FIT} for tab in own)]
         steps = [step for step in section["steps"] if step["what"] != PREDICT_UNSEEN]
-        sections.append(section | {"title": title, "tabs": tabs, "steps": steps})
+        nothing = {"text": NOTHING} if section["steps"] and not steps else {}
+        sections.append(section | {"title": title, "tabs": tabs, "steps": steps} | nothing)
     own = fit.get("fitted_verdict", fit["verdict"])
     verdict = _verdict(own, list(known.values()))
     numbers = fit["numbers"] | {"errors": list(known.values())}

@@ -112,6 +112,10 @@ meshes: setup
 model: meshes
 	$(BIN)/hydroid build-model
 
+.PHONY: pictures
+pictures: setup  ## the documentation's pictures of the demo's fits (after make demo; needs Chromium and OpenGL)
+	$(BIN)/python docs/pictures.py runs/demo
+
 docs: setup  ## the reference of all settings, and the documentation as pages: build/docs/index.html
 	$(BIN)/python docs/settings_reference.py > docs/settings.md
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs

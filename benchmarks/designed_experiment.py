@@ -1,7 +1,9 @@
 """A designed experiment against random ones of the same length and limits (`make design-study`; minutes).
 
     python benchmarks/designed_experiment.py [--random 20] [--improvements 200] [--fits 50] [--duration 30]
-        [--without rest slew clearance]     # limits that are switched off; with --fits 0 nothing is refitted
+        [--without rest slew clearance] [--seed 1]
+
+`--without` switches limits off; with `--fits 0` nothing is refitted.
 
 Stage 1, joints 1 to 6 driven and measured with 0.1 deg of white noise, nine parameters (K, D, S shared by
 the joints, six masses), the total of the masses known to 42.5 ± 0.5 kg. The truth is the article's; designer
@@ -64,9 +66,9 @@ def make_settings(values: dict, arguments: argparse.Namespace):
     return settings, settings.arm
 
 
-def random_experiments(settings, simulator: ExperimentSimulator, count: int) -> list:
+def random_experiments(settings, simulator: ExperimentSimulator, count: int, seed: int) -> list:
     """Single draws that drive all joints and keep the limits at the estimate."""
-    experiments = RandomExperiments(settings, np.random.default_rng(SEED + 1))
+    experiments = RandomExperiments(settings, np.random.default_rng(seed + 1))
     found = []
     while len(found) < count:
         experiment = experiments.draw()
@@ -99,6 +101,7 @@ def main() -> None:
     parser.add_argument("--improvements", type=int, default=200)
     parser.add_argument("--fits", type=int, default=50)
     parser.add_argument("--duration", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the designer and the random experiments")
     parser.add_argument("--without", nargs="+", choices=OFF, default=[])
     arguments = parser.parse_args()
     values = read_values(TRUTH)[0]
@@ -107,11 +110,11 @@ def main() -> None:
     truth = np.array([values[n] for n in names])
     estimate = truth * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(truth)))
     began = time.perf_counter()
-    found = design(settings, estimate, [], SEED, lambda what, done, of: None)
+    found = design(settings, estimate, [], arguments.seed, lambda what, done, of: None)
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
     period = settings.log.period_s
     blind, seeing = (ExperimentSimulator(settings, theta) for theta in (estimate, truth))
-    randoms = random_experiments(settings, blind, arguments.random)
+    randoms = random_experiments(settings, blind, arguments.random, arguments.seed)
     stage = Problem(settings, [found.log])
     known = prior_information(stage.priors, stage.parameters, truth)
 

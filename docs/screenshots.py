@@ -17,7 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -85,12 +86,13 @@ def page(kind: str, runs: Path) -> Path:
     return order[0]
 
 
-async def shoot(pages: dict[str, Path], out: Path, axe: str) -> None:
-    """Take the pictures of some pages, and print what is wrong with them."""
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
+@contextmanager
+def browser() -> Generator[Path]:
+    """Start Chromium, and return its profile; it ends with the context."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
         sys.exit("needs Chromium")
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         how = [
             "--headless",
             "--no-sandbox",
@@ -99,19 +101,25 @@ async def shoot(pages: dict[str, Path], out: Path, axe: str) -> None:
             "--remote-debugging-port=0",
         ]
         process = subprocess.Popen(
-            [browser, *how, f"--user-data-dir={profile}", "about:blank"], stderr=subprocess.DEVNULL
+            [program, *how, f"--user-data-dir={profile}", "about:blank"], stderr=subprocess.DEVNULL
         )
         try:
-            tab = await connected(Path(profile))
-            for kind, file in pages.items():
-                for width in WIDTHS:
-                    for look in LOOKS:
-                        found = await tab.picture(file, (width, look), out / f"{kind}-{width}-{look}", axe)
-                        print(f"{kind} {width} {look}: {'; '.join(found) or 'nothing'}", flush=True)
-                await tab.paper(file, out / f"{kind}-paper.pdf")
+            yield Path(profile)
         finally:
             process.terminate()
             process.wait()
+
+
+async def shoot(pages: dict[str, Path], out: Path, axe: str) -> None:
+    """Take the pictures of some pages, and print what is wrong with them."""
+    with browser() as profile:
+        tab = await connected(profile)
+        for kind, file in pages.items():
+            for width in WIDTHS:
+                for look in LOOKS:
+                    found = await tab.picture(file, (width, look), out / f"{kind}-{width}-{look}.png", axe)
+                    print(f"{kind} {width} {look}: {'; '.join(found) or 'nothing'}", flush=True)
+            await tab.paper(file, out / f"{kind}-paper.pdf")
 
 
 async def connected(profile: Path) -> "Tab":
@@ -185,12 +193,16 @@ class Tab:
         await asyncio.sleep(2)
         return await self.value(PROBE)
 
+    async def shot(self, left: float, top: float, width: float, height: float) -> bytes:
+        """Return a part of the page [px] as PNG."""
+        clip = {"x": left, "y": top, "width": width, "height": height, "scale": 1}
+        taken = await self.ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
+        return base64.b64decode(taken["data"])
+
     async def picture(self, file: Path, seen: tuple[int, str], out: Path, axe: str) -> Sequence[str]:
         """Take a picture of the whole page, and return what is wrong with it."""
         found = await self.load(file, *seen)
-        clip = {"x": 0, "y": 0, "width": seen[0], "height": min(found["height"], 16000), "scale": 1}
-        shot = await self.ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
-        out.with_suffix(".png").write_bytes(base64.b64decode(shot["data"]))
+        out.write_bytes(await self.shot(0, 0, seen[0], min(found["height"], 16000)))
         wrong = list(self.problems)
         if found["content"] > found["width"]:
             wrong.append(f"is {found['content']} px wide")

@@ -1,0 +1,78 @@
+"""The pictures of the documentation that show the demo's fits (`make demo` first; needs Chromium and OpenGL).
+
+python docs/pictures.py [runs/demo]      # docs/arm_moving.gif, docs/report.png, docs/report_*.png
+"""
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("MUJOCO_GL", "egl")
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from screenshots import browser, connected
+
+from hydroid import load_identified, load_settings, read_logs
+from hydroid.viewer.film import Stage
+from hydroid.viewer.motion import simulated_motion
+
+HERE = Path(__file__).parent
+LOG = HERE.parent / "examples" / "logs" / "rig_shoulder_2.csv"
+FITS = {"nsga2": "stage 1, a gain", "hyd": "stage 2, the hydraulics"}
+SIZE, RATE, SPAN = (400, 330), 8, (3.4, 9.4)
+"""of each arm [px]; pictures in a second; from when to when [s]"""
+COLORS = 64
+SHOTS = {
+    "report": ("hyd", "", (1000, 1010), "light"),
+    "report_phone": ("hyd", "", (400, 1000), "dark"),
+    "report_parameters": ("hyd", "Parameters", (1000, 610), "light"),
+    "report_actuator": ("hyd", "The actuator", (1000, 1290), "light"),
+    "report_motion": ("nsga2", "The arm in motion", (1000, 600), "light"),
+}
+"""run, title of the section (the page's beginning without one), width and height [px], and look"""
+TOP = """[...document.querySelectorAll("section")]
+  .find((one) => one.querySelector("h2")?.textContent === "%s").getBoundingClientRect().top + scrollY"""
+
+
+def moving(demo: Path) -> None:
+    """Film the arm with the fits of both stages, each over the ghost of a log that neither has seen."""
+    log = read_logs(LOG, load_settings("fit-mech"))[0]
+    motions = {
+        words: simulated_motion(load_identified(demo / name), {"alone": log}) for name, words in FITS.items()
+    }
+    pictures: list[Image.Image] = []
+    times = np.arange(*SPAN, 1 / RATE)
+    for words, motion in motions.items():
+        with Stage(motion, SIZE, panel=False) as stage:
+            for k, time in enumerate(times):
+                if len(pictures) <= k:
+                    pictures.append(Image.new("RGB", (len(motions) * SIZE[0], SIZE[1])))
+                left = list(motions).index(words) * SIZE[0]
+                pictures[k].paste(Image.fromarray(stage.machine(float(time))), (left, 0))
+                draw = ImageDraw.Draw(pictures[k])
+                draw.text((left + 10, 8), words, "#101010", ImageFont.load_default(17))
+                error = f"error {motion.error:.2g}° rms, {time:.1f} s"
+                draw.text((left + 10, 30), error, "#101010", ImageFont.load_default(14))
+    frames = [one.quantize(COLORS, dither=Image.Dither.NONE) for one in pictures]
+    how = {"save_all": True, "append_images": frames[1:], "duration": 1000 // RATE, "loop": 0}
+    frames[0].save(HERE / "arm_moving.gif", optimize=True, **how)
+
+
+async def shots(demo: Path) -> None:
+    """Take pictures of parts of reports."""
+    with browser() as profile:
+        tab = await connected(profile)
+        for name, (run, title, (width, height), look) in SHOTS.items():
+            await tab.load(demo / run / "report.html", width, look)
+            top = await tab.value(TOP % title) if title else 0
+            file = HERE / f"{name}.png"
+            file.write_bytes(await tab.shot(0, float(top), width, height))
+            Image.open(file).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    runs = Path(*sys.argv[1:2] or ["runs/demo"]).resolve()
+    asyncio.run(shots(runs))
+    moving(runs)

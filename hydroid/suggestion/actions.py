@@ -6,7 +6,7 @@ angles show: the model's own error is part of it, so the forecast is no better t
 every parameter has a prior of ±100 % (`PRIOR_SD`), so that all deviations are finite.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -108,7 +108,8 @@ def next_actions(
     """
     names = [n for n, free in zip(problem.parameters.names, uncertainty.free, strict=True) if free]
     forecast = _Forecasts(names, slopes, Precision(uncertainty.root.T @ uncertainty.root, np.eye(len(names))))
-    sources = [_statements(problem, names)]
+    at_bound = {n for n, s in zip(problem.parameters.names, uncertainty.status, strict=True) if s.at_bound}
+    sources = [_statements(problem, names, at_bound)]
     if simulate:
         sources += [
             _further_channels(problem, uncertainty),
@@ -174,9 +175,11 @@ Forecast = tuple[ActionKind, str, Array]
 """an action, its subject, and the information that it adds, shape (p, p)"""
 
 
-def _statements(problem: Problem, names: Sequence[str]) -> Iterator[Forecast]:
-    """A weighed link, or a value of a data sheet."""
+def _statements(problem: Problem, names: Sequence[str], left_out: Collection[str]) -> Iterator[Forecast]:
+    """A weighed link, or a value of a data sheet; 5 % of a value at its bound, such as 0, says nothing."""
     for i, name in enumerate(names):
+        if name in left_out:
+            continue
         mass = problem.settings.parameters[name].quantity == "mass"
         added = np.zeros((len(names), len(names)))
         added[i, i] = (WEIGHED_SD if mass else STATED_SD) ** -2

@@ -48,6 +48,8 @@ NULL_COMPONENT = 0.01
 """component in an unmeasured direction below which a parameter does not depend on it"""
 DOUBT_ABOVE = 0.1
 """relative difference between two steps' derivatives above which it is reported"""
+CLEAR = 3.0
+"""effects of so many times all errors together are known to be there"""
 TINY = float(np.finfo(float).tiny)
 MAX_LOG_SPREAD = 5.0
 """beyond it nothing is known of a variance, and no interval is of use"""
@@ -173,11 +175,13 @@ def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Ar
     """
     slopes, error = np.nan_to_num(derivatives.slopes[free]), np.nan_to_num(derivatives.error[free])
     directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
-    turned = directions.T @ error
-    # a little of a stronger direction, added to a weak one, takes away what looks like its effect
-    hidden = np.sum(np.tril(turned @ effects.T, -1) ** 2, axis=1)
-    doubt = np.sqrt(np.maximum(np.sum(turned**2, axis=1) - hidden, 0.0))
-    values[values <= np.maximum(doubt, RANK_TOLERANCE * values[0])] = 0.0
+    values[values <= RANK_TOLERANCE * values[0]] = 0.0
+    lost = _lost(directions.T @ error, values, effects)
+    if len(lost):  # the effects along other directions stay as they are
+        rows = directions * values
+        directions, values, mixed = np.linalg.svd(rows - (rows @ lost.T) @ lost, full_matrices=False)
+        values[values <= RANK_TOLERANCE * values[0]] = 0.0
+        effects = mixed @ effects
     priors = derivatives.prior_weight * derivatives.prior_slopes[free]
     if priors.any():
         rows = np.hstack([directions * values, priors])
@@ -186,6 +190,24 @@ def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Ar
         size = len(effects)
         return directions, values, np.hstack([mixed[:, :size] @ effects, mixed[:, size:]])
     return directions, values, np.hstack([effects, np.zeros((len(effects), priors.shape[1]))])
+
+
+def _lost(error: Array, values: Array, effects: Array) -> Array:
+    """Return orthonormal effects that are no larger than their error, (m, p), in coordinates of `effects`.
+
+    Args:
+        error: of the effect of each of p directions, shape (p, R).
+        values, effects: lengths of the effects, shape (p,), and unit vectors, shape (p, R).
+    """
+    felt = values > 0
+    # a little of a strong direction, added to a weak one, takes away what looks like its effect
+    strong = effects[values > CLEAR * np.linalg.norm(error)]
+    error = error - (error @ strong.T) @ strong
+    # errors in units of the effects: the largest belong to the combinations that are known least
+    axes, ratio, _ = np.linalg.svd(error[felt] / values[felt, None], full_matrices=False)
+    lost = np.zeros((int(np.sum(ratio >= 1)), len(values)))
+    lost[:, felt] = axes[:, ratio >= 1].T
+    return lost
 
 
 def quantile(spread: float) -> float:

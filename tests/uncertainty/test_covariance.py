@@ -145,6 +145,19 @@ def test_what_a_prior_says_holds_where_derivatives_are_doubtful():
     assert np.isfinite(found.interval).all()
 
 
+def test_a_doubtful_derivative_leaves_the_others_theirs():
+    """Two parameters with effects of one length: any turn of them is a singular direction too."""
+    columns = np.repeat(np.eye(2), 500, axis=1)
+    theta, rng = np.array([1.0, 1.0]), np.random.default_rng(5)
+    measured = theta @ columns + rng.normal(0, 0.1 * DEG, 1000)
+    problem = Linear(columns, measured, theta, noise_deg=0.1)
+    at = jacobian(problem, theta)
+    error = rng.normal(size=at.slopes.shape) * np.array([[3.0], [0.0]])
+    found = uncertainty_from(problem, theta, replace(at, error=error))
+    assert flags(found) == [Flag.UNIDENTIFIABLE, Flag.IDENTIFIABLE]
+    assert found.standard_deviation[1] == pytest.approx(0.1 * DEG / np.sqrt(500), rel=1e-3)
+
+
 def test_derivatives_at_a_bound_stay_inside():
     problem, theta = white_problem()
     seen = []

@@ -7,10 +7,9 @@ Shoulder and elbow are driven and measured, the other joints locked; K, D, S (sh
 free, M1, M3, M4 and M5 held as if weighed: from these angles all five are determined. The noise of 0.1 deg
 is white, or a first-order autoregression of a correlation time; each fit estimates it from its own residual.
 The refinement starts at the truth times random factors within 5 %: this is a study of the intervals, not of
-the search. The first sample is the start pose and has no noise, unless --noisy-start; with
---free-start the fits leave it open, and width and bound are compared with those of a known start. "width" is the mean
-width of the intervals, divided by that of 95 % intervals for the true noise. "bound" is the Cramér-Rao bound
-of the true noise at the true parameters.
+the search. The first sample is the start pose and has no noise, unless --noisy-start; with --free-start the
+fits leave it open. "width" is the mean width of the intervals, divided by that of 95 % intervals for the true
+noise. "bound" is the Cramér-Rao bound of the true noise at the true parameters. Both are of a known start.
 """
 
 import argparse
@@ -79,7 +78,7 @@ def study(correlation_time: float, logs: int, seconds: float, *, start: bool, op
     settings = load_settings("article-mech", CHANGES | {"free_start": "auto" if open_start else False})
     clean = clean_log(settings, seconds)
     phi = float(np.exp(-clean.period / correlation_time)) if correlation_time else 0.0
-    problem = Problem(settings, [clean])
+    problem = Problem(settings.model_copy(update={"free_start": False}), [clean])
     truth, free = problem.parameters.vector(TRUTH, "truth"), problem.parameters.free
     at, true = jacobian(problem, truth), Noise(len(clean.time), LEVEL, np.array([-phi] if phi else []))
     true = (replace(true, source="settings"),) * len(problem.channels)

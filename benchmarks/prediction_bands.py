@@ -2,8 +2,8 @@
 
     python benchmarks/prediction_bands.py [--logs 20]
 
-Stage 1 of the shoulder: K, D and S are fitted to a log of steps with white noise of 0.1 deg, and predict
-another log. That log is simulated at the fitted log's truth, or with a spring that is stiffer than that.
+Stage 1 of the shoulder: K, D and S are fitted to a log of steps with white noise of 0.1 deg, the start pose
+included, and predict another log. That log is simulated at the fitted log's truth, or with a stiffer spring.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from hydroid.uncertainty.covariance import uncertainty
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 CHANGES = {
+    "free_start": "auto",
     "simulation.other_joints": "locked",
     **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
     **{f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name.startswith("M")},
@@ -34,16 +35,14 @@ STIFFER = {"exact": 1.0, "S 5 % wrong": 1.05, "S 20 % wrong": 1.2, "S 50 % wrong
 
 
 def noisy(settings: FitSettings, values: dict[str, float], rng: np.random.Generator) -> Log:
-    """Random steps of the shoulder with white noise of 0.1 deg, but for the first sample."""
+    """Random steps of the shoulder with white noise of 0.1 deg, at the start too."""
     pose = settings.arm.pose("study")
     command = np.zeros((500, len(pose)))
     command[:, 1] = np.repeat(rng.uniform(-60.0, 60.0, 5), 100)
     time = np.arange(len(command), dtype=np.float64) * 0.01
     drive = Log("steps.csv", time, command, np.tile(pose, (len(time), 1)), 0.01)
     log = simulate_log(settings, drive, values, "truth")
-    noise = rng.normal(0.0, np.deg2rad(0.1), log.angle.shape)
-    noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
+    return replace(log, angle=log.angle + rng.normal(0.0, np.deg2rad(0.1), log.angle.shape))
 
 
 def fitted(settings: FitSettings, log: Log) -> IdentifiedModel:

@@ -10,6 +10,8 @@ Student's t. What an unseen log shows beyond all this is a further error of the 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
+from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from hydroid.identified_model import IdentifiedModel
@@ -22,6 +24,7 @@ from hydroid.uncertainty.open_start import start_deviations
 
 MOST_OUTSIDE = 0.1
 """part of the samples outside the band, above which the model is at fault; 5 % are expected"""
+_END = 0.5 + COVERAGE / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,8 @@ class Band:
         inside: part of the samples whose error lies within it.
         error: rms error [rad].
         expected: rms error that all of this explains [rad].
+        limit: rms error that is larger for 5 % of the logs only, if nothing else is wrong [rad]. Errors of
+            the start and of the parameters are few random numbers for a whole log: far above `expected`.
     """
 
     noise: float
@@ -41,6 +46,7 @@ class Band:
     inside: float
     error: float
     expected: float
+    limit: float
 
     @property
     def exists(self) -> bool:
@@ -55,7 +61,7 @@ class Band:
     @property
     def model_limits(self) -> bool:
         """Whether the model, not the noise, limits the prediction."""
-        return self.inside < 1 - MOST_OUTSIDE and self.model_error > 0
+        return self.inside < 1 - MOST_OUTSIDE and self.error > self.limit
 
 
 def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:
@@ -74,31 +80,46 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1), positive=False
     )
     noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
-    start = start_variance(problem, model.theta, noises)
+    start = start_effects(problem, model.theta, noises)
+    parts = precision.parts(angles.slopes).reshape(-1, *response.shape)
     bands: dict[int, Band] = {}
     for column, (joint, deviation) in enumerate(
         zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
     ):
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
+        begun = np.sum(start[joint] ** 2, axis=0)
         right, unseen = deviation**2 + noise**2, np.radians(left_out.get(f"q{joint}", ()))
         wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
-        widening = float(student.ppf(0.5 + COVERAGE / 2, unseen.size)) if wrong else 0.0
-        half = np.sqrt(precision.quantile**2 * (right + start[joint]) + widening**2 * wrong)
-        variance = right + start[joint] + wrong
+        widened = wrong * float(student.ppf(_END, unseen.size or 1) / normal.ppf(_END)) ** 2
+        half = np.sqrt(precision.quantile**2 * (right + begun) + float(normal.ppf(_END)) ** 2 * widened)
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
-        bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(variance.mean())))
+        expected = float(np.mean(right + begun)) + wrong
+        few = np.vstack([parts[:, :, column], start[joint]])
+        shares = np.append(np.linalg.eigvalsh(few @ few.T / few.shape[1]), widened)
+        limit = _limit(expected - wrong + widened, shares)
+        bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(expected)), limit)
     return bands
 
 
-def start_variance(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:
-    """Variance of each compared angle from the noise of its log's start [rad²], shape (T,), by joint.
+def _limit(mean: float, shares: Array) -> float:
+    """Root of the mean square error that 5 % of the logs exceed.
 
-    `levels` [rad] are those of the compared angles' noise, by joint.
+    `mean` is its expected value. `shares` of it are the squares of one normal number each; the rest is the
+    mean of many. The sum is about a multiple of chi-square (F. E. Satterthwaite, 1946).
     """
-    found = problem.start_slopes(theta, everywhere=True)
-    total = np.zeros(len(problem.measured))
-    for each in found:
-        deviations = start_deviations(problem.logs[each.log], each.joints, levels)
-        total[each.rows] = np.sum((deviations[:, None] * each.slopes) ** 2, axis=0)
+    if not np.isfinite(mean):
+        return np.inf
+    freedom = mean**2 / max(float(np.sum(shares**2)), 1e-3 * mean**2)
+    return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
+
+
+def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:
+    """What one standard deviation of each start angle does to each compared angle [rad], (k, T), by joint.
+
+    `levels` [rad] are those of the compared angles' noise, by joint. The problem has one log.
+    """
+    rows = np.zeros((0, len(problem.measured)))
+    for each in problem.start_slopes(theta, everywhere=True):
+        rows = start_deviations(problem.logs[0], each.joints, levels)[:, None] * each.slopes
     angles = (channel for channel in problem.channels if channel.quantity == "angle")
-    return {channel.joint: total[channel.rows] / channel.weight**2 for channel in angles}
+    return {channel.joint: rows[:, channel.rows] / channel.weight for channel in angles}

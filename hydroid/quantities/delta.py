@@ -96,12 +96,20 @@ class Precision:
             slopes[varied[free]] = (found * self.scale[:, None])[varied]
         return self.known(value, slopes, positive)
 
+    def parts(self, slopes: Array) -> Array:
+        """What each independent, known direction does, shape (k, m), from derivatives, shape (p, m).
+
+        The sum of their squares is the variance along the known directions.
+        """
+        _, values, directions = np.linalg.svd(self.root)
+        measured = values > RANK_TOLERANCE * values.max(initial=0.0)
+        return (directions[measured] @ slopes) / values[measured, None]
+
     def deviation(self, slopes: Array) -> Array:
         """Standard deviations, shape (m,), from derivatives per relative change, shape (p, m)."""
         _, values, directions = np.linalg.svd(self.root)
         measured = values > RANK_TOLERANCE * values.max(initial=0.0)
-        parts = directions @ slopes
-        known = np.linalg.norm(parts[measured] / values[measured, None], axis=0)
+        parts, known = directions @ slopes, np.linalg.norm(self.parts(slopes), axis=0)
         lost = np.linalg.norm(parts[~measured], axis=0) > NULL_COMPONENT * np.linalg.norm(slopes, axis=0)
         return np.where(lost, np.inf, known)
 

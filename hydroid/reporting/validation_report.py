@@ -279,8 +279,9 @@ def _verdict(band: Band) -> str:
         return f"The error is {degrees(band.error):.2g}°. There is no band: the fit leaves this angle open."
     inside = f"{100 * band.inside:.0f} % of the samples lie inside the band"
     error, expected = f"{degrees(band.error):.2g}°", f"{degrees(band.expected):.2g}°"
-    than = f"than the fitted logs lead to expect ({expected})"
+    than = f"than the fitted logs lead to expect ({expected}"
     if band.model_limits:
-        return f"{inside}. The error ({error}) is clearly larger {than}: the model limits the prediction."
+        chance = f"by chance {degrees(band.limit):.2g}° is exceeded in 5 % of logs"
+        return f"{inside}. The error ({error}) is clearly larger {than}; {chance}): the model limits the prediction."
     larger = "no larger" if band.error <= band.expected else "not clearly larger"
-    return f"{inside}: the error ({error}) is {larger} {than}."
+    return f"{inside}: the error ({error}) is {larger} {than})."

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydroid.arm.model import load_model
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.parameters import Array
-from hydroid.problem.problem import Problem
+from hydroid.problem.problem import Problem, make_simulation
 from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, SPANS, TARGETS, actuator_values
 from hydroid.settings.problem import MECHANICAL_SPANS, ParameterSettings
+from hydroid.simulation.hydraulic import STOP_REACH, HydraulicSimulation
 from hydroid.uncertainty.open_start import with_open_start
 
 HELD_SPAN = 4.0
@@ -26,12 +28,14 @@ class Term:
         settings: of that parameter, free, with the span of its values as bounds.
         value: that the model has now; inf of a limit that is switched off.
         named: whether it is a parameter of the fit, held fixed.
+        begins: finite value from which it acts, if it is no limit but switched off all the same.
     """
 
     name: str
     settings: ParameterSettings
     value: float
     named: bool
+    begins: float | None = None
 
     @property
     def span(self) -> tuple[float, float]:
@@ -61,13 +65,17 @@ class Term:
         """
         low, high = self.span
         if math.isinf(self.value):
-            return low / change if change > 0 else math.inf
+            if change <= 0:
+                return math.inf
+            if self.begins is not None:
+                return self.begins + change * ((low if self.begins == high else high) - self.begins)
+            return low / change
         end = high if high - self.value >= self.value - low else low
         return min(max(self.value + change * (end - self.value), low), high)
 
 
-def terms(problem: Problem, *, sides: bool = True) -> tuple[Term, ...]:
-    """List the terms of a problem: its fixed parameters, then what it does not name.
+def terms(problem: Problem, theta: Array, *, sides: bool = True) -> tuple[Term, ...]:
+    """List the terms of a problem at an estimate: its fixed parameters, then what it does not name.
 
     Of a quantity with two sides they are both together and, where `sides`, each.
     """
@@ -99,7 +107,38 @@ def terms(problem: Problem, *, sides: bool = True) -> tuple[Term, ...]:
                 where = None if joint is None else (joint,)
                 free = ParameterSettings(quantity=quantity, joints=where, bounds=span)
                 off.append(Term(unused(name, settings.parameters), free, values.pop(), named=False))
+    if settings.stage == "hyd":
+        free = [j for j in joints if not taken & {("trapped_pressure", j), ("start_pressure", j)}]
+        off += [term for joint in free if (term := _trapped(problem, theta, joint))]
     return (*held, *off)
+
+
+def _trapped(problem: Problem, theta: Array, joint: int) -> Term | None:
+    """Pressure trapped at a stop: less of a load than the oil carries so far, the stop the rest.
+
+    None where no log starts at a stop, or where the settings say it.
+    """
+    arm, j = problem.settings.arm, joint - 1
+    actuator, most = arm.joints[j].actuator, QUANTITIES["supply_pressure"]
+    if actuator is None or problem.settings.hydraulics.trapped_pressure is not None:
+        return None
+    for log in problem.logs:
+        room = abs(np.array([arm.lower[j], arm.upper[j]]) - log.start[j])
+        if log.driven[j] and room.min() <= STOP_REACH:
+            spec = load_model(arm.model, arm)
+            simulation = make_simulation(spec, log, problem.outputs, problem.settings)
+            assert isinstance(simulation, HydraulicSimulation)
+            traced = simulation.trace(problem.stage.candidates(theta[None]))
+            carried = float(traced.pressure[0, traced.joints == joint, 0][0]) / most.factor
+            # chamber A lifts off the lower stop, unless the cylinder runs out towards negative angles
+            less = (room[0] < room[1]) == (getattr(actuator, "sense", 1.0) > 0)
+            span = (0.0, carried) if less else (carried, problem.settings.hydraulics.supply_pressure)
+            name = "trapped_pressure" if len(problem.active_joints) == 1 else f"trapped_pressure_{joint}"
+            if span[0] < span[1]:
+                free = ParameterSettings(quantity="trapped_pressure", joints=(joint,), bounds=span)
+                name = unused(name, problem.settings.parameters)
+                return Term(name, free, math.inf, named=False, begins=carried)
+    return None
 
 
 def _spans(stage: str, *, sides: bool) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
@@ -150,7 +189,7 @@ class ExtendedModel:
     """
 
     def __init__(self, problem: Problem, theta: Array, *, sides: bool = True) -> None:
-        self.terms, self.theta = terms(problem, sides=sides), theta
+        self.terms, self.theta = terms(problem, theta, sides=sides), theta
         added: dict[str, tuple[ParameterSettings, float]] = {}
         parts: list[list[str]] = []
         for term in self.terms:

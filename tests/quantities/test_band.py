@@ -10,7 +10,7 @@ from hydroid.fitting.validation import error_indices
 from hydroid.log import Log
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.quantities.band import Band, prediction_bands, start_variance
+from hydroid.quantities.band import Band, prediction_bands, start_effects
 from hydroid.reporting.validation_report import Validation, validation_page
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -53,8 +53,9 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     if not limits:
         assert band.inside > 0.9
         # this log's start has no noise, which the fit cannot know
-        start = start_variance(Problem(settings, [log]), model.theta, {2: band.noise})[2]
-        assert band.error**2 == pytest.approx(band.expected**2 - start.mean(), rel=0.3)
+        start = start_effects(Problem(settings, [log]), model.theta, {2: band.noise})[2]
+        assert band.error**2 == pytest.approx(band.expected**2 - np.sum(start**2) / len(log.time), rel=0.3)
+        assert band.limit > band.expected
     indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
     page = validation_page([Validation("one", log, response, indices, {2: band})])
     (verdict,) = page.sections[1].points
@@ -69,7 +70,8 @@ def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
         angle = log.angle.copy()
         angle[0] += rng.normal(0, np.radians(0.1), angle.shape[1])
         off.append(predict(model, replace(log, angle=angle), settings.outputs)[:, 0])
-    variance = start_variance(Problem(settings, [log]), model.theta, {2: np.radians(0.1)})[2]
+    effects = start_effects(Problem(settings, [log]), model.theta, {2: np.radians(0.1)})[2]
+    variance = np.sum(effects**2, axis=0)
     np.testing.assert_allclose(np.var(off, axis=0).mean(), variance.mean(), rtol=0.4)
 
 
@@ -103,7 +105,7 @@ def test_without_a_band_nothing_is_called_as_expected(fitted):
     settings, model = fitted
     log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
     response = predict(model, log, settings.outputs)
-    band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf)
+    band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf, limit=np.inf)
     indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
     page = validation_page([Validation("one", log, response, indices, {2: band})])
     assert page.sections[1].points[0].endswith("There is no band: the fit leaves this angle open.")

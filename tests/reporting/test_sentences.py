@@ -29,12 +29,16 @@ def test_an_action_names_what_improves_beside_what_it_states():
     [
         (0.96, 0.01, "96 % of the samples lie inside the band: the error (0.57°) is no larger than"),
         (0.94, 0.03, "the error (1.7°) is not clearly larger than the fitted logs lead to expect (1.1°)"),
-        (0.5, 0.2, "The error (11°) is clearly larger than the fitted logs lead to expect (1.1°): the model"),
+        (
+            0.5,
+            0.2,
+            "The error (11°) is clearly larger than the fitted logs lead to expect (1.1°; by chance 2",
+        ),
     ],
 )
 def test_a_validation_says_whether_the_error_is_as_expected(inside: float, error: float, words: str):
     log = make_problem().logs[0]
-    band = Band(0.015, np.full(len(log.time), 0.04), inside, error, 0.02)
+    band = Band(0.015, np.full(len(log.time), 0.04), inside, error, 0.02, 0.035)
     indices = {2: error_indices(log.angle[:, 1], log.angle[:, 1] + error)}
     page = validation_page([Validation("hyd", log, log.angle[:, [1]] + error, indices, {2: band}, False)])
     assert words in page.sections[1].points[0]

@@ -24,6 +24,7 @@ from hydroid.suggestion.suggest import suggestions
 from hydroid.suggestion.terms import ExtendedModel, terms
 from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 from hydroid.uncertainty.noise import Noise
+from hydroid.uncertainty.open_start import with_open_start
 
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "D": 150.0}
 LEVELS = [0.0, 60.0, -40.0, 80.0, -70.0, 30.0, -20.0, 50.0]
@@ -62,22 +63,46 @@ def test_every_quantity_that_is_switched_off_by_default_is_tested():
     settings = load_settings("fit-hyd")
     off = [n for n in QUANTITIES if getattr(settings.hydraulics, n, 1.0) in (0.0, None)]
     tested = {target for name in SPANS for target in TARGETS[name]}
-    # what acts only at a stop, and what is 0 in nature
+    # what acts only at a stop (tested below), and what is 0 in nature
     assert set(off) - tested <= {"trapped_pressure", "vapour_pressure"}
 
 
+def test_oil_that_is_trapped_at_a_stop_is_named():
+    """Three movements off the lower stop, where the oil must first be pressed."""
+    changes = {"leakage": 0.0, "dead_volume": 200.0}
+    truth, model = make_settings(**changes, trapped_pressure=5.0), make_settings(**changes)
+    stopped = np.radians([0, -30, -60, 0, 0, 0, 20])
+    logs = []
+    for seed, level in enumerate((25.0, 50.0, 100.0)):
+        log = simulate_log(truth, step_log(stopped, [level], joint=2), TRUTH, "truth")
+        noise = np.zeros_like(log.angle)
+        noise[:, 1] = np.random.default_rng(seed).normal(0, np.radians(0.05), len(noise))
+        logs.append(replace(log, angle=log.angle + noise))
+    problem = Problem(model, logs)
+    known = uncertainty(problem, problem.parameters.vector(TRUTH, "truth"))
+    (term,) = (t for t in terms(problem, known.theta) if t.settings.quantity == "trapped_pressure")
+    assert term.span[0] == 0.0
+    assert term.begins == term.span[1] > 5.0
+    extended = ExtendedModel(problem, known.theta)
+    opened = with_open_start(problem, known.theta)
+    np.testing.assert_array_equal(extended.residual, opened.residuals(known.theta[None])[0])
+    found = {t.term.settings.quantity: t for t in missing_terms(problem, known).free}
+    assert found["trapped_pressure"].value == pytest.approx(5.0, rel=0.3)
+
+
 def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
-    problem, _ = late
-    names = {term.name for term in terms(problem)}
+    problem, known = late
+    theta = known.theta
+    names = {term.name for term in terms(problem, theta)}
     assert {"delay", "delay_a", "delay_b", "overlap", "leakage", "dry_friction", "stiffness"} <= names
     assert not {"damping", "area_a", "area", "pump_flow"} & names
     freed = problem.extended({"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))})
-    assert not {"delay", "delay_a"} & {term.name for term in terms(freed)}
-    assert "delay_b" in {term.name for term in terms(freed)}
+    assert not {"delay", "delay_a"} & {term.name for term in terms(freed, theta)}
+    assert "delay_b" in {term.name for term in terms(freed, theta)}
     (log,) = problem.logs
     gauged = replace(log, pressure=np.zeros((*log.angle.shape, 2)))
     assert "start_pressure" in names
-    assert "start_pressure" not in {term.name for term in terms(Problem(problem.settings, [gauged]))}
+    assert "start_pressure" not in {term.name for term in terms(Problem(problem.settings, [gauged]), theta)}
 
 
 def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: tuple[Problem, Uncertainty]):
@@ -91,7 +116,7 @@ def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: 
 
 
 def test_a_limit_that_is_switched_off_changes_by_its_reciprocal(late: tuple[Problem, Uncertainty]):
-    (limit,) = (term for term in terms(late[0]) if term.name == "flow_limit")
+    (limit,) = (term for term in terms(late[0], late[1].theta) if term.name == "flow_limit")
     assert limit.value == np.inf
     assert limit.at(0.0) == np.inf
     assert limit.at(0.5) == pytest.approx(2 * limit.span[0])

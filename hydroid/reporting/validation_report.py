@@ -282,6 +282,7 @@ def _verdict(band: Band) -> str:
     than = f"than the fitted logs lead to expect ({expected}"
     if band.model_limits:
         chance = f"by chance {degrees(band.limit):.2g}° is exceeded in 5 % of logs"
-        return f"{inside}. The error ({error}) is clearly larger {than}; {chance}): the model limits the prediction."
+        larger = f"The error ({error}) is clearly larger {than}; {chance})"
+        return f"{inside}. {larger}: the model limits the prediction."
     larger = "no larger" if band.error <= band.expected else "not clearly larger"
     return f"{inside}: the error ({error}) is {larger} {than})."

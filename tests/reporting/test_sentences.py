@@ -32,7 +32,7 @@ def test_an_action_names_what_improves_beside_what_it_states():
         (
             0.5,
             0.2,
-            "The error (11°) is clearly larger than the fitted logs lead to expect (1.1°; by chance 2",
+            "The error (11°) is clearly larger than the fitted logs lead to expect (1.1°; by",
         ),
     ],
 )

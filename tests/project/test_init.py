@@ -180,7 +180,7 @@ def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert [settings.log.command_of(j).scale for j in (1, 2, 3)] == [10, -10, 10]
     (line,) = [line for line in project.columns if "of the command is reversed" in line]
-    assert line.startswith("boom_joint moves against its command (for 9")
+    assert line.startswith("boom_joint moves against its command (for ")
 
 
 def test_angles_outside_the_arms_range_are_said(place: Path, tmp_path: Path):

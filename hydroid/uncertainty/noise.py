@@ -7,6 +7,7 @@ that last for many samples. An autoregressive (AR) process describes them. It is
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -43,7 +44,7 @@ class Noise:
     reflection: Array
     source: Literal["residual", "settings", "smallest"] = "residual"
 
-    @property
+    @cached_property
     def autocovariance(self) -> Array:
         """At lags 0 to T - 1, shape (T,)."""
         predictors, order = self._predictors(), min(len(self.reflection), self.samples - 1)

@@ -39,6 +39,10 @@ excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the 
 excavator-seeds: setup  ## the same from five starts, with time and simulations (docs/measured.md)
 	$(BIN)/python benchmarks/excavator.py 5
 
+.PHONY: excavator-folds
+excavator-folds: setup  ## models of the excavator compared within the logs of the fit; ten minutes (docs/measured.md)
+	$(BIN)/python benchmarks/excavator_folds.py
+
 six-joints: setup  ## six hydraulic joints at once, 54 parameters (docs/measured.md)
 	$(BIN)/python benchmarks/six_joints.py
 

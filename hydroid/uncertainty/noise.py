@@ -207,6 +207,8 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
 def _levinson(autocovariance: Array) -> Array | None:
     """Reflection coefficients from lags 0 to p; None where no AR process has these autocovariances."""
     polynomial, variance, reflection = np.ones(1), float(autocovariance[0]), np.empty(0)
+    if not variance > 0:
+        return None
     for m in range(1, len(autocovariance)):
         k = float(-(polynomial @ autocovariance[m:0:-1]) / variance)
         if not abs(k) < 1:

@@ -13,6 +13,7 @@ myst_heading_anchors = 3
 suppress_warnings = ["myst.xref_missing"]  # links to folders of the repository; a test follows every link
 html_theme = "furo"
 html_title = "hydroid"
+html_show_copyright = False
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
 exclude_patterns = ["*.py"]

@@ -14,7 +14,7 @@ from hydroid.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "two_arms")
+RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "two_arms", "own_arm")
 """pages whose `sh` and `python` blocks are run, in this order; other blocks are only shown"""
 COMMANDS = get_command(app).commands  # pyright: ignore
 
@@ -74,6 +74,11 @@ def test_commands_have_the_flags_that_are_shown(page: Path):
 def test_what_the_pages_show_runs(tmp_path: Path):
     """A page's commands, then its Python as one program; all pages share a folder, as for a reader."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
+    urdf = ROOT / "examples" / "urdf"  # the files that own_arm.md takes for the reader's own
+    (tmp_path / "robot.urdf").write_bytes((urdf / "robot.urdf").read_bytes())
+    (tmp_path / "meshes").symlink_to(urdf / "meshes")
+    for n, name in enumerate("abc", start=1):
+        (tmp_path / f"{name}.csv").symlink_to(urdf / f"log_{n}.csv")
     bin_folder = Path(sys.executable).parent
     environment = os.environ | {
         "PYTHONPATH": str(ROOT),

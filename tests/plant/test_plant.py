@@ -36,6 +36,7 @@ def model(stage: str = "mech", **changes: object) -> IdentifiedModel:
             "open_A": 0.4,
             "open_B": 0.4,
             "delay": 0.0,
+            "friction": 100.0,
         }
     return identified(settings, values, "test")
 

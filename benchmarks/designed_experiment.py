@@ -21,6 +21,7 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ OFF = {"rest": {"rest_s": 0.0}, "slew": {"slew_pct_s": None}, "clearance": {"cle
 
 def make_settings(values: dict, arguments: argparse.Namespace):
     """Settings with bounds far enough from the truth that they cut no estimate off."""
-    changes = {
+    changes: dict[str, Any] = {
         "outputs": [1, 2, 3, 4, 5, 6],
         "simulation.other_joints": "locked",
         "objective.noise_deg": NOISE_DEG,

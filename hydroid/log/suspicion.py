@@ -61,6 +61,8 @@ def outside_hint(recording: Recording, signal: Signal, values: Floats) -> str:
         }
         degrees = abs(abs(signal.gain) - DEGREE) < 1e-12
         for hint, other in alternatives.items():
+            if hint.endswith("unit: deg") and np.nanmax(np.abs(values)) <= np.pi:
+                continue  # degrees that are read as radians turn far more than this
             fits = np.nanmin(other) >= signal.low and np.nanmax(other) <= signal.high
             if fits and not hint.endswith("unit: deg" if degrees else "unit: rad"):
                 return hint

@@ -101,7 +101,7 @@ def actuator_plot(actuator: JointActuator) -> Plot:
         "at each current."
     )
     if actuator.known is not None:
-        caption += " Bands: 95 % intervals. A curve without a band is given, or not determined by the logs."
+        caption += " Bands: 95 % intervals, some thinner than the line. A curve of given values has none."
     return Plot("actuator", caption, partial(draw, actuator))
 
 

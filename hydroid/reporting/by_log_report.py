@@ -1,5 +1,7 @@
 """What a fit of several logs says about each parameter by log, beside the pooled standard deviation."""
 
+import numpy as np
+
 from hydroid.problem.problem import Problem
 from hydroid.reporting.phrases import listed
 from hydroid.reporting.table import Cell, Table, unless_nan
@@ -36,7 +38,13 @@ def by_log_warning(found: ByLog | None) -> tuple[str, ...]:
     """Say which parameters differ between the logs by more than the noise explains."""
     if found is None or not found.differing:
         return ()
+    differing = listed(found.differing)
+    if max(found.freedom[np.isfinite(found.freedom)], default=0.0) < FEW:
+        return (
+            f"The logs disagree about {differing} by more than the noise explains. So few logs cannot tell "
+            "why: add logs before you use these values.",
+        )
     return (
-        f"{listed(found.differing)} would change from log to log by more than the noise explains: the model "
+        f"{differing} would change from log to log by more than the noise explains: the model "
         "errs, and the intervals in the table of parameters are too narrow. Take those by log.",
     )

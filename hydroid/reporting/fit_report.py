@@ -149,11 +149,24 @@ def _known(problem: Problem, fit: Fit) -> tuple[Section, ...]:
         quantity_section(problem, fit.quantities),
         Section(
             "Parameters",
-            f"{rank_phrase(fit.identifiability)} {words}",
+            " ".join(filter(None, (rank_phrase(fit.identifiability), _given_supply(problem), words))),
             bars=fit_bars(problem, fit),
             plots=(drawn,),
             more={"parameters": parameter_table(problem, fit)},
         ),
+    )
+
+
+def _given_supply(problem: Problem) -> str:
+    """Say what rests on a supply pressure that is given: without pressures in the log only p A is known."""
+    free = {p.quantity for p in problem.settings.parameters.values() if p.fixed is None}
+    compared = problem.settings.objective.pressure_weight > 0
+    if problem.settings.stage != "hyd" or "supply_pressure" in free or compared:
+        return ""
+    supply = number(problem.settings.hydraulics.supply_pressure)
+    return (
+        f"Areas, masses, torques and flows hold for a supply of {supply} bar, which is given; speeds, dead "
+        "bands and times do not depend on it."
     )
 
 

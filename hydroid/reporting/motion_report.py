@@ -14,8 +14,8 @@ MOTION = "The arm in motion"
 _FEWEST = 100
 """moments of a log at least"""
 _CAPTION = (
-    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins at their largest "
-    "difference. Joints that are not compared follow the log."
+    "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where they differ "
+    "most. Joints that are not compared follow the log."
 )
 
 

@@ -1,5 +1,7 @@
 """Do next: the steps that promise most, ranked, each with what it is predicted to bring."""
 
+import shlex
+
 from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.reporting.page import Section, Step
@@ -23,6 +25,10 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None, run: st
     elif not fit.converged:
         what = "Let the refinement finish: allow more iterations (refinement.iterations), or another seed."
         steps.append(Step(what, "Until then neither the estimate nor its intervals can be trusted."))
+    if problem.settings.stage == "mech":
+        logs = " ".join(shlex.quote(log.source) for log in problem.logs)
+        what = f"Fit the hydraulics: hydroid fit-hyd {logs} --mech {shlex.quote(run)}"
+        steps.append(Step(what, "A gain stands for them here. Most of the error is theirs."))
     if at := at_limits(problem, fit.uncertainty):
         gain = "The error falls beyond the bound. If such values are impossible, the model lacks something."
         steps.append(

@@ -31,8 +31,8 @@ _HELD = 0.2
 """how long a command is held at least to be marked in the figure [s]"""
 _CAPTION = (
     "Speed against command in the middle of the logged travel, and at 50 % command over the travel; bands "
-    "are 95 % intervals. Grey: commands beyond those of the logs. Ticks: commands that the logs hold. Where "
-    "there is no band, the logs do not determine the speed."
+    "are 95 % intervals. Grey: commands beyond those of the logs. Ticks: commands that the logs hold. A "
+    "band may be thinner than its line. Where the logs do not determine the speed, curves.csv has no limits."
 )
 
 

@@ -57,7 +57,7 @@ def suggested_steps(problem: Problem, result: Suggestions, run: str = "RUN") -> 
         Step(
             f"Free {test.term.name}.",
             f"The rms error is predicted to fall {fall_phrase(result.missing, test)}. "
-            f"Run: {freeing_command(problem, test, run)}",
+            f"Keep it if the error on an unseen log falls too. Run: {freeing_command(problem, test, run)}",
         )
         for test in free[: int(result.thorough)]
     ]
@@ -142,7 +142,7 @@ def term_phrases(problem: Problem, result: Suggestions, run: str = "RUN") -> tup
     if others:
         said.append(
             f"{listed(others)} would also lower the error, but may describe the same error. Free one "
-            "quantity at a time, and look at the report of the new fit."
+            "quantity at a time, and validate the new fit."
         )
     return tuple(said)
 
@@ -227,10 +227,11 @@ def missing_table(missing: MissingTerms) -> Table:
     header = ("quantity", "unit", "held at", "freed", "rms [deg]", "score", "verdict")
     free = _VERDICTS[Verdict.FREE]
     note = (
-        f"rms without any of them: {number(math.degrees(missing.rms))} deg. score: how clearly the residual "
-        "shows the effect, in standard deviations; effects that the free parameters can reproduce are "
-        f"removed first. '{free}' needs two things. (1) If the model lacked nothing, any of these quantities "
-        f"would be named in {100 * LEVEL:.0f} % of fits at most. (2) In simulation the rms error falls by "
+        f"rms without any of them: {number(math.degrees(missing.rms))} deg, with the best start angles where "
+        "the start is open. score: how clearly the residual shows the effect, in standard deviations; "
+        "effects that the free parameters can reproduce are removed first. "
+        f"'{free}' needs two things. (1) If the model lacked nothing, any of these quantities would be "
+        f"named in {100 * LEVEL:.0f} % of fits at most. (2) In simulation the rms error falls by "
         f"{100 * MIN_GAIN:.0f} % at least."
     )
     return Table("Quantities that the fit holds", header, tuple(rows), note, ("unit", "score"))
@@ -330,15 +331,20 @@ def action_effect(action: Action) -> str:
     """Say what an action would do."""
     stated = action.kind in (ActionKind.STATE, ActionKind.WEIGH)
     beside = f"Besides {action.subject} itself, " if stated else ""
-    most = f"{beside}{action.parameter} improves most: {_fall(action.deviations)}"
-    if action.quantity:
-        most += f". Of the quantities, {action.quantity} improves most: {_fall(action.quantity_deviations)}"
-    return most[0].upper() + most[1:] if stated else most
+    parameter = f"{beside}{action.parameter} improves most: {_fall(action.deviations)}"
+    quantity = f"Of the quantities, {action.quantity} improves most: {_fall(action.quantity_deviations)}"
+    if not action.quantity:
+        return parameter
+    return quantity if len(set(_percents(action.deviations))) == 1 else f"{parameter}. {quantity}"
 
 
 def _fall(deviations: tuple[float, float]) -> str:
-    before, after = (f"{100 * deviation:.2g}" for deviation in deviations)
+    before, after = _percents(deviations)
     return f"standard deviation {before} % to {after} %"
+
+
+def _percents(deviations: tuple[float, float]) -> list[str]:
+    return [f"{100 * deviation:.2g}" for deviation in deviations]
 
 
 def action_table(actions: Sequence[Action]) -> Table:

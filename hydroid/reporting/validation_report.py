@@ -134,7 +134,11 @@ def _motion(
     shown = {names[r.log.source]: r for r in results if r.fit == best and r.arm is not None}
     movements = [Movement.of(name, r.log, tuple(r.indices), r.response) for name, r in shown.items()]
     arm = next((r.arm for r in shown.values()), None)
-    return () if arm is None else motion_section(arm, movements, notes)
+    if arm is None:
+        return ()
+    several = len({r.fit for r in results}) > 1
+    of = f"Simulated by {best}, the fit with the lowest error. " if several else ""
+    return motion_section(arm, movements, {name: f"{of}{notes.get(name, '')}".strip() for name in shown})
 
 
 def validation_responses(results: Sequence[Validation]) -> dict[str, JointResponse]:

@@ -42,6 +42,8 @@ HOLD_S = 3.0
 """time that each is held, and the time of rest before it [s]"""
 DRAWS = 6
 """random experiments, the best of which stands for the designed one, which is at least as good"""
+_STAND_INS = ("gain", "damping", "stiffness")
+"""in stage 1 they stand for the hydraulics: no data sheet has them"""
 FEWEST_TIMES = 1.5
 """factor by which an action must improve a parameter to be listed"""
 MOST = 3
@@ -178,9 +180,10 @@ Forecast = tuple[ActionKind, str, Array]
 def _statements(problem: Problem, names: Sequence[str], left_out: Collection[str]) -> Iterator[Forecast]:
     """A weighed link, or a value of a data sheet; 5 % of a value at its bound, such as 0, says nothing."""
     for i, name in enumerate(names):
-        if name in left_out:
+        quantity = problem.settings.parameters[name].quantity
+        if name in left_out or (problem.settings.stage == "mech" and quantity in _STAND_INS):
             continue
-        mass = problem.settings.parameters[name].quantity == "mass"
+        mass = quantity == "mass"
         added = np.zeros((len(names), len(names)))
         added[i, i] = (WEIGHED_SD if mass else STATED_SD) ** -2
         yield ActionKind.WEIGH if mass else ActionKind.STATE, name, added

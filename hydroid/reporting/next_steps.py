@@ -9,7 +9,7 @@ from hydroid.reporting.phrases import at_limits, listed
 from hydroid.reporting.suggestion_report import MOST_STEPS, suggested_steps
 from hydroid.suggestion.suggest import Suggestions
 
-PREDICT_UNSEEN = "Predict a log that this fit has not seen: hydroid validate OTHER.csv --fit RUN."
+PREDICT_UNSEEN = "Predict a log that this fit has not seen."
 
 
 def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None, run: str = "RUN") -> Section:
@@ -27,8 +27,10 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None, run: st
         steps.append(Step(what, "Until then neither the estimate nor its intervals can be trusted."))
     if problem.settings.stage == "mech":
         logs = " ".join(shlex.quote(log.source) for log in problem.logs)
-        what = f"Fit the hydraulics: hydroid fit-hyd {logs} --mech {shlex.quote(run)}"
-        steps.append(Step(what, "A gain stands for them here. Most of the error is theirs."))
+        command = f"hydroid fit-hyd {logs} --mech {shlex.quote(run)}"
+        steps.append(
+            Step("Fit the hydraulics.", "A gain stands for them here. Most of the error is theirs.", command)
+        )
     if at := at_limits(problem, fit.uncertainty):
         gain = "The error falls beyond the bound. If such values are impossible, the model lacks something."
         steps.append(
@@ -38,6 +40,7 @@ def fit_steps(problem: Problem, fit: Fit, suggested: Suggestions | None, run: st
     unseen = Step(
         PREDICT_UNSEEN,
         "It shows how large the error is elsewhere, and whether the fitted logs lead to expect it.",
+        f"hydroid validate OTHER.csv --fit {shlex.quote(run)}",
     )
     return Section(
         "Do next", steps=tuple([*steps[: MOST_STEPS - 1], unseen, *steps[MOST_STEPS - 1 :]][:MOST_STEPS])

@@ -75,10 +75,11 @@ class Bar:
 
 @dataclass(frozen=True)
 class Step:
-    """Something to do next, and what it is predicted to bring."""
+    """Something to do next, what it is predicted to bring, and the command that does it."""
 
     what: str
     gain: str
+    command: str = ""
 
 
 @dataclass(frozen=True)

@@ -57,16 +57,18 @@ def suggested_steps(problem: Problem, result: Suggestions, run: str = "RUN") -> 
         Step(
             f"Free {test.term.name}.",
             f"The rms error is predicted to fall {fall_phrase(result.missing, test)}. "
-            f"Keep it if the error on an unseen log falls too. Run: {freeing_command(problem, test, run)}",
+            "Keep it if the error on an unseen log falls too.",
+            freeing_command(problem, test, run),
         )
         for test in free[: int(result.thorough)]
     ]
     if free and not result.thorough:
         steps.append(
             Step(
-                f"Find what the model lacks: {_suggest_command(problem, run)}",
+                "Find what the model lacks.",
                 f"A quick test points at {listed([t.term.name for t in free])}. suggest refines each of the "
                 "promising ones, and prints the command that frees the best.",
+                _suggest_command(problem, run),
             )
         )
     return steps + [

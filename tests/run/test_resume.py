@@ -58,17 +58,20 @@ def content(folder: Path) -> dict[str, object]:
 @pytest.mark.slow
 def test_killed_runs_end_the_same(tmp_path: Path):
     options = [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"]
-    finish(start(tmp_path, *options, out="whole"))
+    whole, killed = tmp_path / "whole", tmp_path / "killed"  # the report's commands name the run's folder
+    whole.mkdir()
+    killed.mkdir()
+    finish(start(whole, *options, out="run"))
     for met in ("run.json", "checkpoint.npz", "refinement.npz"):
-        process = start(tmp_path, *options, out="killed")
-        wait_for(process, tmp_path / "killed" / met)
+        process = start(killed, *options, out="run")
+        wait_for(process, killed / "run" / met)
         time.sleep(0.02)
         process.kill()
         process.communicate()
         assert process.returncode == -signal.SIGKILL
-        assert not (tmp_path / "killed" / "estimate.yaml").exists()
-    finish(start(tmp_path, *options, out="killed"))
-    assert content(tmp_path / "killed") == content(tmp_path / "whole")
+        assert not (killed / "run" / "estimate.yaml").exists()
+    finish(start(killed, *options, out="run"))
+    assert content(killed / "run") == content(whole / "run")
 
 
 @pytest.mark.slow

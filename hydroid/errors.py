@@ -58,10 +58,10 @@ class RunError(HydroidError):
 
 
 class Stopped(KeyboardInterrupt):
-    """A fit that Ctrl-C or a signal ended.
+    """A fit or study that Ctrl-C or a signal ended.
 
     Args:
-        kept: what remains of it, a clause; empty: nothing.
+        kept: what remains of it, and what continues it; empty: nothing.
     """
 
     def __init__(self, kept: str) -> None:

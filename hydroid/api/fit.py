@@ -117,7 +117,8 @@ def fit(
             result = _fit_in(folder, problem, progress or Silent())
         except KeyboardInterrupt:
             _log.info("interrupted after %.0f s", time.monotonic() - began)
-            raise Stopped(folder.interrupt()) from None
+            kept = folder.interrupt()
+            raise Stopped(kept and f"{kept}; the same command with --resume continues") from None
         except Exception as error:
             _log.error("ended by %s: %s", type(error).__name__, error)
             raise

@@ -31,11 +31,11 @@ def remember(stop: KeyboardInterrupt) -> None:
 
 
 def kept() -> str:
-    """Return what remains of a stopped fit, to follow the word `stopped`."""
+    """Return what remains of a stopped fit or study, to follow the word `stopped`."""
     kept = getattr(_interrupt, "kept", None)
     if kept is None:
         return ""
-    return f"; {kept}; the same command with --resume continues" if kept else "; nothing was written"
+    return f"; {kept}" if kept else "; nothing was written"
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

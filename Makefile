@@ -57,7 +57,7 @@ structure: setup  ## size and shape of the code
 
 article: setup  ## the article's tables and figures over ten seeds (docs/reproduction.md); about two hours, goes on where it was
 	$(BIN)/hydroid article --all --out runs/article
-	$(BIN)/python docs/reproduction.py runs/article > docs/reproduction.md
+	$(BIN)/python docs/reproduction.py runs/article
 
 article-quick: setup  ## the same in its short form: shows that everything runs; at most five minutes
 	$(BIN)/hydroid article --all --quick --out runs/article-quick

@@ -1,15 +1,11 @@
 """Settings compared over many seeds: `study` of your own, and `article`, the article's evaluation."""
 
 import json
-import os
-import platform
-import re
 import time
 from collections.abc import Generator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,11 +19,6 @@ from hydroid.progress import Progress, no_progress
 if TYPE_CHECKING:
     from hydroid.settings.study import StudySettings
     from hydroid.studies.study import StudyPlan, StudyRuns
-
-ELSEWHERE = {
-    "figure 12": "is the flow chart of the genetic algorithm: hydroid/search/ga.py is that loop",
-}
-"""items of the article that are no results"""
 
 
 @dataclass(frozen=True)
@@ -88,7 +79,8 @@ def article(
 
         result = hydroid.article(["table 6"], "runs/article", hydroid.StudyOptions(quick=True))
 
-    Studies share the runs that they have in common. What is stopped goes on with the same call.
+    Studies share the runs that they have in common. What is stopped goes on with the same call. The page of
+    all items is written when all are made.
 
     Args:
         items: such as "table 6" or "figure 13"; none: all.
@@ -99,32 +91,36 @@ def article(
         SettingsError: no such item.
         RunError: as of `study`.
     """
-    from hydroid.reporting.study_report import index_page
+    from hydroid.reporting.article_report import account, article_page
     from hydroid.run.lock import locked
 
     plans = [_plan(path, options) for path in _chosen(items)]
     out, began = Path(out), time.monotonic()
     with _stoppable(out), locked(out), _executor(options) as executor:
         results = [_run(plan, out, out / plan.name, executor, options).result for plan in plans]
-    about = _about(options) | {"findings": {r.plan.name: r.findings for r in results}}
-    write_atomic(out / "about.json", json.dumps(about, indent=1, ensure_ascii=False) + "\n")
-    return Study(results, index_page(results, time.monotonic() - began)).write(out)
+    page = article_page(results, items or article_items(), time.monotonic() - began)
+    if items:
+        return Study(results, page)
+    about = json.dumps(account(results, quick=options.quick), indent=1, ensure_ascii=False)
+    write_atomic(out / "about.json", about + "\n")
+    return Study(results, page).write(out)
 
 
-def article_items() -> "dict[str, tuple[str, StudySettings]]":
-    """Return the study behind each table and figure of the article: its file's name and its settings."""
+def article_items() -> "dict[str, dict[str, StudySettings]]":
+    """Return the studies behind each table and figure of the article, by name of their file."""
     from hydroid.settings.study import load_study
 
-    found: dict[str, tuple[str, StudySettings]] = {}
+    found: dict[str, dict[str, StudySettings]] = {}
     for path in _shipped():
         settings = load_study(path)
-        found |= dict.fromkeys(settings.items, (path.stem, settings))
+        for item in settings.items:
+            found.setdefault(item, {})[path.stem] = settings
     return dict(sorted(found.items(), key=lambda each: _order(each[0])))
 
 
 def _order(item: str) -> tuple[bool, int]:
-    number = re.search(r"\d+", item)
-    return item.startswith("figure"), int(number[0]) if number else 0
+    kind, number = item.split()
+    return kind == "figure", int(number)
 
 
 def _shipped() -> list[Path]:
@@ -135,11 +131,9 @@ def _chosen(items: Sequence[str]) -> list[Path]:
     """Return the files of the studies that make some items, each once."""
     known = article_items()
     for item in items:
-        if item in ELSEWHERE:
-            raise SettingsError(ELSEWHERE[item], where=item)
         if item not in known:
-            raise SettingsError("no such item", where=item, hint=f"known: {', '.join(known)}")
-    wanted = {known[item][0] for item in items or known}
+            raise SettingsError("cannot be made", where=item, hint="tables 1 to 9 and figures 9 to 20 can")
+    wanted = {name for item in items or known for name in known[item]}
     return [path for path in _shipped() if path.stem in wanted]
 
 
@@ -188,10 +182,3 @@ def _stoppable(out: Path) -> Generator[None]:
     except KeyboardInterrupt:
         count = len(list(out.glob("runs/*.json")))
         raise Stopped(f"{out} holds {count} runs that have ended; the same command goes on") from None
-
-
-def _about(options: StudyOptions) -> dict[str, Any]:
-    """Return with what the article was run."""
-    versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")}
-    machine = f"{platform.machine()}, {os.cpu_count()} cores"
-    return {"versions": versions, "machine": machine, "quick": options.quick}

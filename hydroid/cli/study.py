@@ -1,5 +1,6 @@
 """`hydroid study` and `article`."""
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -72,10 +73,12 @@ def article(
     flags: StudyFlags,
     output: Output,
     table: Annotated[
-        list[int] | None, typer.Option(metavar="N", help="A table of the article, 1 to 9. May be repeated.")
+        list[int] | None,
+        typer.Option(metavar="N", help="A table of the article, 1 to 9. May be repeated."),
     ] = None,
     figure: Annotated[
-        list[int] | None, typer.Option(metavar="N", help="A figure of the article, 9 to 20. May be repeated.")
+        list[int] | None,
+        typer.Option(metavar="N", help="A figure of the article, 9 to 20. May be repeated."),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="All tables and figures.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List them, and run nothing.")] = False,
@@ -91,21 +94,51 @@ def article(
 
     if listed:
         items = article_items()
-        lines = [f"{item:10} {name:12} {settings.title}" for item, (name, settings) in items.items()]
-        show(output, lambda: {"items": {item: name for item, (name, _) in items.items()}}, lines)
+        lines = [
+            f"{item:10} {name:16} {settings.title}"
+            for item, studies in items.items()
+            for name, settings in studies.items()
+        ]
+        show(output, lambda: {"items": {item: list(studies) for item, studies in items.items()}}, lines)
         return
-    chosen = [f"table {n}" for n in table or ()] + [f"figure {n}" for n in figure or ()]
+    chosen = [] if every else [f"table {n}" for n in table or ()] + [f"figure {n}" for n in figure or ()]
     if not chosen and not every:
         raise typer.BadParameter("give --table N, --figure N, --all or --list")
     with Progress(quiet=output.silent) as progress:
-        result = article([] if every else chosen, out, flags.options(progress))
-    sentences = [line for runs in result.result for line in (runs.plan.study.title, *_sentences(runs))]
+        result = article(chosen, out, flags.options(progress))
+    made = [line for runs in result.result for line in _made(runs, out / runs.plan.name, chosen)]
     content = {runs.plan.name: _content(runs) for runs in result.result}
-    show(output, lambda: {"out": str(out), "studies": content}, [*sentences, str(out / "article.html")])
+    pages = [str(out / "article.html")] if every else []
+    show(output, lambda: {"out": str(out), "studies": content}, [*made, *pages])
+
+
+def _made(runs: "StudyRuns", folder: Path, chosen: list[str]) -> list[str]:
+    """Return what was made of a study, found, and where it stands; of all items or of those chosen."""
+    items = [item for item in runs.plan.study.items if item in chosen or not chosen]
+    names = [item.replace(" ", "_") for item in items if item in chosen]
+    files = [
+        f
+        for name in names
+        for kind in ("tables/{}*.csv", "figures/{}*.png")
+        for f in folder.glob(kind.format(name))
+    ]
+    where = [folder / f"{runs.plan.name}.html", *sorted(files)]
+    return [
+        f"{', '.join(items)}: {runs.plan.study.title}",
+        *_sentences(runs),
+        *(f"  {file}" for file in where),
+        "",
+    ]
 
 
 def _sentences(runs: "StudyRuns") -> list[str]:
-    found = [f"- {verdict.sentence}" for verdict in runs.verdicts] + [f"- {text}" for text in runs.findings]
+    from hydroid.studies.claims import Outcome
+
+    verdicts, few = (*runs.verdicts, *runs.findings), Counter[str]()
+    few.update(v.detail for v in runs.verdicts if v.outcome is Outcome.UNTESTED)
+    alike = {detail: count for detail, count in few.items() if count > 1}
+    found = [f"- {v.sentence}" for v in verdicts if v.detail not in alike]
+    found += [f"- {count} claims are not tested: {detail}" for detail, count in alike.items()]
     failed = sum(bool(row.failed) for row in runs.rows)
     return [*found, f"- {failed} of {len(runs.rows)} runs failed"] if failed else found
 
@@ -116,17 +149,19 @@ def _content(runs: "StudyRuns") -> dict[str, Any]:
 
     verdicts = [
         {
-            "claim": v.claim.says,
+            "claim": v.says,
+            "item": v.item or None,
             "verdict": v.outcome.value,
+            "detail": v.detail,
             "p": finite(v.p),
             "effect": finite(v.effect),
             "seeds": v.seeds,
         }
-        for v in runs.verdicts
+        for v in (*runs.verdicts, *runs.findings)
     ]
     rows = [
         {"cell": r.cell, "seed": r.seed, "failed": r.failed or None}
         | {name: finite(value) for name, value in r.values.items()}
         for r in runs.rows
     ]
-    return {"verdicts": verdicts, "findings": list(runs.findings), "runs": rows}
+    return {"verdicts": verdicts, "runs": rows}

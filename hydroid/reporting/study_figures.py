@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.reporting import style
+from hydroid.reporting.flow_chart import flow_chart
 from hydroid.reporting.truth_figures import COLORS, arm_in_space, landscape_figure, record, sensitivity
 from hydroid.settings.study import StudyFigure
 from hydroid.studies.study import StudyRuns
@@ -166,6 +167,10 @@ def _segments(runs: StudyRuns, figure: StudyFigure) -> Figure:
     return drawing
 
 
+def _flow_chart(runs: StudyRuns, figure: StudyFigure) -> Figure:
+    return flow_chart(runs.problem.settings.search.ga, figure.title)
+
+
 _KINDS: dict[str, Callable[[StudyRuns, StudyFigure], Figure]] = {
     "convergence": _convergence,
     "spread": _spread,
@@ -176,4 +181,5 @@ _KINDS: dict[str, Callable[[StudyRuns, StudyFigure], Figure]] = {
     "sensitivity": sensitivity,
     "surface": landscape_figure,
     "arm": arm_in_space,
+    "flow chart": _flow_chart,
 }

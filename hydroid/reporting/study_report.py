@@ -26,24 +26,28 @@ CAPTIONS = {
     "sensitivity": "Dark: lower bound; light: upper bound; dashed: the data. All else is at the truth.",
     "surface": "All other parameters are at the truth.",
     "arm": "Drawn from the meshes of the arm's file.",
+    "flow chart": "With the settings of the study's first cell.",
 }
 """what each kind of figure shows"""
 QUICK = "The short form: few seeds, short data, few generations. It shows that the study runs, nothing else."
 
 
 def study_page(runs: StudyRuns) -> Page:
-    """Return the page of a study; its tables are `table_1`, ..., and its CSV holds every run."""
+    """Return the page of a study; what its titles have before a colon names tables and figures.
+
+    Its CSV holds every run.
+    """
     study, plan = runs.plan.study, runs.plan
-    tables = {
-        f"table_{i}": study_table(table, runs.rows, list(plan.cells), plan.units)
-        for i, table in enumerate(study.tables, 1)
-    }
     taken: set[str] = set()
+    tables = {
+        _name(table.title, taken): study_table(table, runs.rows, list(plan.cells), plan.units)
+        for table in study.tables
+    }
     plots: list[Plot] = []
     for figure in study.figures:
-        name = file_name(figure.title.partition(":")[0].lower(), taken)
+        name = _name(figure.title, taken)
         plots.append(Plot(name, f"{figure.title}. {CAPTIONS[figure.kind]}", partial(draw, runs, figure)))
-    found = conclusions(runs.verdicts, runs.findings)
+    found = conclusions([*runs.verdicts, *runs.findings])
     sections = [Section(heading, points=tuple(sentences)) for heading, sentences in found.items()]
     sections.append(Section("What was compared", text=study.about, facts=facts(runs)))
     if tables:
@@ -63,19 +67,8 @@ def study_page(runs: StudyRuns) -> Page:
     return Page(plan.name, study.title, lead, tuple(sections), tuple(warnings), data=data)
 
 
-def index_page(studies: Sequence[StudyRuns], seconds: float) -> Page:
-    """Return the page of several studies: what each claims and found."""
-    sections: list[Section] = []
-    for runs in studies:
-        found = [v.sentence for v in runs.verdicts] + list(runs.findings)
-        items = ", ".join(runs.plan.study.items)
-        where = f"{items}: {runs.plan.name}/{runs.plan.name}.html"
-        sections.append(Section(runs.plan.study.title, text=where, points=tuple(found)))
-    quick = (QUICK,) if any(runs.plan.quick for runs in studies) else ()
-    count = sum(len(runs.rows) for runs in studies)
-    of = "one study" if len(studies) == 1 else f"{len(studies)} studies"
-    lead = f"{count} runs of {of}; this call took {seconds:.0f} s."
-    return Page("article", "The article, put to the test", lead, tuple(sections), quick)
+def _name(title: str, taken: set[str]) -> str:
+    return file_name(title.partition(":")[0].lower(), taken)
 
 
 def study_table(
@@ -112,11 +105,11 @@ def _short(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def conclusions(verdicts: Sequence[Verdict], findings: Sequence[str]) -> dict[str, list[str]]:
+def conclusions(verdicts: Sequence[Verdict]) -> dict[str, list[str]]:
     """Return what was found of the claims, in sentences, by heading."""
     found = {
-        "Claims": [v.sentence for v in verdicts if not v.claim.ours] + list(findings),
-        "Further claims, not the article's": [v.sentence for v in verdicts if v.claim.ours],
+        "Claims": [v.sentence for v in verdicts if not v.ours],
+        "Further claims, not the article's": [v.sentence for v in verdicts if v.ours],
     }
     return {heading: sentences for heading, sentences in found.items() if sentences}
 

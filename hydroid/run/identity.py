@@ -22,6 +22,8 @@ DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
 """settings on which no result depends"""
+ELSEWHERE = frozenset({"model", "meshes", "pair"})
+"""of an arm's settings: where its files are, and what stands beside it"""
 
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
@@ -100,8 +102,7 @@ def refuse_other_run(
         raise RunError(what, where=str(folder), hint=hint)
     if settings.arm.model.resolve() == (folder / MODEL).resolve():
         return
-    elsewhere = {"model", "meshes", "pair"}  # where files are, and what stands beside the arm
-    arms = (arm.model_dump(mode="json", exclude=elsewhere) for arm in (before.arm, settings.arm))
+    arms = (arm.model_dump(mode="json", exclude=set(ELSEWHERE)) for arm in (before.arm, settings.arm))
     for key, old, new in _differences(*arms):
         hint = f"continue it with its own arm, or {other}"
         raise RunError(f"holds a run of an arm with {key} = {old}, now {new}", where=str(folder), hint=hint)

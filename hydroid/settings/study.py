@@ -1,5 +1,6 @@
 """A study's file: settings of a fit, what of them varies, seeds, data, and what is shown and claimed."""
 
+import re
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -69,6 +70,12 @@ class DataSettings(Settings):
         return self
 
 
+def item_of(title: str) -> str:
+    """Return `table 6` of a title such as "Table 6: errors"; empty where it has no such beginning."""
+    found = re.match(r"(table|figure) \d+(?=[:,])", title.lower())
+    return found[0] if found else ""
+
+
 class StudyTable(Settings):
     """A table: a row for each cell of the study, a column for each measure."""
 
@@ -91,11 +98,13 @@ class StudyFigure(Settings):
     """above the figure"""
     kind: Literal[
         "convergence", "spread", "responses", "commands", "segments", "segment bests",
-        "sensitivity", "surface", "arm",
+        "sensitivity", "surface", "arm", "flow chart",
     ]  # fmt: skip
     """convergence: best objective by generation; spread: a measure of every run; responses: of the median
-    run of each cell; segment bests: the best candidate of each segment, and the estimate; the last three are
-    drawn at the true parameters and need no run"""
+    run of each cell; segment bests: the best candidate of each segment, and the estimate; sensitivity and
+    surface are drawn at the true parameters; flow chart: of the simple GA"""
+    says: str = ""
+    """a statement that the figure is judged by (docs/studies.md); none: it is only drawn"""
     cells: tuple[str, ...] = ()
     """cells that are drawn; none: all"""
     column: str = "parameter error"
@@ -110,6 +119,19 @@ class StudyFigure(Settings):
     """sensitivity: part of the record that is drawn [s]; null: all of it"""
     points: Annotated[int, Field(ge=3, le=101)] = 31
     """surface: values of each parameter"""
+    actuators: dict[Literal["linear", "rotary"], int] = Field(default_factory=dict[Any, int])
+    """arm: how many of each kind it is said to have"""
+
+    @property
+    def item(self) -> str:
+        """The article's item that the figure is, as its title says; empty where it is none."""
+        return item_of(self.title)
+
+    @model_validator(mode="after")
+    def _judged(self) -> "StudyFigure":
+        if self.says and self.kind in ("convergence", "spread"):
+            raise ValueError(f"a figure of kind {self.kind} judges no statement; give it as a claim")
+        return self
 
 
 class Claim(Settings):
@@ -117,14 +139,24 @@ class Claim(Settings):
 
     says: str
     """the statement"""
-    column: str
+    item: str = ""
+    """the article's table or figure that says so, one of the study's `items`"""
+    column: str = ""
     """the measure"""
-    lower: str
+    lower: str = ""
     """cell that has the lower value if the statement is true"""
-    than: str
+    than: str = ""
     """cell that it is compared with"""
     ours: bool = False
     """the statement is not the article's"""
+    untested: str = ""
+    """why no run can tell, in place of column, lower and than"""
+
+    @model_validator(mode="after")
+    def _testable(self) -> "Claim":
+        if bool(self.untested) == all((self.column, self.lower, self.than)):
+            raise ValueError("give column, lower and than; or untested: REASON")
+        return self
 
 
 class QuickSettings(Settings):
@@ -172,11 +204,18 @@ class StudySettings(Settings):
         named = [(f"tables.{i}.article", c) for i, t in enumerate(self.tables) for c in t.article]
         named += [(f"figures.{i}.cells", c) for i, f in enumerate(self.figures) for c in f.cells]
         named += [
-            (f"claims.{i}", c) for i, claim in enumerate(self.claims) for c in (claim.lower, claim.than)
+            (f"claims.{i}", c)
+            for i, claim in enumerate(self.claims)
+            for c in (claim.lower, claim.than)
+            if not claim.untested
         ]
+        named += [(f"tables.{i}.cells", c) for i, t in enumerate(self.tables) for c in t.cells]
         for where, cell in named:
             if cell not in known:
                 raise ValueError(f"{where}: no cell {cell!r}; the cells: {', '.join(known)}")
+        for i, claim in enumerate(self.claims):
+            if claim.item and claim.item not in self.items:
+                raise ValueError(f"claims.{i}: {claim.item!r} is none of the items {', '.join(self.items)}")
         for i, table in enumerate(self.tables):
             for cell, values in table.article.items():
                 if len(values) != len(table.columns):

@@ -31,48 +31,70 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """A claim and what the runs say of it.
+    """A statement and what was found of it.
 
     Attributes:
-        claim: what was tested.
+        says: the statement.
         outcome: the answer.
-        p: corrected by Holm's method; nan where untested.
-        effect: rank-biserial correlation, from -1 to 1; nan where untested.
-        medians: of the cell that should be lower, and of the other one.
+        detail: what it rests on, in words.
+        item: the article's table or figure that makes the statement; empty where none does.
+        ours: the statement is not the article's.
+        p: of a claim, corrected by Holm's method; nan where nothing was tested.
+        effect: of a claim: rank-biserial correlation, from -1 to 1; nan where nothing was tested.
+        medians: of the cell that should be lower, and of the other one; nan where nothing was tested.
         seeds: pairs.
     """
 
-    claim: Claim
+    says: str
     outcome: Outcome
-    p: float
-    effect: float
-    medians: tuple[float, float]
-    seeds: int
+    detail: str
+    item: str = ""
+    ours: bool = False
+    p: float = np.nan
+    effect: float = np.nan
+    medians: tuple[float, float] = (np.nan, np.nan)
+    seeds: int = 0
 
     @property
     def sentence(self) -> str:
         """The verdict in a sentence."""
-        if self.outcome is Outcome.UNTESTED:
-            return f"{self.claim.says}: not tested ({self.seeds} seeds are too few for any answer)."
-        low, high = (f"{m:.3g}" for m in self.medians)
-        medians = f"median {self.claim.column} {low} against {high}"
-        test = f"p = {self.p:.2g}, effect {self.effect:+.2f}, {self.seeds} seeds"
-        return f"{self.claim.says}: {self.outcome.value} ({medians}; {test})."
+        return f"{self.says}: {self.outcome.value} ({self.detail})."
 
 
 def verdicts(claims: Sequence[Claim], rows: Sequence[Row]) -> list[Verdict]:
-    """Return the verdict on every claim, with p-values corrected over all of them."""
+    """Return the verdict on every claim, with p-values corrected over all of them.
+
+    Where even a difference on every seed would not be significant after the correction, none is tested.
+    """
     pairs = [_pairs(claim, rows) for claim in claims]
-    testable = [len(p) and 2.0 ** (1 - len(p)) < SIGNIFICANT for p in pairs]
+    least = [2.0 ** (1 - len(p)) if len(p) else 1.0 for p in pairs]
+    able = [p < SIGNIFICANT for p in least]
+    family = sum(able)
+    enough = family and min(least) * family < SIGNIFICANT
     raw = [
-        signed_rank(p[:, 1] - p[:, 0]) if able else (np.nan, np.nan)
-        for p, able in zip(pairs, testable, strict=True)
+        signed_rank(p[:, 1] - p[:, 0]) if each and enough else (np.nan, np.nan)
+        for p, each in zip(pairs, able, strict=True)
     ]
     corrected = holm(np.array([p for p, _ in raw]))
     return [
-        Verdict(claim, _outcome(p, effect), p, effect, _medians(pair), len(pair))
+        _verdict(claim, pair, p, effect, family)
         for claim, pair, p, (_, effect) in zip(claims, pairs, corrected.tolist(), raw, strict=True)
     ]
+
+
+def _verdict(claim: Claim, pairs: Array, p: float, effect: float, family: int) -> Verdict:
+    seeds = f"{len(pairs)} seed{'s' * (len(pairs) != 1)}"
+    if not np.isfinite(p):
+        few = f"{seeds} are too few for {f'{family} claims' if family else 'any answer'}"
+        return Verdict(claim.says, Outcome.UNTESTED, claim.untested or few, claim.item, claim.ours)
+    low, high = np.median(pairs, axis=0).tolist()
+    if np.array_equal(pairs[:, 0], pairs[:, 1]):
+        detail = f"{claim.column} is the same in both, seed by seed; median {low:.3g}, {seeds}"
+    else:
+        test = f"p = {p:.2g}, effect {effect:+.2f}, {seeds}"
+        detail = f"median {claim.column} {low:.3g} against {high:.3g}; {test}"
+    outcome, medians = _outcome(p, effect), (low, high)
+    return Verdict(claim.says, outcome, detail, claim.item, claim.ours, p, effect, medians, len(pairs))
 
 
 def signed_rank(difference: Array) -> tuple[float, float]:
@@ -108,14 +130,7 @@ def _pairs(claim: Claim, rows: Sequence[Row]) -> Array:
     return pairs[np.isfinite(pairs).all(axis=1)]
 
 
-def _medians(pairs: Array) -> tuple[float, float]:
-    low, high = np.median(pairs, axis=0) if len(pairs) else (np.nan, np.nan)
-    return float(low), float(high)
-
-
 def _outcome(p: float, effect: float) -> Outcome:
-    if not np.isfinite(p):
-        return Outcome.UNTESTED
     if p >= SIGNIFICANT:
         return Outcome.OPEN
     return Outcome.CONFIRMED if effect > 0 else Outcome.CONTRADICTED

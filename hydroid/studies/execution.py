@@ -17,7 +17,8 @@ from pathlib import Path
 
 from hydroid.errors import HydroidError, RunError
 from hydroid.files import write_atomic
-from hydroid.progress import Progress
+from hydroid.progress import NOTE, Progress
+from hydroid.studies.code import code_version
 from hydroid.studies.runs import Result, Task, perform
 
 _log = logging.getLogger(__name__)
@@ -35,7 +36,9 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     missing = {file: task for file, task in zip(files, tasks, strict=True) if not file.is_file()}
     results = {file: read_result(file) for file in files if file not in missing}
     failed: dict[Path, Result] = {}
-    known = len(results)
+    known, code = len(results), code_version()
+    if known and missing:
+        _log.log(NOTE, "%d of %d runs found, goes on", known, known + len(missing))
     progress("runs", known, known + len(missing))
     futures: dict[Future[Result], Path] = {
         executor.submit(perform, task): file for file, task in missing.items()
@@ -43,7 +46,7 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     try:
         for done, future in enumerate(as_completed(futures), 1):
             file = futures.pop(future)
-            results[file] = _outcome(future, missing[file], failed, file)
+            results[file] = _outcome(future, missing[file], failed, file) | {"code": code}
             if file not in failed:
                 write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
             progress("runs", known + done, known + len(missing))

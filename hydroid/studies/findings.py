@@ -1,32 +1,72 @@
-"""What holds at the true parameters without a fit: each parameter's effect, and minima of the error."""
+"""Verdicts that need no test over seeds: on the statements that figures are judged by (docs/studies.md)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import lru_cache
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
+from hydroid.settings.study import StudyFigure, StudySettings
+from hydroid.studies.claims import Outcome, Verdict
+from hydroid.studies.measures import Row
 from hydroid.uncertainty.jacobian import jacobian
 from hydroid.uncertainty.sweep import Surface, surface
 
+FOLLOWS = 0.05
+"""rms error, as part of the record's range, up to which a response follows the data"""
+PEAK = 0.1
+"""part of the record's range by which a peak or trough must stand out"""
+FULL_COMMAND = 100.0
+"""largest command [%]"""
 
-def ranking(problem: Problem, theta: Array, order: Sequence[str]) -> str:
-    """Say whether the effects of some parameters fall in a stated order, the strongest first."""
+Judged = tuple[bool | Outcome, str]
+"""whether a statement holds, and what that rests on"""
+
+
+def findings(
+    study: StudySettings, problem: Problem, rows: Sequence[Row], points: Callable[[StudyFigure], int]
+) -> Generator[Verdict]:
+    """Return the verdict on the statement of each figure that has one.
+
+    Args:
+        study: with the figures.
+        problem: of its first cell.
+        rows: of all runs.
+        points: of each parameter of a figure's surface.
+    """
+    for figure in study.figures:
+        if not figure.says:
+            continue
+        if figure.kind in ("sensitivity", "surface"):
+            theta = problem.parameters.vector(study.data.truth, "data.truth")
+            if figure.kind == "surface":
+                judged = minima(landscape(problem, theta, figure.parameters, points(figure)))
+            else:
+                judged = ranking(problem, theta, figure.order)
+        elif figure.kind in ("responses", "segment bests"):
+            judged = following(problem, rows, figure.cells)
+        else:
+            judged = _JUDGES[figure.kind](problem, figure)
+        holds, detail = judged
+        outcome = holds if isinstance(holds, Outcome) else Outcome.CONFIRMED if holds else Outcome.OPEN
+        yield Verdict(figure.says, outcome, detail, figure.item)
+
+
+def ranking(problem: Problem, theta: Array, order: Sequence[str]) -> Judged:
+    """Whether the effects of some parameters fall in a stated order, the strongest first."""
     effects = dict(zip(problem.parameters.names, np.degrees(jacobian(problem, theta).effects), strict=True))
     found = sorted(order, key=lambda name: -effects[name])
-    outcome = "confirmed" if found == list(order) else "contradicted"
     sizes = ", ".join(f"{name} {effects[name]:.2g}" for name in found)
-    said = ", ".join(order)
-    return f"The effect on the output falls in the order {said}: {outcome} (deg rms per 1 %: {sizes})."
+    holds = found == list(order) or Outcome.CONTRADICTED
+    return holds, f"rms change of the angle in deg for 1 % of each parameter: {sizes}"
 
 
-def minima(found: Surface) -> str:
-    """Say whether a surface has several minima."""
-    count = local_minima(found.error)
-    outcome = "confirmed" if count > 1 else "not confirmed"
-    names, shape = " and ".join(p.name for p in found.parameters), " by ".join(map(str, found.error.shape))
-    return f"The error over {names} has several minima: {outcome} ({count} on a grid of {shape} points)."
+def minima(found: Surface) -> Judged:
+    """Whether a surface has several minima."""
+    count, shape = local_minima(found.error), " by ".join(map(str, found.error.shape))
+    return count > 1, f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
 
 
 def local_minima(error: Array) -> int:
@@ -36,6 +76,66 @@ def local_minima(error: Array) -> int:
     n, m = error.shape
     around = [padded[i : i + n, j : j + m] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
     return int(np.sum(known < np.min(around, axis=0)))
+
+
+def following(problem: Problem, rows: Sequence[Row], cells: Sequence[str]) -> Judged:
+    """Whether the responses of some cells follow the record: each by the median of its runs."""
+    found: dict[str, float] = {}
+    for cell in cells or dict.fromkeys(row.cell for row in rows):
+        errors = [row.values["rms error"] for row in rows if row.cell == cell and not row.failed]
+        if not errors:
+            return Outcome.UNTESTED, f"no run of {cell}"
+        found[cell] = float(np.median(errors))
+    span = float(np.ptp(_record(problem)))
+    shares = ", ".join(f"{cell} {error:.3g} deg or {error / span:.1%}" for cell, error in found.items())
+    limit = f"at most {FOLLOWS:.0%} of the record's range of {span:.3g} deg"
+    return max(found.values()) <= FOLLOWS * span, f"median rms error: {shares}; to follow means {limit}"
+
+
+def turning_points(angle: Array) -> int:
+    """Return how many peaks and troughs of a record, shape (T,), stand out by PEAK of its range."""
+    least = PEAK * np.ptp(angle)
+    return sum(len(find_peaks(sign * angle, prominence=least)[0]) for sign in (1, -1))
+
+
+def _segments(problem: Problem, _: StudyFigure) -> Judged:
+    count, turns = len(problem.bounds), turning_points(_record(problem))
+    return count == turns, f"{count} segments; {turns} peaks and troughs of at least {PEAK:.0%} of the range"
+
+
+def _commands(problem: Problem, _: StudyFigure) -> Judged:
+    command = problem.logs[0].command[:, problem.outputs[0]]
+    levels = 1 + int(np.count_nonzero(np.diff(command)))
+    inside = bool(np.abs(command).max() <= FULL_COMMAND)
+    return inside, f"{levels} levels from {command.min():.0f} to {command.max():.0f} %"
+
+
+def _arm(problem: Problem, figure: StudyFigure) -> Judged:
+    kinds = [joint.actuator.kind for joint in problem.settings.arm.joints if joint.actuator is not None]
+    have = {kind: kinds.count(kind) for kind in ("linear", "rotary")}
+    count = " and ".join(f"{number} {kind}" for kind, number in have.items())
+    same = all(have[kind] == number for kind, number in figure.actuators.items())
+    return same, f"{len(problem.settings.arm.joints)} joints; {count} actuators"
+
+
+def _flow_chart(problem: Problem, _: StudyFigure) -> Judged:
+    elite = problem.settings.search.ga.elitism
+    added = f"; one thing added: the best {elite} of each generation survive" if elite else ""
+    return True, f"each step has its test in tests/search{added}"
+
+
+_JUDGES: dict[str, Callable[[Problem, StudyFigure], Judged]] = {
+    "segments": _segments,
+    "commands": _commands,
+    "arm": _arm,
+    "flow chart": _flow_chart,
+}
+"""figures whose statement is judged by the problem alone"""
+
+
+def _record(problem: Problem) -> Array:
+    """Return the first compared angle of the first log [deg], shape (T,)."""
+    return np.degrees(problem.logs[0].angle[:, problem.outputs[0]])
 
 
 def landscape(problem: Problem, theta: Array, names: tuple[str, ...], points: int) -> Surface:

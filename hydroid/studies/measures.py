@@ -107,7 +107,7 @@ def check_measures(study: StudySettings, known: Mapping[str, str], where: str) -
         SettingsError: with the measures that it has.
     """
     named = [(f"tables.{i}.columns", c) for i, t in enumerate(study.tables) for c in t.columns]
-    named += [(f"claims.{i}.column", c.column) for i, c in enumerate(study.claims)]
+    named += [(f"claims.{i}.column", c.column) for i, c in enumerate(study.claims) if not c.untested]
     named += [(f"figures.{i}.column", f.column) for i, f in enumerate(study.figures) if f.kind == "spread"]
     for key, name in named:
         if name not in known:

@@ -21,7 +21,7 @@ from hydroid.identified_model import IdentifiedModel, portable
 from hydroid.log import Log
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
-from hydroid.run.identity import FREE, model_hash
+from hydroid.run.identity import ELSEWHERE, FREE, model_hash
 from hydroid.search.compromise import segment_best
 from hydroid.settings.fit import FitSettings
 from hydroid.studies.data import StudyData
@@ -64,7 +64,7 @@ def _plain(settings: FitSettings) -> dict[str, Any]:
     for name in ALGORITHMS:
         if name != settings.search.algorithm:
             del values["search"][name]
-    arm = settings.arm.model_dump(mode="json", exclude={"model", "meshes"})
+    arm = settings.arm.model_dump(mode="json", exclude=set(ELSEWHERE))
     return values | {"arm": arm}
 
 

@@ -1,6 +1,6 @@
 """A study from its file to its measures and verdicts."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from hydroid.settings.study import StudyFigure, StudySettings, cell_settings, lo
 from hydroid.studies.claims import Verdict, verdicts
 from hydroid.studies.data import Read, StudyData, make_data
 from hydroid.studies.execution import run_all
-from hydroid.studies.findings import landscape, minima, ranking
+from hydroid.studies.findings import findings
 from hydroid.studies.measures import Directions, Row, check_measures, measured, measures, true_directions
 from hydroid.studies.runs import Result, Task, make_tasks
 
@@ -70,7 +70,7 @@ class StudyRuns:
         results: of every task.
         rows: their measures.
         verdicts: on the study's claims.
-        findings: what needs no run, each a sentence.
+        findings: on the statements that its figures are judged by.
     """
 
     plan: StudyPlan
@@ -79,7 +79,7 @@ class StudyRuns:
     results: tuple[Result, ...]
     rows: tuple[Row, ...]
     verdicts: tuple[Verdict, ...]
-    findings: tuple[str, ...]
+    findings: tuple[Verdict, ...]
 
     def of(self, cell: str) -> list[tuple[Row, Result]]:
         """Return the runs of a cell that did not fail."""
@@ -130,17 +130,6 @@ def run_study(plan: StudyPlan, folder: Path, executor: Executor, progress: Progr
     directions = true_directions(problem, data.truth, data.determined_at_deg) if data.truth else None
     results = run_all(plan.tasks, folder / RUNS, executor, progress)
     rows = [measured(task, result, directions) for task, result in zip(plan.tasks, results, strict=True)]
-    found = verdicts(plan.study.claims, rows)
-    return StudyRuns(
-        plan, problem, directions, tuple(results), tuple(rows), tuple(found), tuple(_findings(plan, problem))
-    )
-
-
-def _findings(plan: StudyPlan, problem: Problem) -> Generator[str]:
-    for figure in plan.study.figures:
-        if figure.kind in ("sensitivity", "surface"):
-            theta = problem.parameters.vector(plan.study.data.truth, "data.truth")
-            if figure.kind == "surface":
-                yield minima(landscape(problem, theta, figure.parameters, plan.grid(figure)))
-            elif figure.order:
-                yield ranking(problem, theta, figure.order)
+    claimed = verdicts(plan.study.claims, rows)
+    judged = findings(plan.study, problem, rows, plan.grid)
+    return StudyRuns(plan, problem, directions, tuple(results), tuple(rows), tuple(claimed), tuple(judged))

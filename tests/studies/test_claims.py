@@ -38,6 +38,22 @@ def test_noise_is_not_confirmed_and_five_seeds_are_too_few():
     assert "5 seeds are too few" in few.sentence
     (equal,) = verdicts([CLAIM], rows(np.ones(10), np.ones(10)))
     assert (equal.outcome, equal.p, equal.effect) == (Outcome.OPEN, 1.0, 0.0)
+    assert "error is the same in both, seed by seed" in equal.sentence
+
+
+def test_a_claim_that_no_run_can_tell_says_why_and_takes_no_part_in_the_correction():
+    silent = Claim(says="A is heavy", untested="nobody weighed it", item="")
+    base = RNG.uniform(1, 2, 10)
+    made = rows(base, base + RNG.uniform(0.1, 0.2, 10))
+    first, second = verdicts([silent, CLAIM], made)
+    assert first.sentence == "A is heavy: not tested (nobody weighed it)."
+    assert second.p == verdicts([CLAIM], made)[0].p
+    for wrong in (
+        {"column": "error", "lower": "A"},
+        {"untested": "why", "column": "e", "lower": "A", "than": "B"},
+    ):
+        with pytest.raises(ValueError, match="give column, lower and than; or untested"):
+            Claim(says="neither or both", **wrong)
 
 
 def test_only_seeds_that_both_cells_have_are_compared():
@@ -57,7 +73,12 @@ def test_holm_corrects_over_all_claims_of_a_study():
     base = RNG.uniform(1, 2, 7)
     made = rows(base, base + 0.1)  # p = 2 / 2^7 alone
     assert verdicts([CLAIM], made)[0].outcome is Outcome.CONFIRMED
-    assert verdicts([CLAIM] * 4, made)[0].outcome is Outcome.OPEN
+    assert verdicts([CLAIM] * 3, made)[0].outcome is Outcome.CONFIRMED
+    (many, *_) = verdicts([CLAIM] * 4, made)  # 4 · 2 / 2^7 is above 0.05: no result could be significant
+    assert many.outcome is Outcome.UNTESTED
+    assert "7 seeds are too few for 4 claims" in many.sentence
+    four = [made[i] for i in (*range(4), *range(7, 11))]
+    assert "4 seeds are too few for any answer" in verdicts([CLAIM], four)[0].sentence
 
 
 def test_signed_ranks_are_scipys():

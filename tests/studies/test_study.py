@@ -1,6 +1,8 @@
 """The study's mechanism: each run is one file, what is there is not repeated, what failed is shown."""
 
 import json
+from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +57,29 @@ def test_studies_share_the_runs_that_they_have_in_common(tmp_path: Path):
     assert set(stored(tmp_path)) == files  # the unused search's settings decide nothing
 
 
+def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
+    """A checkout that is moved keeps its runs: paths decide nothing."""
+    plan = plan_study(written(tmp_path), lambda paths, settings: read_logs(paths, settings))
+    task = plan.tasks[0]
+    arm, pair = task.settings.arm, task.settings.arm.pair
+    assert pair is not None
+    elsewhere = tmp_path / "other.xml"
+    moved = arm.model_copy(update={"pair": pair.model_copy(update={"model": elsewhere})})
+    other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
+    assert other.key() == task.key()
+
+
+def test_a_study_that_goes_on_says_so_and_records_the_code_of_each_run(tmp_path: Path, caplog):
+    caplog.set_level("INFO", "hydroid")
+    file = written(tmp_path)
+    run(file, tmp_path, seeds=1)
+    assert "found" not in caplog.text
+    run(file, tmp_path, seeds=2)
+    assert "2 of 4 runs found, goes on" in caplog.text
+    for result in stored(tmp_path).values():
+        assert result["code"].startswith(version("hydroid"))
+
+
 def test_more_seeds_add_runs(tmp_path: Path):
     file = written(tmp_path, axes={"objective.norm": ["inf"]}, claims=[], tables=[])
     one = run(file, tmp_path, seeds=1)
@@ -81,7 +106,7 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
         ("mean", 2, "every candidate diverged"),
     ]
     assert "2 of 4 runs failed" in " ".join(page.warnings)
-    counts = {row[0]: row[2] for row in page.tables["table_1"].rows if row[1] == "ours"}
+    counts = {row[0]: row[2] for row in page.tables["errors"].rows if row[1] == "ours"}
     assert counts == {"largest": "2", "mean": "0 of 2"}
     assert len(stored(tmp_path)) == 3  # what may pass is tried again
     monkeypatch.setattr(execution, "perform", perform)

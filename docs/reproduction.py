@@ -205,7 +205,7 @@ def section(each: Evaluated, about: dict[str, Any]) -> str:
     lines = [
         f"\n## {study.title}\n",
         f"\n{items[:1].upper()}{items[1:]} (`configs/article/{each.name}.yaml`). {study.about.strip()}\n",
-        "".join(f"\n- {name}: {text}" for name, text in about["facts"][each.name].items()),
+        "".join(f"\n- {name}: {text}" for name, text in about["facts"][each.name].items() if name != "cells"),
     ]
     if rows:
         failed = sum(bool(row.failed) for row in rows)

@@ -118,10 +118,13 @@ def log_lines(*, verbose: bool, quiet: bool) -> Generator[None]:
     handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
     logger = logging.getLogger("hydroid")
+    level = logger.level
     logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
     try:
         yield
     finally:
+        logger.setLevel(level)
         logger.removeHandler(handler)
 
 

@@ -1,6 +1,7 @@
 """`hydroid study` and `article`."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +14,7 @@ from hydroid.cli.output import show
 if TYPE_CHECKING:
     from hydroid.api.studies import StudyOptions
     from hydroid.cli.progress import Progress
+    from hydroid.reporting.table import Table
     from hydroid.studies.study import StudyRuns
 
 
@@ -112,30 +114,30 @@ def article(
     show(output, lambda: {"out": str(out), "studies": content}, [*made, *pages])
 
 
-def _made(runs: "StudyRuns", folder: Path, chosen: list[str]) -> list[str]:
+def _made(runs: "StudyRuns", folder: Path, chosen: list[str]) -> "list[Table | str]":
     """Return what was made of a study, found, and where it stands; of all items or of those chosen."""
+    from hydroid.reporting.study_report import study_tables
+
     items = [item for item in runs.plan.study.items if item in chosen or not chosen]
-    names = [item.replace(" ", "_") for item in items if item in chosen]
+    names = tuple(item.replace(" ", "_") for item in items if item in chosen)
+    tables = {name: table for name, table in study_tables(runs).items() if names and name.startswith(names)}
+    figures = [name for figure in runs.plan.study.figures if (name := figure.item.replace(" ", "_")) in names]
     files = [
-        f
-        for name in names
-        for kind in ("tables/{}*.csv", "figures/{}*.png")
-        for f in folder.glob(kind.format(name))
+        f"{runs.plan.name}.html",
+        *(f"tables/{n}.csv" for n in tables),
+        *(f"figures/{n}.png" for n in figures),
     ]
-    where = [folder / f"{runs.plan.name}.html", *sorted(files)]
-    return [
-        f"{', '.join(items)}: {runs.plan.study.title}",
-        *_sentences(runs),
-        *(f"  {file}" for file in where),
-        "",
-    ]
+    heading = f"{', '.join(items)}: {runs.plan.study.title}"
+    where = [f"  {folder / file}" for file in files]
+    return [heading, *tables.values(), *_sentences(runs, chosen), *where, ""]
 
 
-def _sentences(runs: "StudyRuns") -> list[str]:
+def _sentences(runs: "StudyRuns", chosen: Sequence[str] = ()) -> list[str]:
+    """Return the verdicts in sentences, of all items or of those chosen; many of one reason in one."""
     from hydroid.studies.claims import Outcome
 
-    verdicts, few = (*runs.verdicts, *runs.findings), Counter[str]()
-    few.update(v.detail for v in runs.verdicts if v.outcome is Outcome.UNTESTED)
+    verdicts = [v for v in (*runs.verdicts, *runs.findings) if v.item in chosen or not chosen]
+    few = Counter(v.detail for v in verdicts if v.outcome is Outcome.UNTESTED)
     alike = {detail: count for detail, count in few.items() if count > 1}
     found = [f"- {v.sentence}" for v in verdicts if v.detail not in alike]
     found += [f"- {count} claims are not tested: {detail}" for detail, count in alike.items()]

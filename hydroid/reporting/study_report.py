@@ -39,10 +39,7 @@ def study_page(runs: StudyRuns) -> Page:
     """
     study, plan = runs.plan.study, runs.plan
     taken: set[str] = set()
-    tables = {
-        _name(table.title, taken): study_table(table, runs.rows, list(plan.cells), plan.units)
-        for table in study.tables
-    }
+    tables = study_tables(runs)
     plots: list[Plot] = []
     for figure in study.figures:
         name = _name(figure.title, taken)
@@ -65,6 +62,15 @@ def study_page(runs: StudyRuns) -> Page:
     )
     data = {f"{plan.name}_runs.csv": runs_csv(runs.rows)} if runs.rows else {}
     return Page(plan.name, study.title, lead, tuple(sections), tuple(warnings), data=data)
+
+
+def study_tables(runs: StudyRuns) -> dict[str, Table]:
+    """Return the tables of a study by name, such as table_6."""
+    plan, taken = runs.plan, set[str]()
+    return {
+        _name(table.title, taken): study_table(table, runs.rows, list(plan.cells), plan.units)
+        for table in plan.study.tables
+    }
 
 
 def _name(title: str, taken: set[str]) -> str:

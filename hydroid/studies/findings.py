@@ -87,9 +87,9 @@ def following(problem: Problem, rows: Sequence[Row], cells: Sequence[str]) -> Ju
             return Outcome.UNTESTED, f"no run of {cell}"
         found[cell] = float(np.median(errors))
     span = float(np.ptp(_record(problem)))
-    shares = ", ".join(f"{cell} {error:.3g} deg or {error / span:.1%}" for cell, error in found.items())
-    limit = f"at most {FOLLOWS:.0%} of the record's range of {span:.3g} deg"
-    return max(found.values()) <= FOLLOWS * span, f"median rms error: {shares}; to follow means {limit}"
+    errors = "; ".join(f"{cell} {error:.3g} deg" for cell, error in found.items())
+    limit = f"{FOLLOWS * span:.3g} deg, {100 * FOLLOWS:g} % of the record's range"
+    return max(found.values()) <= FOLLOWS * span, f"median rms error: {errors}; to follow allows {limit}"
 
 
 def turning_points(angle: Array) -> int:
@@ -100,7 +100,8 @@ def turning_points(angle: Array) -> int:
 
 def _segments(problem: Problem, _: StudyFigure) -> Judged:
     count, turns = len(problem.bounds), turning_points(_record(problem))
-    return count == turns, f"{count} segments; {turns} peaks and troughs of at least {PEAK:.0%} of the range"
+    size = f"{100 * PEAK:g} % of the range"
+    return count == turns, f"segments: {count}; peaks and troughs of at least {size}: {turns}"
 
 
 def _commands(problem: Problem, _: StudyFigure) -> Judged:

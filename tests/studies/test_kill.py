@@ -11,7 +11,7 @@ import pytest
 from small_studies import written
 
 
-def start(file: Path, out: Path) -> "subprocess.Popen[str]":
+def start(file: Path, out: Path, *options: str) -> "subprocess.Popen[str]":
     command = [
         sys.executable,
         "-m",
@@ -22,7 +22,7 @@ def start(file: Path, out: Path) -> "subprocess.Popen[str]":
         str(out),
         "--processes",
         "2",
-        "-q",
+        *options,
     ]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
@@ -44,8 +44,8 @@ def children(process: "subprocess.Popen[str]") -> list[int]:
 @pytest.mark.slow
 def test_a_killed_study_ends_the_same(tmp_path: Path):
     file = written(tmp_path, seeds=6)
-    whole = start(file, tmp_path / "whole")
-    killed = start(file, tmp_path / "killed")
+    whole = start(file, tmp_path / "whole", "-q")
+    killed = start(file, tmp_path / "killed", "-q")
     while not list((tmp_path / "killed").glob("runs/*.json")) and killed.poll() is None:
         time.sleep(0.01)
     workers = children(killed)
@@ -54,8 +54,12 @@ def test_a_killed_study_ends_the_same(tmp_path: Path):
     assert whole.wait(timeout=300) == 0, whole.communicate()
     left = len(list((tmp_path / "killed" / "runs").glob("*.json")))
     assert 0 < left < 12
+    before = {file: file.stat().st_mtime_ns for file in (tmp_path / "killed" / "runs").glob("*.json")}
     again = start(file, tmp_path / "killed")
-    assert again.wait(timeout=300) == 0, again.communicate()
+    _, said = again.communicate(timeout=300)
+    assert again.returncode == 0, said
+    assert f"{left} of 12 runs found, goes on" in said
+    assert all(file.stat().st_mtime_ns == then for file, then in before.items())  # nothing is done twice
     assert content(tmp_path / "killed") == content(tmp_path / "whole")
     assert workers
     for pid in workers:
@@ -65,7 +69,7 @@ def test_a_killed_study_ends_the_same(tmp_path: Path):
 @pytest.mark.slow
 def test_dask_and_processes_come_to_the_same(tmp_path: Path):
     file = written(tmp_path, seeds=1)
-    assert start(file, tmp_path / "here").wait(timeout=300) == 0
+    assert start(file, tmp_path / "here", "-q").wait(timeout=300) == 0
     command = [sys.executable, "-m", "hydroid", "study", str(file), "--out", str(tmp_path / "there"), "-q"]
     subprocess.run([*command, "--dask", "local:2"], check=True, timeout=300)
     assert content(tmp_path / "there") == content(tmp_path / "here")

@@ -1,4 +1,4 @@
-"""Terms that no other test recovers: each is estimated from a simulated log of one joint, mostly the shoulder."""
+"""Terms that no other test recovers: each is estimated from a simulated log of one joint."""
 
 from typing import NamedTuple
 

@@ -80,8 +80,14 @@ VARIANTS: dict[str, dict[str, object]] = {
     "tight": TIGHT,
     "former": NO_NOTCHES | NO_OVERLAP | FLAT | changed("fixed", 0, "F_swing"),
     "no-notches-tight": NO_NOTCHES | TIGHT,
-    "one-curve-tight": TIGHT | changed("within", 3, *NOTCHES) | ONE_CURVE,
     "alike": ALIKE,
+    "one-curve": ONE_CURVE,
+    "notches-everywhere": changed("each", True, *NOTCHES),
+    "overlaps-everywhere": changed("each", True, *sides("over")),
+    "slow-return": {
+        f"parameters.back_{side}": {"quantity": f"plunger_back_{side.lower()}", "each": True, "within": 4}
+        for side in SIDES
+    },
 }
 
 

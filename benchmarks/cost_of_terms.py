@@ -1,0 +1,80 @@
+"""What the hydraulics cost today, beside an older commit: the price of terms that are switched off.
+
+    python benchmarks/cost_of_terms.py COMMIT [ROUNDS]
+
+Both simulate the same candidates of the article's stage 2, in one thread each, in turn: shoulder alone, and
+all seven joints. Prints the ratio of their CPU seconds, today's over the commit's: median and quartiles over
+the rounds. The older tree is checked out beside this one and removed again.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+CASES = {"the shoulder's hydraulics": [2], "all seven joints'": list(range(1, 8))}
+WORKER = """
+import sys, time
+import numpy as np
+from hydroid import load_settings
+from hydroid.log import Log
+from hydroid.problem.problem import Problem
+
+settings = load_settings("article-hyd", {"simulation.other_joints": "passive", "simulation.threads": 1})
+problems = []
+for joints in eval(sys.argv[1]):
+    rng, pose = np.random.default_rng(0), settings.arm.pose("study")
+    command = np.zeros((1501, len(pose)))
+    command[:1500, [j - 1 for j in joints]] = np.repeat(rng.uniform(-60, 60, (30, len(joints))), 50, axis=0)
+    time_s, angle = np.arange(1501) * 0.01, np.tile(pose, (1501, 1))
+    problems.append(Problem(settings, [Log("duties", time_s, command, angle, 0.01)]))
+theta = problems[0].parameters.from_unit(np.random.default_rng(1).random((35, 7)))
+for line in sys.stdin:
+    began = time.process_time()
+    problems[int(line)].objectives(theta)
+    print(time.process_time() - began, flush=True)
+"""
+
+
+def worker(tree: Path) -> "subprocess.Popen[str]":
+    """Start a process that times one case per line of its input."""
+    command = [sys.executable, "-c", WORKER, str(list(CASES.values()))]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, cwd=tree, env={"PYTHONPATH": str(tree)}, stdin=pipe, stdout=pipe, text=True
+    )
+
+
+def ask(process: "subprocess.Popen[str]", case: int) -> float:
+    """CPU seconds of one case."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(f"{case}\n")
+    process.stdin.flush()
+    return float(process.stdout.readline())
+
+
+def main(commit: str, rounds: int) -> None:
+    """Print one line per case."""
+    with tempfile.TemporaryDirectory() as folder:
+        older = Path(folder) / "older"
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*git, "add", "--quiet", "--detach", str(older), commit], check=True)
+        try:
+            both = worker(ROOT), worker(older)
+            for number, name in enumerate(CASES):
+                _ = [ask(process, number) for process in both]  # compile and warm up
+                seconds = np.array([[ask(process, number) for process in both] for _ in range(rounds)])
+                low, median, high = np.quantile(seconds[:, 0] / seconds[:, 1], [0.25, 0.5, 0.75])
+                print(f"{name:28}{median:7.3f}  ({low:.3f} to {high:.3f})", flush=True)
+            for process in both:
+                process.communicate()
+        finally:
+            subprocess.run([*git, "remove", "--force", str(older)], check=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 21)

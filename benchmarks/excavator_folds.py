@@ -65,6 +65,13 @@ TIGHT = (
     | changed("within", 2, *sides("lag", "over"))
 )
 """the same of all that a valve and its pilot stage have; only the openings are as unknown as before"""
+LOOSE = (
+    changed("within", 4, *NOTCHES, *EXPONENTS)
+    | changed("sd", 12, *sides("dead"))
+    | changed("sd", 0.2, *sides("delay"))
+    | changed("within", 10, *sides("lag", "over", "open"))
+)
+"""hardly any expectation"""
 FLAT = (
     changed("nominal", 1.3, *EXPONENTS)
     | changed("within", 1.6, *EXPONENTS)
@@ -80,6 +87,7 @@ VARIANTS: dict[str, dict[str, object]] = {
     "tight": TIGHT,
     "former": NO_NOTCHES | NO_OVERLAP | FLAT | changed("fixed", 0, "F_swing"),
     "no-notches-tight": NO_NOTCHES | TIGHT,
+    "loose": LOOSE,
     "alike": ALIKE,
     "one-curve": ONE_CURVE,
     "notches-everywhere": changed("each", True, *NOTCHES),

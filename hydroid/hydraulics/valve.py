@@ -22,6 +22,7 @@ the other chamber fills from the tank through an anti-cavitation check valve.
 from typing import Any
 
 import numpy as np
+from numba.extending import overload
 
 from hydroid.hydraulics.elementwise import compilable, power, select
 
@@ -36,12 +37,8 @@ def spool(stroke_a: Any, stroke_b: Any) -> Any:
 
 
 @compilable
-def notched(share: Any, steepness: Any) -> Any:
-    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
-
-    `steepness` are the factors of the four parts below 4, 10, 25 and 50 %. Where all are 1, the result is the
-    power law's, to the bit.
-    """
+def bent(share: Any, steepness: Any) -> Any:
+    """What `notched` says, with every notch computed."""
     first, second, third, fourth = steepness
     low, middle, high, half = NOTCHES
     more = (first - 1.0) * np.minimum(share, low)
@@ -51,6 +48,23 @@ def notched(share: Any, steepness: Any) -> Any:
     whole = (first - 1.0) * low + (second - 1.0) * (middle - low)
     whole = whole + (third - 1.0) * (high - middle) + (fourth - 1.0) * (half - high)
     return (share + more) / (1.0 + whole)
+
+
+def notched(share: Any, steepness: Any) -> Any:
+    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
+
+    `steepness` are the factors of the four parts below 4, 10, 25 and 50 %. Where all are 1, the result is the
+    power law's, to the bit; a compiled loop then computes no notch.
+    """
+    return bent(share, steepness)
+
+
+@overload(notched)
+def _compiled_notched(share: Any, steepness: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(share: Any, steepness: Any) -> Any:
+        return share if steepness == (1.0, 1.0, 1.0, 1.0) else bent(share, steepness)
+
+    return scalar
 
 
 @compilable

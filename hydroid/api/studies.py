@@ -133,8 +133,8 @@ def _chosen(items: Sequence[str]) -> list[Path]:
     for item in items:
         if item not in known:
             raise SettingsError("cannot be made", where=item, hint="tables 1 to 9 and figures 9 to 20 can")
-    wanted = {name for item in items or known for name in known[item]}
-    return [path for path in _shipped() if path.stem in wanted]
+    wanted = dict.fromkeys(name for item in items or known for name in known[item])
+    return [path for name in wanted for path in _shipped() if path.stem == name]
 
 
 def _plan(path: Path, options: StudyOptions) -> "StudyPlan":

@@ -21,14 +21,14 @@ def article_page(studies: Sequence[StudyRuns], items: Iterable[str], seconds: fl
     rows = []
     for item in items:
         makers = [name for name, runs in by_study.items() if item in runs.plan.study.items]
-        pages = ", ".join(f"{name}/{name}.html" for name in makers)
-        rows.append((item, tally(v for v in every if v.item == item and not v.ours), pages))
-    overview = Table("Tables and figures", ("item", "verdicts", "page"), tuple(rows))
+        titles = "; ".join(by_study[name].plan.study.title for name in makers)
+        rows.append((item, tally(v for v in every if v.item == item and not v.ours), titles))
+    overview = Table("Tables and figures", ("item", "verdicts", "made in"), tuple(rows))
     sections = [Section("Every table and figure", tables={"items": overview})]
     for runs in studies:
         points = tuple(v.sentence for v in (*runs.verdicts, *runs.findings))
-        where = f"{', '.join(runs.plan.study.items)}: {runs.plan.name}/{runs.plan.name}.html"
-        sections.append(Section(runs.plan.study.title, text=where, points=points))
+        text, link = ", ".join(runs.plan.study.items).capitalize(), f"{runs.plan.name}/{runs.plan.name}.html"
+        sections.append(Section(runs.plan.study.title, text, points, link=link))
     quick = (QUICK,) if any(runs.plan.quick for runs in studies) else ()
     count = sum(len(runs.rows) for runs in studies)
     lead = (

@@ -86,7 +86,8 @@ class Step:
 class Section:
     """A heading with text, points to note, facts, tables by file name, bars and figures.
 
-    `more` are tables that are shown on demand. All of a `folded` section is.
+    `more` are tables that are shown on demand. All of a `folded` section is. `link` is a page that has more,
+    relative to this one.
     """
 
     title: str
@@ -100,6 +101,7 @@ class Section:
     steps: tuple[Step, ...] = ()
     more: Mapping[str, Table] = field(default_factory=dict[str, Table])
     folded: bool = False
+    link: str = ""
 
     @property
     def all_plots(self) -> Iterator[Plot]:

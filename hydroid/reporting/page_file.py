@@ -104,6 +104,7 @@ def page_content(
             "bars": [asdict(bar) for bar in one.bars],
             "steps": [asdict(step) for step in one.steps],
             "folded": one.folded,
+            "link": one.link,
         }
 
     return {

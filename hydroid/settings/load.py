@@ -131,7 +131,7 @@ def validate(
         at = next(
             (o for o in overridden or () if f"{place}.".startswith(f"{o}.") or o.startswith(f"{place}.")), ""
         )
-        where = f"--set {at}" if at else source + _line(loc, lines or {})
+        where = f"--set {at}" if at else source + _line(loc or tuple(place.split(".")), lines or {})
         for name in (at, place, key) if at.startswith(f"{place}.") else (at,):
             what = what.removeprefix(f"{name}: ")
         raise SettingsError(what, where=where, hint=hint) from None

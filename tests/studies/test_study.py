@@ -156,7 +156,7 @@ def test_a_search_has_converged_when_a_twentieth_of_the_descent_is_left():
         ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be at least 2"),
         (
             {"figures": [{"title": "f", "kind": "spread", "cells": ["other"]}]},
-            r"figures.0.cells: no cell 'other'; the cells: largest, mean",
+            r"small.yaml, line \d+: figures.0.cells: no cell 'other'; the cells: largest, mean",
         ),
         ({"axes": {"objective.norm": []}}, r"axes give 0 cells"),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),

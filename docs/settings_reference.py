@@ -102,7 +102,9 @@ def _type(annotation: Any) -> str:
     if origin is tuple:
         inner = _type(arguments[0])
         return (
-            f"list of {inner}s" if arguments[-1] is Ellipsis else f"list of {len(arguments)} {_plural(inner)}"
+            f"list of {_plural(inner)}"
+            if arguments[-1] is Ellipsis
+            else f"list of {len(arguments)} {_plural(inner)}"
         )
     if origin is dict:
         inner = _type(arguments[1])

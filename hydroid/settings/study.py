@@ -113,8 +113,8 @@ class StudyFigure(Settings):
     """convergence: scale every curve to 0 to 1"""
     parameters: tuple[str, ...] = ()
     """sensitivity and surface: parameters drawn"""
-    order: tuple[str, ...] = ()
-    """sensitivity: parameters as the article ranks their effect, the strongest first"""
+    orders: dict[str, tuple[tuple[str, ...], ...]] = Field(default_factory=dict[str, Any])
+    """sensitivity: statements in place of `says`, each with groups of parameters, the largest effect first"""
     window_s: tuple[NotNegative, Positive] | None = None
     """sensitivity: part of the record that is drawn [s]; null: all of it"""
     points: Annotated[int, Field(ge=3, le=101)] = 31
@@ -129,8 +129,9 @@ class StudyFigure(Settings):
 
     @model_validator(mode="after")
     def _judged(self) -> "StudyFigure":
-        if self.says and self.kind in ("convergence", "spread"):
-            raise ValueError(f"a figure of kind {self.kind} judges no statement; give it as a claim")
+        if self.says and self.kind in ("convergence", "spread", "sensitivity"):
+            other = "under orders" if self.kind == "sensitivity" else "as a claim"
+            raise ValueError(f"a figure of kind {self.kind} judges no statement; give it {other}")
         return self
 
 

@@ -1,7 +1,8 @@
 """Verdicts that need no test over seeds: on the statements that figures are judged by (docs/studies.md)."""
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -21,7 +22,7 @@ PEAK = 0.1
 FULL_COMMAND = 100.0
 """largest command [%]"""
 
-Judged = tuple[bool | Outcome, str]
+Judged = tuple[Outcome, str]
 """whether a statement holds, and what that rests on"""
 
 
@@ -37,36 +38,42 @@ def findings(
         points: of each parameter of a figure's surface.
     """
     for figure in study.figures:
+        for says, groups in figure.orders.items():
+            effects = _effects(problem, problem.parameters.vector(study.data.truth, "data.truth"))
+            outcome, detail = ranking(effects, groups)
+            yield Verdict(says, outcome, detail, figure.item)
         if not figure.says:
             continue
-        if figure.kind in ("sensitivity", "surface"):
+        if figure.kind == "surface":
             theta = problem.parameters.vector(study.data.truth, "data.truth")
-            if figure.kind == "surface":
-                judged = minima(landscape(problem, theta, figure.parameters, points(figure)))
-            else:
-                judged = ranking(problem, theta, figure.order)
+            judged = minima(landscape(problem, theta, figure.parameters, points(figure)))
         elif figure.kind in ("responses", "segment bests"):
             judged = following(problem, rows, figure.cells)
         else:
             judged = _JUDGES[figure.kind](problem, figure)
-        holds, detail = judged
-        outcome = holds if isinstance(holds, Outcome) else Outcome.CONFIRMED if holds else Outcome.OPEN
+        outcome, detail = judged
         yield Verdict(figure.says, outcome, detail, figure.item)
 
 
-def ranking(problem: Problem, theta: Array, order: Sequence[str]) -> Judged:
-    """Whether the effects of some parameters fall in a stated order, the strongest first."""
-    effects = dict(zip(problem.parameters.names, np.degrees(jacobian(problem, theta).effects), strict=True))
-    found = sorted(order, key=lambda name: -effects[name])
+def _effects(problem: Problem, theta: Array) -> dict[str, float]:
+    """Return by how much 1 % of each parameter changes the angle [deg rms]."""
+    effects = np.degrees(jacobian(problem, theta).effects).tolist()
+    return dict(zip(problem.parameters.names, effects, strict=True))
+
+
+def ranking(effects: Mapping[str, float], groups: Sequence[Sequence[str]]) -> Judged:
+    """Whether each effect of a group is larger than each of the next one."""
+    holds = all(min(effects[n] for n in a) > max(effects[n] for n in b) for a, b in pairwise(groups))
+    found = sorted((name for group in groups for name in group), key=lambda name: -effects[name])
     sizes = ", ".join(f"{name} {effects[name]:.2g}" for name in found)
-    holds = found == list(order) or Outcome.CONTRADICTED
-    return holds, f"rms change of the angle in deg for 1 % of each parameter: {sizes}"
+    outcome = Outcome.CONFIRMED if holds else Outcome.CONTRADICTED
+    return outcome, f"rms change of the angle in deg for 1 % of each parameter: {sizes}"
 
 
 def minima(found: Surface) -> Judged:
     """Whether a surface has several minima."""
     count, shape = local_minima(found.error), " by ".join(map(str, found.error.shape))
-    return count > 1, f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
+    return _found(count > 1), f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
 
 
 def local_minima(error: Array) -> int:
@@ -89,7 +96,9 @@ def following(problem: Problem, rows: Sequence[Row], cells: Sequence[str]) -> Ju
     span = float(np.ptp(_record(problem)))
     errors = "; ".join(f"{cell} {error:.3g} deg" for cell, error in found.items())
     limit = f"{FOLLOWS * span:.3g} deg, {100 * FOLLOWS:g} % of the record's range"
-    return max(found.values()) <= FOLLOWS * span, f"median rms error: {errors}; to follow allows {limit}"
+    return _found(
+        max(found.values()) <= FOLLOWS * span
+    ), f"median rms error: {errors}; to follow allows {limit}"
 
 
 def turning_points(angle: Array) -> int:
@@ -101,14 +110,14 @@ def turning_points(angle: Array) -> int:
 def _segments(problem: Problem, _: StudyFigure) -> Judged:
     count, turns = len(problem.bounds), turning_points(_record(problem))
     size = f"{100 * PEAK:g} % of the range"
-    return count == turns, f"segments: {count}; peaks and troughs of at least {size}: {turns}"
+    return _found(count == turns), f"segments: {count}; peaks and troughs of at least {size}: {turns}"
 
 
 def _commands(problem: Problem, _: StudyFigure) -> Judged:
     command = problem.logs[0].command[:, problem.outputs[0]]
     levels = 1 + int(np.count_nonzero(np.diff(command)))
     inside = bool(np.abs(command).max() <= FULL_COMMAND)
-    return inside, f"{levels} levels from {command.min():.0f} to {command.max():.0f} %"
+    return _found(inside), f"{levels} levels from {command.min():.0f} to {command.max():.0f} %"
 
 
 def _arm(problem: Problem, figure: StudyFigure) -> Judged:
@@ -116,13 +125,13 @@ def _arm(problem: Problem, figure: StudyFigure) -> Judged:
     have = {kind: kinds.count(kind) for kind in ("linear", "rotary")}
     count = " and ".join(f"{number} {kind}" for kind, number in have.items())
     same = all(have[kind] == number for kind, number in figure.actuators.items())
-    return same, f"{len(problem.settings.arm.joints)} joints; {count} actuators"
+    return _found(same), f"{len(problem.settings.arm.joints)} joints; {count} actuators"
 
 
 def _flow_chart(problem: Problem, _: StudyFigure) -> Judged:
     elite = problem.settings.search.ga.elitism
     added = f"; one thing added: the best {elite} of each generation survive" if elite else ""
-    return True, f"each step has its test in tests/search{added}"
+    return Outcome.CONFIRMED, f"each step has its test in tests/search{added}"
 
 
 _JUDGES: dict[str, Callable[[Problem, StudyFigure], Judged]] = {
@@ -132,6 +141,10 @@ _JUDGES: dict[str, Callable[[Problem, StudyFigure], Judged]] = {
     "flow chart": _flow_chart,
 }
 """figures whose statement is judged by the problem alone"""
+
+
+def _found(holds: bool) -> Outcome:
+    return Outcome.CONFIRMED if holds else Outcome.OPEN
 
 
 def _record(problem: Problem) -> Array:

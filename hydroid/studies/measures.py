@@ -101,10 +101,10 @@ def measures(study: StudySettings, masses: Sequence[str], parameters: Sequence[s
 
 
 def check_measures(study: StudySettings, known: Mapping[str, str], where: str) -> None:
-    """Refuse a measure that the study does not have.
+    """Refuse a measure or a parameter that the study does not have.
 
     Raises:
-        SettingsError: with the measures that it has.
+        SettingsError: with those that it has.
     """
     named = [(f"tables.{i}.columns", c) for i, t in enumerate(study.tables) for c in t.columns]
     named += [(f"claims.{i}.column", c.column) for i, c in enumerate(study.claims) if not c.untested]
@@ -112,6 +112,13 @@ def check_measures(study: StudySettings, known: Mapping[str, str], where: str) -
     for key, name in named:
         if name not in known:
             raise SettingsError(f"{key}: no measure {name!r}", where=where, hint=f"known: {', '.join(known)}")
+    parameters = [name.removeprefix("value ") for name in known if name.startswith("value ")]
+    for i, figure in enumerate(study.figures):
+        grouped = (n for groups in figure.orders.values() for group in groups for n in group)
+        for name in (*figure.parameters, *grouped):
+            if name not in parameters:
+                hint = f"known: {', '.join(parameters)}"
+                raise SettingsError(f"figures.{i}: no parameter {name!r}", where=where, hint=hint)
 
 
 def measured(task: Task, result: Result, directions: Directions | None) -> Row:

@@ -35,8 +35,8 @@ def test_each_kind_of_figure_judges_its_statement(tmp_path: Path):
         {"title": "c", "kind": "commands", "says": "inside"},
         {"title": "s", "kind": "segments", "says": "as many"},
         {"title": "r", "kind": "responses", "says": "follows", "cells": ["mean"]},
-        {"title": "order", "kind": "sensitivity", "says": "D before M1", "order": ["D", "M1"]},
-        {"title": "reverse", "kind": "sensitivity", "says": "M1 before D", "order": ["M1", "D"]},
+        {"title": "order", "kind": "sensitivity", "orders": {"D before M1": [["D", "S"], ["M1"]]}},
+        {"title": "reverse", "kind": "sensitivity", "orders": {"M1 before D": [["M1"], ["D"]]}},
         {"title": "drawn only", "kind": "commands"},
     ]
     found = run(written(tmp_path, figures=figures, seeds=1), tmp_path)

@@ -166,6 +166,10 @@ def test_a_search_has_converged_when_a_twentieth_of_the_descent_is_left():
         ({"data": {"truth": {"K": 1.0}, "simulated": {}}}, r"data.truth: parameter 'D' is missing"),
         ({"data": {"truth": TRUTH, "simulated": {"pose": "sleeping"}}}, r"sleeping"),
         ({"tables": [{"title": "t", "columns": ["beauty"]}]}, r"no measure 'beauty'; known: objective"),
+        (
+            {"figures": [{"title": "f", "kind": "sensitivity", "orders": {"s": [["K"], ["L"]]}}]},
+            r"figures.0: no parameter 'L'; known: K, D, S, M1",
+        ),
         ({"figures": [{"title": "f", "kind": "pie"}]}, r"figures.0.kind: must be 'convergence'"),
         (
             {"tables": [{"title": "t", "columns": ["seconds"], "article": {"mean": [1, 2]}}]},

@@ -13,7 +13,7 @@ import json
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from PIL import Image
 from hydroid.api.studies import article_items
 from hydroid.reporting.article_report import tally
 from hydroid.reporting.study_report import QUICK, conclusions, study_table
-from hydroid.reporting.table import Table
+from hydroid.reporting.table import Cell, Table
 from hydroid.settings.study import StudySettings, cell_settings
 from hydroid.studies.claims import Outcome, Verdict, verdicts
 from hydroid.studies.measures import Row, measures
@@ -36,8 +36,8 @@ HEAD = """# The article, put to the test
 and Taylor, 2017: [the two stages](two_stages.md) cites it): ten runs with different random numbers where the
 article shows one. No machine was measured: the data of tables 1 to 7 are simulated at the article's true
 parameters with our geometry, and those of tables 8 and 9 are a virtual rig's. So the numbers cannot be the
-article's; its conclusions can be tested. `python docs/reproduction.py` writes this page from the results in
-`docs/reproduction/`.
+article's; its conclusions can be tested. What the article leaves open, and what was chosen, stands at the
+end. `python docs/reproduction.py` writes this page from the results in `docs/reproduction/`.
 """
 MEANING = """
 *Confirmed* and *contradicted*: the difference is significant, in the stated direction or against it
@@ -48,6 +48,8 @@ statements on figures are judged.
 """
 COLORS = 64
 """of a picture: a third of its bytes, and nobody sees the difference"""
+SHORT = 20
+"""letters of a name that a narrow column can hold on one line"""
 CHOICES = """
 ## What the article leaves open, and what was chosen
 
@@ -154,16 +156,22 @@ def overview(made: Sequence[Evaluated]) -> str:
         )
         found = tally(v for v in (*theirs, *judged) if v.item == item)
         lines.append(f"| {whole(item)} | {found} | {where} |\n")
-    shown = {"What the article concludes": theirs, "What its figures show": judged, "Claims of ours": ours}
-    return "".join([*lines, *(f"\n{claims(title, found)}" for title, found in shown.items())])
+    figures = tuple((whole(v.item), v.says, whole(v.outcome.value), v.detail) for v in judged)
+    header = ("item", "statement", "verdict", "what that rests on")
+    tables = [
+        claims("What the article concludes", theirs),
+        Table("What its figures show", header, figures),
+        claims("Claims of ours", ours),
+    ]
+    return "".join([*lines, *(f"\n{table.markdown()}" for table in tables)])
 
 
-def claims(title: str, found: Iterable[Verdict]) -> str:
-    """Return verdicts as a table."""
+def claims(title: str, found: Iterable[Verdict]) -> Table:
+    """Return verdicts with their tests as a table."""
     rows = tuple(
         (whole(v.item), v.says, whole(v.outcome.value), number(v.p), number(v.effect, "+")) for v in found
     )
-    return Table(title, ("item", "claim", "verdict", "p", "effect"), rows).markdown()
+    return Table(title, ("item", "claim", "verdict", "p", "effect"), rows)
 
 
 def anchor(title: str) -> str:
@@ -191,8 +199,8 @@ def provenance(made: Sequence[Evaluated], about: dict[str, Any]) -> str:
         f"\n- {about['runs']} runs over {seeds} seeds; studies share the runs that they have in common.",
         f"\n- Machine: {about['machine']}; {versions}.",
         f"\n- Code of hydroid, as each run recorded it: {code}.",
-        f"\n- Time: {about['seconds'] / 60:,.0f} minutes of one core together, by a clock that also counts",
-        "\n  pauses and other work of the machine; two cores take half of it.\n",
+        f"\n- Time: {about['seconds'] / 60:,.0f} minutes of one core, each run counted with the median time",
+        "\n  of its cell; two cores take half of it. The clock also counts what else the machine did.\n",
     ]
     note = RESULTS / "note.md"
     return "".join(lines) + (f"\n{note.read_text(encoding='utf-8').strip()}\n" if note.is_file() else "")
@@ -201,10 +209,10 @@ def provenance(made: Sequence[Evaluated], about: dict[str, Any]) -> str:
 def section(each: Evaluated, about: dict[str, Any]) -> str:
     """Return the part of one study."""
     study, rows = each.study, each.rows
-    items = ", ".join(study.items)
+    items, settings = ", ".join(study.items).capitalize(), f"../configs/article/{each.name}.yaml"
     lines = [
         f"\n## {study.title}\n",
-        f"\n{items[:1].upper()}{items[1:]} (`configs/article/{each.name}.yaml`). {study.about.strip()}\n",
+        f"\n{items} ([settings]({settings})). {study.about.strip()}\n",
         "".join(f"\n- {name}: {text}" for name, text in about["facts"][each.name].items() if name != "cells"),
     ]
     if rows:
@@ -231,7 +239,13 @@ def tables(each: Evaluated) -> list[Table]:
     parameters = next(iter(cells.values())).parameters
     units = measures(each.study, ["any"], list(parameters))
     units |= {f"value {name}": p.unit for name, p in parameters.items()}
-    return [study_table(table, each.rows, list(cells), units) for table in each.study.tables]
+    made = [study_table(table, each.rows, list(cells), units) for table in each.study.tables]
+    return [replace(table, rows=tuple((short(row[0]), *row[1:]) for row in table.rows)) for table in made]
+
+
+def short(cell: Cell) -> Cell:
+    """Return the name of a cell; a short one stays on one line."""
+    return whole(cell) if isinstance(cell, str) and len(cell) < SHORT else cell
 
 
 def read_rows(file: Path) -> list[Row]:

@@ -12,7 +12,7 @@ from hydroid.reporting.table import Cell, Table
 from hydroid.settings.study import StudyTable
 from hydroid.studies.claims import Verdict
 from hydroid.studies.measures import Row
-from hydroid.studies.study import StudyRuns
+from hydroid.studies.study import StudyPlan, StudyRuns
 from hydroid.uncertainty.flags import WEAK_ABOVE
 
 SPREAD = "Ours: median of the seeds [lowest, highest]."
@@ -131,15 +131,21 @@ def facts(runs: StudyRuns) -> tuple[tuple[str, str], ...]:
             ("seeds", f"1 to {plan.seeds}"),
             ("simulations", f"{total:,.0f} in {seconds:,.0f} s of one core"),
         ]
-    found.append(
-        ("data", ", ".join(f"{Path(log.source).name}, {log.duration:.4g} s" for log in plan.data.logs))
-    )
+    found.append(("data", _data(plan)))
     if runs.directions is not None:
         known = runs.directions
         at = f"{plan.study.data.determined_at_deg:g} deg of white noise"
         limit = f"to {100 * WEAK_ABOVE:g} % or better at {at}"
         found.append(("identifiable directions", f"{known.rank} of {len(known.names)} ({limit})"))
     return tuple(found)
+
+
+def _data(plan: StudyPlan) -> str:
+    simulated, logs = plan.study.data.simulated, plan.data.logs
+    if simulated is None:
+        return ", ".join(f"{Path(log.source).name}, {log.duration:.4g} s" for log in logs)
+    noise = f"{simulated.noise_deg:g} deg of noise" if simulated.noise_deg else "no noise"
+    return f"simulated at the truth under random commands, {logs[0].duration:.3g} s, {noise}"
 
 
 def failures(rows: Sequence[Row]) -> Table:

@@ -12,7 +12,7 @@ from hydroid.problem.problem import Problem
 from hydroid.reporting import style
 from hydroid.reporting.flow_chart import flow_chart
 from hydroid.reporting.truth_figures import COLORS, arm_in_space, landscape_figure, record, sensitivity
-from hydroid.settings.study import StudyFigure
+from hydroid.settings.study_shown import StudyFigure
 from hydroid.studies.study import StudyRuns
 
 LINES = ("-", "--", "-.", ":")

@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.reporting.page import Page, Plot, Section, file_name
 from hydroid.reporting.study_figures import draw
 from hydroid.reporting.table import Cell, Table
-from hydroid.settings.study import StudyTable
+from hydroid.settings.study_shown import StudyTable
 from hydroid.studies.claims import Verdict
 from hydroid.studies.measures import Row
 from hydroid.studies.study import StudyPlan, StudyRuns

@@ -12,7 +12,7 @@ from hydroid.arm.build import VISUAL_GROUP
 from hydroid.arm.model import load_model
 from hydroid.parameters import Array
 from hydroid.reporting import style
-from hydroid.settings.study import StudyFigure
+from hydroid.settings.study_shown import StudyFigure
 from hydroid.studies.findings import landscape
 from hydroid.studies.study import StudyRuns
 from hydroid.uncertainty.sweep import SWEEP_POINTS

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import rankdata, wilcoxon
 
 from hydroid.parameters import Array
-from hydroid.settings.study import Claim
+from hydroid.settings.study_shown import Claim
 from hydroid.studies.measures import Row
 
 SIGNIFICANT = 0.05

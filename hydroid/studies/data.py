@@ -11,7 +11,8 @@ from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.study import SimulatedData, StudySettings, cell_settings
+from hydroid.settings.study import StudySettings, cell_settings
+from hydroid.settings.study_data import SimulatedData
 
 Read = Callable[[Sequence[Path], FitSettings], list[Log]]
 """reads CSV files as settings map them"""

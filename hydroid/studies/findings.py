@@ -9,7 +9,8 @@ from scipy.signal import find_peaks
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.settings.study import StudyFigure, StudySettings
+from hydroid.settings.study import StudySettings
+from hydroid.settings.study_shown import StudyFigure
 from hydroid.studies.claims import Outcome, Verdict
 from hydroid.studies.measures import Row
 from hydroid.uncertainty.jacobian import jacobian

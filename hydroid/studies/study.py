@@ -10,7 +10,8 @@ import numpy as np
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.study import StudyFigure, StudySettings, cell_settings, load_study
+from hydroid.settings.study import StudySettings, cell_settings, load_study
+from hydroid.settings.study_shown import StudyFigure
 from hydroid.studies.claims import Verdict, verdicts
 from hydroid.studies.data import Read, StudyData, make_data
 from hydroid.studies.execution import run_all

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import wilcoxon
 
-from hydroid.settings.study import Claim
+from hydroid.settings.study_shown import Claim
 from hydroid.studies.claims import Outcome, holm, signed_rank, verdicts
 from hydroid.studies.measures import Row
 

@@ -20,10 +20,10 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
 from hydroid.uncertainty.covariance import COVERAGE, NULL_COMPONENT, RANK_TOLERANCE, Uncertainty
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE
-from hydroid.uncertainty.jacobian import slopes_of
+from hydroid.uncertainty.axes import changed, covariance_axes, room
 
-STEP = 1e-3
-"""relative step of the differences: it averages the small jumps that events between two samples make"""
+STEP = 0.1
+"""step of the differences in standard deviations: wide enough for the small jumps that events make"""
 GIVEN_BELOW = 1e-3
 """relative change per relative change of any free parameter, below which the settings give a quantity"""
 _NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
@@ -88,13 +88,28 @@ class Precision:
             concerned: parameters on which any of them can depend, shape (P,); None: all.
         """
         free = self.parameters.free
-        varied = free if concerned is None else free & concerned
+        varied = np.flatnonzero(free if concerned is None else free & concerned)
         value = function(self.theta[None])[0]
         slopes = np.zeros((int(free.sum()), len(value)))
-        if varied.any():
-            found = slopes_of(function, self.parameters, self.theta, value, (STEP * self.scale, varied))
-            slopes[varied[free]] = (found * self.scale[:, None])[varied]
+        if len(varied):
+            inside = np.isin(np.flatnonzero(free), varied)
+            within = room(self.parameters, self.theta, self.scale)[:, inside]
+            axes = covariance_axes(self._root_of(inside), within, STEP)
+
+            def moved(relative: Array) -> Array:
+                changes = np.zeros((len(relative), len(self.theta)))
+                changes[:, varied] = relative * self.scale[varied]
+                return function(changed(self.parameters, self.theta, changes))
+
+            slopes[inside] = axes.by_parameter(axes.slopes(moved, value))
         return self.known(value, slopes, positive)
+
+    def _root_of(self, inside: NDArray[np.bool_]) -> Array:
+        """Return G, shape (p, k), of the covariance of some of the free parameters, shape (p,)."""
+        left, values, _ = np.linalg.svd(self.root[:, ~inside], full_matrices=False)
+        left = left[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
+        own = self.root[:, inside]
+        return own - left @ (left.T @ own)  # what the others cannot do as well
 
     def parts(self, slopes: Array) -> Array:
         """What each independent, known direction does, shape (k, m), from derivatives, shape (p, m).

@@ -81,8 +81,8 @@ def status_phrase(status: ParameterStatus) -> str:
         parts.append(status.flag.value)
     if status.source is Source.BOTH or status.source is Source.PRIOR:
         parts.append(status.source.value)
-    if status.derivative_doubt is not None:
-        parts.append(f"derivative only to {100 * status.derivative_doubt:.0f} %")
+    if status.doubt is not None:
+        parts.append(f"interval only to {100 * status.doubt:.0f} %")
     if status.at_bound is not None:
         parts.append(f"at {status.at_bound} bound")
     return ", ".join(parts)

@@ -23,7 +23,7 @@ from hydroid.progress import Progress, no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE
-from hydroid.uncertainty.jacobian import STEP, relative_scale
+from hydroid.uncertainty.jacobian import FINE_STEP, relative_scale
 from hydroid.uncertainty.noise import Noise
 
 WEIGHED_SD = 0.02
@@ -270,9 +270,9 @@ def _constant(log: Log, joint: int, levels: Array, settings: FitSettings) -> Exp
 def _information(problem: Problem, uncertainty: Uncertainty, chosen: Callable[..., bool]) -> Array:
     """Information of some channels of a problem at the estimate, (p, p), in plain least squares."""
     theta, free = uncertainty.theta, uncertainty.free
-    moved = theta + STEP * np.diag(relative_scale(problem.parameters, theta))[free]
+    moved = theta + FINE_STEP * np.diag(relative_scale(problem.parameters, theta))[free]
     rows = problem.residuals(np.vstack([theta, moved]))
-    slopes = np.nan_to_num((rows[1:] - rows[0]) / STEP)
+    slopes = np.nan_to_num((rows[1:] - rows[0]) / FINE_STEP)
     worst = max(uncertainty.noise, key=lambda noise: noise.level)
     total = np.zeros((int(free.sum()), int(free.sum())))
     for channel in problem.channels:

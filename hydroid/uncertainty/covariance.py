@@ -46,10 +46,8 @@ RANK_TOLERANCE = 1e-12
 """singular values below this part of the largest are zero"""
 NULL_COMPONENT = 0.01
 """component in an unmeasured direction below which a parameter does not depend on it"""
-DOUBT_ABOVE = 0.1
-"""relative difference between two steps' derivatives above which it is reported"""
-CLEAR = 3.0
-"""effects of so many times all errors together are known to be there"""
+DOUBT_ABOVE = 0.25
+"""relative change of a standard deviation in the last round, above which it is reported"""
 TINY = float(np.finfo(float).tiny)
 MAX_LOG_SPREAD = 5.0
 """beyond it nothing is known of a variance, and no interval is of use"""
@@ -169,45 +167,13 @@ def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, N
 def decompose(free: NDArray[np.bool_], derivatives: Jacobian) -> tuple[Array, Array, Array]:
     """Return V, D, U of J = V D U: directions (p, p), singular values (p,), effects (p, R + M).
 
-    The effects are unit rows of residuals with the M priors behind them. Along a direction whose effect on
-    the residuals is no larger than its error, the difference between two steps' derivatives, only the priors
-    count: they are exact.
+    The effects are unit rows of residuals with the M priors behind them.
     """
-    slopes, error = np.nan_to_num(derivatives.slopes[free]), np.nan_to_num(derivatives.error[free])
-    directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
-    values[values <= RANK_TOLERANCE * values[0]] = 0.0
-    lost = _lost(directions.T @ error, values, effects)
-    if len(lost):  # the effects along other directions stay as they are
-        rows = directions * values
-        directions, values, mixed = np.linalg.svd(rows - (rows @ lost.T) @ lost, full_matrices=False)
-        values[values <= RANK_TOLERANCE * values[0]] = 0.0
-        effects = mixed @ effects
     priors = derivatives.prior_weight * derivatives.prior_slopes[free]
-    if priors.any():
-        rows = np.hstack([directions * values, priors])
-        directions, values, mixed = np.linalg.svd(rows, full_matrices=False)
-        values[values <= RANK_TOLERANCE * values[0]] = 0.0
-        size = len(effects)
-        return directions, values, np.hstack([mixed[:, :size] @ effects, mixed[:, size:]])
-    return directions, values, np.hstack([effects, np.zeros((len(effects), priors.shape[1]))])
-
-
-def _lost(error: Array, values: Array, effects: Array) -> Array:
-    """Return orthonormal effects that are no larger than their error, (m, p), in coordinates of `effects`.
-
-    Args:
-        error: of the effect of each of p directions, shape (p, R).
-        values, effects: lengths of the effects, shape (p,), and unit vectors, shape (p, R).
-    """
-    felt = values > 0
-    # a little of a strong direction, added to a weak one, takes away what looks like its effect
-    strong = effects[values > CLEAR * np.linalg.norm(error)]
-    error = error - (error @ strong.T) @ strong
-    # errors in units of the effects: the largest belong to the combinations that are known least
-    axes, ratio, _ = np.linalg.svd(error[felt] / values[felt, None], full_matrices=False)
-    lost = np.zeros((int(np.sum(ratio >= 1)), len(values)))
-    lost[:, felt] = axes[:, ratio >= 1].T
-    return lost
+    rows = np.hstack([np.nan_to_num(derivatives.slopes[free]), priors])
+    directions, values, effects = np.linalg.svd(rows, full_matrices=False)
+    values[values <= RANK_TOLERANCE * values[0]] = 0.0
+    return directions, values, effects
 
 
 def quantile(spread: float) -> float:

@@ -39,8 +39,8 @@ class ParameterStatus:
 
     flag: Flag
     at_bound: Side | None = None
-    derivative_doubt: float | None = None
-    """relative difference between the derivatives of two step sizes, where it is large"""
+    doubt: float | None = None
+    """relative change of the standard deviation in the last round of derivatives, where it is large"""
     diverges: bool = False
     """whether its effect is unknown because simulations diverge where it is changed"""
     share: float = 1.0

@@ -1,4 +1,4 @@
-"""Derivatives of the residuals at one parameter vector, by finite differences whose step is checked."""
+"""Derivatives of the residuals at one parameter vector, by finite differences as wide as the uncertainty."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,21 +7,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.parameters import Array, ParameterSet
+from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem
+from hydroid.uncertainty.axes import Axes, changed, covariance_axes, deviations, room, single_axes
 from hydroid.uncertainty.noise import prior_weight
 from hydroid.uncertainty.open_start import with_open_start
 
-STEP = 1e-4
-"""relative step of the differences: truncation and the simulation's rounding then leave about 1e-7"""
-WIDER_STEPS = (1e-3, 1e-2, 3e-2)
-"""steps that check the one before, as far as needed; the response is not smooth where oil cavitates: such
-jumps, of about 1e-5 rad, change a wide step's derivative less"""
-STEPS_DISAGREE_ABOVE = 0.02
-"""relative difference of two steps' derivatives above which a wider one is tried"""
+STEP = 1e-3
+"""relative step of the first differences, by each parameter"""
+SHORTER = 0.1
+"""second step along each axis, as a part of the first"""
+CURVED = 0.3
+"""part of the first step's effect; where the second's is smaller, the first one's is mostly curvature"""
+ROUNDS = 2
+"""times at most that the axes of the covariance are found and followed"""
+AGREE = 0.1
+"""relative change of every standard deviation, below which another round would change nothing"""
+UNKNOWN = 1.0
+"""relative standard deviation above which it does not matter how large it is"""
+UNFELT = 1e3
+"""relative standard deviation of a direction that the residuals do not depend on: the rest is rounding"""
 MIN_SCALE = 0.01
 """part of the bounds' width: a smaller value is changed by parts of this instead of its own"""
 NO_EFFECT_BELOW = 1e-6
 """a parameter whose effect is below this part of the strongest one's has none"""
+FINE_STEP = 1e-4
+"""relative step of what is smooth: the priors, and a design's responses"""
+
+Residuals = Callable[[Array], Array]
+"""relative changes of the free parameters, (n, p) -> (n, R)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +48,7 @@ class Jacobian:
             both sides.
         prior_slopes: derivatives of the M priors' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
-        error: difference between two steps' derivatives, shape (P, R).
+        doubt: relative change of each standard deviation in the last round, shape (P,).
         prior_weight: weight of a score of 1 beside the residuals [rad] (`noise.prior_weight`).
     """
 
@@ -42,7 +56,7 @@ class Jacobian:
     slopes: Array
     prior_slopes: Array
     scale: Array
-    error: Array
+    doubt: Array
     prior_weight: float
 
     @property
@@ -55,48 +69,51 @@ class Jacobian:
         """Parameters that the outputs do not depend on, shape (P,)."""
         return self.effects <= NO_EFFECT_BELOW * np.nanmax(self.effects, initial=0.0)
 
-    @property
-    def doubt(self) -> Array:
-        """Relative difference between two steps' derivatives, shape (P,); 0 where there is no effect."""
-        length, error = np.linalg.norm(self.slopes, axis=1), np.linalg.norm(self.error, axis=1)
-        return np.where(self.without_effect, 0.0, error / np.maximum(length, np.finfo(float).tiny))
-
 
 def jacobian(problem: Problem, theta: Array) -> Jacobian:
-    """Return the derivatives at theta, shape (P,), from 1 + 4 p simulations, p parameters being free.
+    """Return the derivatives at theta, shape (P,), from 1 + 2 p simulations and 4 p a round, p parameters free.
 
-    Differences are central, or one-sided and of second order at a bound. Each is taken with two steps. Where
-    these disagree, wider ones follow, two simulations each, until two in a row agree; then the wider one of
-    those that agree best counts, and `doubt` is their difference.
+    The first differences are by each parameter. Then come rounds of differences along the axes of the
+    covariance that follows: a standard deviation and a tenth of it to each side. The long step counts, which
+    events disturb less, unless its effect is mostly curvature. A further round follows where a standard
+    deviation changed.
     """
     problem = with_open_start(problem, theta)
-    scale, left = relative_scale(problem.parameters, theta), problem.parameters.free
-    residual = problem.residuals(theta[None])[0]
+    parameters, free = problem.parameters, problem.parameters.free
+    scale, residual = relative_scale(parameters, theta), problem.residuals(theta[None])[0]
+    within = room(parameters, theta, scale)
 
-    def derivatives(step: float) -> Array:
-        found = slopes_of(problem.residuals, problem.parameters, theta, residual, (step * scale, left))
-        return found * scale[:, None]
+    def moved(relative: Array) -> Array:
+        changes = np.zeros((len(relative), len(theta)))
+        changes[:, free] = relative * scale[free]
+        return problem.residuals(changed(parameters, theta, changes))
 
-    slopes = derivatives(STEP)
-    effect = np.linalg.norm(slopes, axis=1)
-    felt = ~(effect <= NO_EFFECT_BELOW * np.nanmax(effect, initial=0.0))
-    errors, finer, least = np.full_like(slopes, np.nan), slopes.copy(), np.full(len(theta), np.inf)
-    for step in WIDER_STEPS:
-        wider = derivatives(step)
-        error, length = finer - wider, np.linalg.norm(wider, axis=1)
-        disagreement = np.linalg.norm(error, axis=1) / np.maximum(length, np.finfo(float).tiny)
-        agree, closer = disagreement <= STEPS_DISAGREE_ABOVE, disagreement < least
-        taken = closer & ~(agree & (step == WIDER_STEPS[0]))
-        slopes[taken] = wider[taken]
-        errors[closer], least[closer] = error[closer], disagreement[closer]
-        left, finer = left & ~agree & felt & np.isfinite(length), wider
-        if not left.any():
-            break
-    change = np.diag(STEP * scale)
-    scores = problem.priors.scores(np.vstack([theta + change, theta - change]))
-    prior_slopes = (scores[: len(theta)] - scores[len(theta) :]) / (2 * STEP)
+    prior_slopes = score_slopes(problem.priors, theta, scale)
     weight = prior_weight(problem.channels, residual, problem.settings.objective)
-    return Jacobian(residual, slopes, prior_slopes, scale, errors, weight)
+    slopes = single_axes(STEP, within).slopes(moved, residual)
+    diverges = np.logical_not(np.isfinite(slopes).all(axis=1))
+    slopes[diverges] = 0.0
+    root, doubt = _root(slopes, prior_slopes[free], weight), np.zeros(len(slopes))
+    for _ in range(ROUNDS):
+        before, axes = deviations(root), covariance_axes(root, within, step=1.0)
+        slopes = _felt(axes.by_parameter(_along(axes, moved, residual, axes.directions @ slopes)), weight)
+        root = _root(slopes, prior_slopes[free], weight)
+        after = deviations(root)
+        known = np.minimum(before, after) < UNKNOWN
+        doubt[known] = np.abs(after[known] / before[known] - 1)
+        if (doubt <= AGREE).all():
+            break
+    found, doubts = np.full((len(theta), residual.size), np.nan), np.zeros(len(theta))
+    found[free], doubts[free] = slopes, doubt
+    found[np.flatnonzero(free)[diverges]] = np.nan
+    return Jacobian(residual, found, prior_slopes, scale, doubts, weight)
+
+
+def score_slopes(priors: Priors, theta: Array, scale: Array) -> Array:
+    """Derivatives of the M priors' scores at theta, shape (P, M), per relative change of each parameter."""
+    change = np.diag(FINE_STEP * scale)
+    scores = priors.scores(np.vstack([theta + change, theta - change]))
+    return (scores[: len(theta)] - scores[len(theta) :]) / (2 * FINE_STEP)
 
 
 def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
@@ -108,29 +125,23 @@ def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
     return np.maximum(np.abs(theta), least)
 
 
-def slopes_of(
-    function: Callable[[Array], Array],
-    parameters: ParameterSet,
-    theta: Array,
-    value: Array,
-    steps: tuple[Array, NDArray[np.bool_]],
-) -> Array:
-    """Derivatives of a function, (n, P) -> (n, R), at theta, (P,), shape (P, R).
+def _along(axes: Axes, moved: Residuals, residual: Array, former: Array) -> Array:
+    """Derivatives along axes, (p, R); `former`, (p, R), where simulations diverge on both sides."""
+    found = [one.slopes(moved, residual) for one in (axes, axes.shortened(SHORTER))]
+    long, short = (np.where(np.isfinite(one).all(axis=1)[:, None], one, former) for one in found)
+    curved = np.linalg.norm(short, axis=1) < CURVED * np.linalg.norm(long, axis=1)
+    return np.where(curved[:, None], short, long)
 
-    `steps` are a step by each parameter, (P,), and which parameters are changed, (P,): those of the others
-    are NaN. A derivative is that of the parabola through `value`, the function there, and two other points.
-    The two lie on both sides, a step away, or both on one side where a bound is near.
-    """
-    step, which = steps
-    above = theta + step > np.maximum(parameters.upper, theta)
-    below = theta - step < np.minimum(parameters.lower, theta)
-    first = np.where(above, -step, step)
-    second = np.where(above, -2 * step, np.where(below, 2 * step, -step))
-    rows = function(theta + np.vstack([np.diag(first)[which], np.diag(second)[which]]))
-    first, second = first[which, None], second[which, None]
-    near, far = (rows[: len(first)] - value) / first, (rows[len(first) :] - value) / second
-    both = (near * second - far * first) / (second - first)
-    one_side = np.where(np.isfinite(near), near, far)  # where the other one diverges
-    slopes = np.full((len(theta), value.size), np.nan)
-    slopes[which] = np.where(np.isfinite(both), both, one_side)
-    return slopes
+
+def _felt(slopes: Array, weight: float) -> Array:
+    """Return derivatives, (p, R), that are exactly 0 along directions without effect."""
+    directions, values, effects = np.linalg.svd(slopes, full_matrices=False)
+    felt = values * UNFELT > weight
+    return (directions[:, felt] * values[felt]) @ effects[felt]
+
+
+def _root(slopes: Array, prior_slopes: Array, weight: float) -> Array:
+    """Return G of C^-1 = G' G, shape (p, p), for white noise of a level that the prior's weight implies."""
+    rows = np.hstack([slopes / weight, prior_slopes])
+    directions, values, _ = np.linalg.svd(rows, full_matrices=False)
+    return values[:, None] * directions.T

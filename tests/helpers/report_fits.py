@@ -160,7 +160,7 @@ def make_uncertainty(
         slopes,
         np.zeros((len(theta), 0)),
         relative_scale(problem.parameters, theta),
-        np.zeros_like(slopes),
+        np.zeros(len(theta)),
         prior_weight=1.0,
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)

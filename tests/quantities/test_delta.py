@@ -41,8 +41,8 @@ def test_a_ratio_has_a_multiplicative_interval_that_its_inverse_shares():
 
     found = known().propagate(ratios, positive=True)
     sd = np.sqrt(COVARIANCE[0, 0] + COVARIANCE[1, 1] - 2 * COVARIANCE[0, 1])
-    np.testing.assert_allclose(found.interval[0], 0.4 * np.exp([-Z * sd, Z * sd]), rtol=1e-5)
-    np.testing.assert_allclose(found.interval[0], 1 / found.interval[1, ::-1], rtol=1e-5)
+    np.testing.assert_allclose(found.interval[0], 0.4 * np.exp([-Z * sd, Z * sd]), rtol=1e-3)
+    np.testing.assert_allclose(found.interval[0], 1 / found.interval[1, ::-1], rtol=1e-3)
 
 
 def test_only_the_direction_that_nothing_measures_makes_a_quantity_unknown():

@@ -1,7 +1,7 @@
 # Everything runs in .venv, made on demand: each target works alone on a fresh clone with Python >= 3.11 and make.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-quick accuracy least-squares search-budget many-parameters virtual-boom design-study coverage quantity-coverage fuzz kill-resume slurm wheel docs meshes model clean
+.PHONY: setup check test test-slow demo excavator excavator-seeds six-joints bench structure article article-quick accuracy least-squares search-budget many-parameters virtual-boom design-study coverage quantity-coverage own-arm-coverage fuzz kill-resume slurm wheel docs meshes model clean
 
 setup: .venv/.ready
 
@@ -87,6 +87,9 @@ suggest-study: setup  ## terms that are left out of the model, and whether sugge
 
 coverage: setup  ## whether the intervals hold the truth as often as they say (docs/uncertainty.md)
 	$(BIN)/python benchmarks/interval_coverage.py
+
+own-arm-coverage: setup  ## do the intervals of 27 parameters that trade hold? (docs/uncertainty.md)
+	$(BIN)/python benchmarks/own_arm_coverage.py
 
 quantity-coverage: setup  ## the same for quantities such as speeds and dead bands (docs/quantities.md)
 	$(BIN)/python benchmarks/quantity_coverage.py

@@ -75,7 +75,7 @@ def clean_log(settings: FitSettings, seconds: float) -> Log:
 
 def study(correlation_time: float, logs: int, seconds: float, *, start: bool, open_start: bool) -> None:
     """Fit every log, and print how often each parameter's interval holds the truth."""
-    settings = load_settings("article-mech", CHANGES | {"free_start": "auto" if open_start else False})
+    settings = load_settings("article-mech", CHANGES | {"free_start": open_start})
     clean = clean_log(settings, seconds)
     phi = float(np.exp(-clean.period / correlation_time)) if correlation_time else 0.0
     problem = Problem(settings.model_copy(update={"free_start": False}), [clean])

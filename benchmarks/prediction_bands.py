@@ -26,7 +26,7 @@ from hydroid.uncertainty.covariance import uncertainty
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 CHANGES = {
-    "free_start": "auto",
+    "free_start": True,
     "simulation.other_joints": "locked",
     **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
     **{f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name.startswith("M")},

@@ -9,24 +9,14 @@ G. H. Golub and V. Pereyra, 1973), which is to whiten the residuals for a start 
 is computed from such residuals, intervals too, holds for any start angle that the prior allows.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.log import Log
 from hydroid.parameters import Array
 
 STEP = float(np.radians(0.05))
 """of the differences by a start angle"""
-FEWEST_SAMPLES = 25.0
-"""independent samples of rest, below which the start is open: its error is then above a fifth of the noise"""
-
-
-def open_joints(log: Log, joints: Sequence[int], free: bool | str) -> list[int]:
-    """Return which of some joints, numbered from 1, have an open start angle in a log."""
-    samples = log.start_samples
-    return [j for j in joints if free is True or (free == "auto" and samples[j - 1] < FEWEST_SAMPLES)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.free_start import STEP, OpenStart, StartSlopes, open_joints
+from hydroid.problem.free_start import STEP, OpenStart, StartSlopes
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.stage import Stage
@@ -111,7 +111,7 @@ class Problem:
     @property
     def leaves_start_open(self) -> bool:
         """Whether the start angle of any log is open."""
-        return any(self._open_joints(log) for log in self.logs)
+        return self.settings.free_start and any(self._started(log) for log in self.logs)
 
     def start_slopes(self, theta: Array, *, everywhere: bool = False) -> list[StartSlopes]:
         """Differentiate the residuals at theta, shape (P,), by the start angles that logs leave open.
@@ -119,12 +119,12 @@ class Problem:
         Where `everywhere`, by all that are measured. One simulation for each. A start angle from which the
         simulation diverges has no effect.
         """
-        if not (everywhere or self.leaves_start_open):
+        if not (everywhere or self.settings.free_start):
             return []
         spec = load_model(self.settings.arm.model, self.settings.arm)  # cannot be pickled: not kept
         candidates, found = self.stage.candidates(theta[None]), list[StartSlopes]()
         for i, log in enumerate(self.logs):
-            joints = self._started(log) if everywhere else self._open_joints(log)
+            joints = self._started(log)
             if not joints:
                 continue
             own = [channel for channel in self.channels if channel.log == i]
@@ -147,9 +147,6 @@ class Problem:
         opened = copy(self)
         opened.open_starts = tuple(open_starts)
         return opened
-
-    def _open_joints(self, log: Log) -> list[int]:
-        return open_joints(log, self._started(log), self.settings.free_start)
 
     def _started(self, log: Log) -> list[int]:
         """Joints whose measured angle only their start is simulated from, numbered from 1."""

@@ -18,9 +18,9 @@ from hydroid.errors import RunError
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
+from hydroid.uncertainty.axes import changed, covariance_axes, room
 from hydroid.uncertainty.covariance import COVERAGE, NULL_COMPONENT, RANK_TOLERANCE, Uncertainty
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE
-from hydroid.uncertainty.axes import changed, covariance_axes, room
 
 STEP = 0.1
 """step of the differences in standard deviations: wide enough for the small jumps that events make"""

@@ -32,9 +32,9 @@ class FitSettings(Settings):
     """joints whose measured angle is compared"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
-    free_start: bool | Literal["auto"] = "auto"
+    free_start: bool = True
     """whether the start angles are open in the refinement and its intervals, as far as the noise of their
-    sensors allows; auto: where a log starts with a command, moves or drifts"""
+    sensors in the rest before the first command allows"""
     parameters: dict[str, ParameterSettings]
     """the parameters of the model by name, those to be estimated and those that are fixed"""
     scale: Literal["log", "linear"] = "log"

@@ -54,7 +54,7 @@ class Axes:
 
     def by_parameter(self, slopes: Array) -> Array:
         """Derivatives by each parameter, (p, R), from those along each direction, (p, R)."""
-        return np.linalg.solve(self.directions, slopes)
+        return np.asarray(np.linalg.solve(self.directions, slopes), dtype=float)
 
 
 def room(parameters: ParameterSet, theta: Array, scale: Array) -> Array:
@@ -65,7 +65,7 @@ def room(parameters: ParameterSet, theta: Array, scale: Array) -> Array:
 
 
 def changed(parameters: ParameterSet, theta: Array, changes: Array) -> Array:
-    """Return parameter vectors, (n, P), at changes of theta, (n, P), that rounding does not lead out of bounds."""
+    """Return theta, (P,), with changes, (n, P); rounding does not lead out of its bounds."""
     low, high = np.minimum(parameters.lower, theta), np.maximum(parameters.upper, theta)
     return np.clip(theta + changes, low, high)
 

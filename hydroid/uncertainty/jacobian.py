@@ -71,7 +71,7 @@ class Jacobian:
 
 
 def jacobian(problem: Problem, theta: Array) -> Jacobian:
-    """Return the derivatives at theta, shape (P,), from 1 + 2 p simulations and 4 p a round, p parameters free.
+    """Return the derivatives at theta, shape (P,), from 1 + 2 p simulations, p free, and 4 p a round.
 
     The first differences are by each parameter. Then come rounds of differences along the axes of the
     covariance that follows: a standard deviation and a tenth of it to each side. The long step counts, which
@@ -128,7 +128,7 @@ def relative_scale(parameters: ParameterSet, theta: Array) -> Array:
 def _along(axes: Axes, moved: Residuals, residual: Array, former: Array) -> Array:
     """Derivatives along axes, (p, R); `former`, (p, R), where simulations diverge on both sides."""
     found = [one.slopes(moved, residual) for one in (axes, axes.shortened(SHORTER))]
-    long, short = (np.where(np.isfinite(one).all(axis=1)[:, None], one, former) for one in found)
+    long, short = (np.where(np.isfinite(one).all(axis=1, keepdims=True), one, former) for one in found)
     curved = np.linalg.norm(short, axis=1) < CURVED * np.linalg.norm(long, axis=1)
     return np.where(curved[:, None], short, long)
 

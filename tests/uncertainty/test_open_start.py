@@ -48,7 +48,7 @@ def test_a_wrong_start_leaves_little_error_where_it_is_open():
     angle[0] += wrong
     held, opened = (
         Problem(load_settings("article-mech", {"free_start": free}), [replace(log, angle=angle)])
-        for free in (False, "auto")
+        for free in (False, True)
     )
     theta = held.parameters.start
     assert with_open_start(held, theta) is held

@@ -21,9 +21,9 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem, compared_pressures
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.fit import FitSettings
+from hydroid.uncertainty.axes import changed, covariance_axes, room
 from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE
-from hydroid.uncertainty.jacobian import FINE_STEP, relative_scale
 from hydroid.uncertainty.noise import Noise
 
 WEIGHED_SD = 0.02
@@ -269,12 +269,15 @@ def _constant(log: Log, joint: int, levels: Array, settings: FitSettings) -> Exp
 
 def _information(problem: Problem, uncertainty: Uncertainty, chosen: Callable[..., bool]) -> Array:
     """Information of some channels of a problem at the estimate, (p, p), in plain least squares."""
-    theta, free = uncertainty.theta, uncertainty.free
-    moved = theta + FINE_STEP * np.diag(relative_scale(problem.parameters, theta))[free]
-    rows = problem.residuals(np.vstack([theta, moved]))
-    slopes = np.nan_to_num((rows[1:] - rows[0]) / FINE_STEP)
+    theta, free, scale = uncertainty.theta, uncertainty.free, uncertainty.jacobian.scale
+    axes = covariance_axes(uncertainty.root, room(problem.parameters, theta, scale), step=1.0)
+    steps = axes.steps[:, :1]  # to one side
+    changes = np.zeros((len(steps), len(theta)))
+    changes[:, free] = steps * axes.directions * scale[free]
+    rows = problem.residuals(np.vstack([theta, changed(problem.parameters, theta, changes)]))
+    slopes = axes.by_parameter(np.nan_to_num((rows[1:] - rows[0]) / steps))
     worst = max(uncertainty.noise, key=lambda noise: noise.level)
-    total = np.zeros((int(free.sum()), int(free.sum())))
+    total = np.zeros((len(slopes), len(slopes)))
     for channel in problem.channels:
         if chosen(channel):
             level = worst.level if channel.quantity == "angle" else PRESSURE_SD * channel.weight

@@ -107,11 +107,12 @@ def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
 
 def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: tuple[Problem, Uncertainty]):
     problem, known = late
-    model = ExtendedModel(problem, known.theta)
-    np.testing.assert_array_equal(model.residual, problem.residuals(known.theta[None])[0])
+    model, opened = ExtendedModel(problem, known.theta), with_open_start(problem, known.theta)
+    np.testing.assert_array_equal(model.residual, opened.residuals(known.theta[None])[0])
     i = [term.name for term in model.terms].index("delay")
     changed = model.residuals(known.theta[None], [i], [0.03 / 2.0])[0]
-    right = Problem(make_settings(delay=0.03), problem.logs).residuals(known.theta[None])[0]
+    delayed = Problem(make_settings(delay=0.03), problem.logs).with_open_starts(opened.open_starts)
+    right = delayed.residuals(known.theta[None])[0]
     np.testing.assert_allclose(changed, right, atol=1e-12)
 
 

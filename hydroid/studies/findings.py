@@ -131,7 +131,8 @@ def _arm(problem: Problem, figure: StudyFigure) -> Judged:
 
 def _flow_chart(problem: Problem, _: StudyFigure) -> Judged:
     elite = problem.settings.search.ga.elitism
-    added = f"; one thing added: the best {elite} of each generation survive" if elite else ""
+    survive = "best candidate of each generation survives" if elite == 1 else f"best {elite} of each survive"
+    added = f"; added: the {survive}" if elite else ""
     return Outcome.CONFIRMED, f"each step has its test in tests/search{added}"
 
 

@@ -40,7 +40,7 @@ excavator-seeds: setup  ## the same from five starts, with time and simulations 
 	$(BIN)/python benchmarks/excavator.py 5
 
 .PHONY: excavator-folds
-excavator-folds: setup  ## models of the excavator compared within the logs of the fit; ten minutes (docs/measured.md)
+excavator-folds: setup  ## models of the excavator compared by logs that their fits left out (docs/measured.md); 40 minutes, goes on where it was
 	$(BIN)/python benchmarks/excavator_folds.py
 
 six-joints: setup  ## six hydraulic joints at once, 54 parameters (docs/measured.md)

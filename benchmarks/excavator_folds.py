@@ -56,7 +56,14 @@ NOTCHES = sides(*(f"notch_{k}" for k in NUMBERS))
 EXPONENTS = sides("exponent")
 NO_NOTCHES = changed("fixed", 1, *NOTCHES)
 NO_OVERLAP = changed("fixed", 0, *sides("over"))
-ALIKE = changed("within", 1.3, *NOTCHES, *EXPONENTS)
+NARROW_CURVES = changed("within", 3, *NOTCHES) | changed("within", 2.2, *EXPONENTS)
+NARROW_REST = (
+    changed("sd", 6, *sides("dead"))
+    | changed("sd", 0.1, *sides("delay"))
+    | changed("within", 4, *sides("lag", "over", "open"))
+)
+NARROW = NARROW_CURVES | NARROW_REST
+ALIKE = NARROW | changed("within", 1.3, *NOTCHES, *EXPONENTS)
 """valves of one make: their curves differ by a third"""
 TIGHT = (
     ALIKE
@@ -64,14 +71,7 @@ TIGHT = (
     | changed("sd", 0.05, *sides("delay"))
     | changed("within", 2, *sides("lag", "over"))
 )
-"""the same of all that a valve and its pilot stage have; only the openings are as unknown as before"""
-LOOSE = (
-    changed("within", 4, *NOTCHES, *EXPONENTS)
-    | changed("sd", 12, *sides("dead"))
-    | changed("sd", 0.2, *sides("delay"))
-    | changed("within", 10, *sides("lag", "over", "open"))
-)
-"""hardly any expectation"""
+"""the same of all that a valve and its pilot stage have, but for the openings"""
 FLAT = (
     changed("nominal", 1.3, *EXPONENTS)
     | changed("within", 1.6, *EXPONENTS)
@@ -81,21 +81,19 @@ FLAT = (
 ONE_CURVE = changed("each", False, *NOTCHES) | {
     f"priors.curve_{k}": {"of": {f"notch_{k}_A": 1, f"notch_{k}_B": -1}, "value": 0} for k in NUMBERS
 }
-"""one curve for all spools, which only their sizes and exponents tell apart"""
+"""one curve for all spools of the arm, which only their sizes and exponents tell apart"""
 VARIANTS: dict[str, dict[str, object]] = {
     "shipped": {},
+    "narrow": NARROW,
+    "narrow, wide curves": NARROW_REST,
+    "narrow, wide rest": NARROW_CURVES,
+    "narrow, notches everywhere": NARROW | changed("each", True, *NOTCHES),
+    "narrow, overlaps everywhere": NARROW | changed("each", True, *sides("over")),
+    "tight curves": ALIKE,
     "tight": TIGHT,
-    "former": NO_NOTCHES | NO_OVERLAP | FLAT | changed("fixed", 0, "F_swing"),
-    "no-notches-tight": NO_NOTCHES | TIGHT,
-    "loose": LOOSE,
-    "alike": ALIKE,
-    "one-curve": ONE_CURVE,
-    "notches-everywhere": changed("each", True, *NOTCHES),
-    "overlaps-everywhere": changed("each", True, *sides("over")),
-    "slow-return": {
-        f"parameters.back_{side}": {"quantity": f"plunger_back_{side.lower()}", "each": True, "within": 4}
-        for side in SIDES
-    },
+    "narrow, one curve": NARROW | ONE_CURVE,
+    "tight, no notches": NO_NOTCHES | TIGHT,
+    "47 parameters": NARROW | NO_NOTCHES | NO_OVERLAP | FLAT | changed("fixed", 0, "F_swing"),
 }
 
 

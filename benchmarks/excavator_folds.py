@@ -19,16 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from excavator import BEFORE, FOLDER, JOINTS, errors
+from excavator import BEFORE, FOLDER, JOINTS, errors, fitted
 
 import hydroid
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import refine
-from hydroid.identified_model import IdentifiedModel
-from hydroid.log import Log
-from hydroid.problem.problem import Problem
-from hydroid.settings.fit import FitSettings
 
 GROUPS = 3
 QUICK: dict[str, object] = {
@@ -97,17 +90,6 @@ VARIANTS: dict[str, dict[str, object]] = {
 }
 
 
-def fitted(settings: FitSettings, logs: list[Log]) -> IdentifiedModel:
-    """Fit as `hydroid.fit` does, without the uncertainty."""
-    problem = Problem(settings, logs)
-    search = Multistart(problem, settings.search, Memo(problem), lambda simulated, rms: None)
-    state = search.run(None, lambda state, memo: None, lambda row: None)
-    theta = search.theta(state.population)[0]
-    assert settings.refinement is not None
-    point = refine(problem, theta, settings.refinement, lambda simulated, rms: None).point
-    return IdentifiedModel(settings, problem.parameters.from_unit(point[None])[0], "a fit in part")
-
-
 def row(variant: str, group: int) -> dict[str, Any]:
     """Fit without one group of logs; errors on fitted and on left-out logs [deg], by joint."""
     settings = hydroid.load_settings(FOLDER / "fit.yaml", VARIANTS[variant] | QUICK)
@@ -115,7 +97,7 @@ def row(variant: str, group: int) -> dict[str, Any]:
     out = np.array_split(np.arange(len(logs)), GROUPS)[group]
     kept = [log for i, log in enumerate(logs) if i not in out]
     began = time.process_time()
-    model = fitted(settings, kept)
+    model, _, _ = fitted(settings, kept)
     return {
         "variant": variant,
         "group": group,

@@ -103,6 +103,8 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
         doubt[known] = np.abs(after[known] / before[known] - 1)
         if (doubt <= AGREE).all():
             break
+    effects = np.linalg.norm(slopes, axis=1)
+    slopes[effects <= NO_EFFECT_BELOW * effects.max()] = 0.0  # not the rounding that the axes bring
     found, doubts = np.full((len(theta), residual.size), np.nan), np.zeros(len(theta))
     found[free], doubts[free] = slopes, doubt
     found[np.flatnonzero(free)[diverges]] = np.nan

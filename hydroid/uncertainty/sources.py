@@ -10,6 +10,8 @@ from hydroid.uncertainty.jacobian import Jacobian
 
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it"""
+ROUNDING = 1e-9
+"""a share below this is none"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,8 @@ def data_shares(slopes: Array, variance: Array) -> Array:
     inverse = directions[known] / values[known, None]
     prior = np.where(reached, np.sum(inverse**2, axis=0), np.inf)
     with np.errstate(invalid="ignore"):
-        return np.where(reached, np.clip(1 - variance / prior, 0.0, 1.0), 1.0)
+        share = 1 - variance / prior
+    return np.where(reached, np.clip(np.where(share < ROUNDING, 0.0, share), 0.0, 1.0), 1.0)
 
 
 def strains(problem: Problem, theta: Array, derivatives: Jacobian) -> tuple[Strain, ...]:

@@ -63,7 +63,7 @@ def _convergence(runs: StudyRuns, figure: StudyFigure) -> Figure:
         axes.plot(at, middle, **look)
         axes.fill_between(at, lower, upper, color=look["color"], alpha=0.12, linewidth=0)
     if not figure.normalized:
-        axes.set_yscale("log")
+        style.logarithmic(axes.yaxis)
     style.legend_below(drawing, axes, columns=2)
     return drawing
 

@@ -5,7 +5,7 @@
 
 With a folder, its results are first copied to docs/reproduction/: one CSV of all runs for each study, the
 figures that are the article's, and about.json. Without one, the page is written from these alone.
-docs/reproduction/note.md is written by hand; the page holds it where it says how the runs were made.
+docs/reproduction/note.txt is written by hand; the page holds it where it says how the runs were made.
 """
 
 import csv
@@ -202,7 +202,7 @@ def provenance(made: Sequence[Evaluated], about: dict[str, Any]) -> str:
         f"\n- Time: {about['seconds'] / 60:,.0f} minutes of one core, each run counted with the median time",
         "\n  of its cell; two cores take half of it. The clock also counts what else the machine did.\n",
     ]
-    note = RESULTS / "note.md"
+    note = RESULTS / "note.txt"
     return "".join(lines) + (f"\n{note.read_text(encoding='utf-8').strip()}\n" if note.is_file() else "")
 
 

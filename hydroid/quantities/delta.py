@@ -18,8 +18,8 @@ from hydroid.errors import RunError
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
-from hydroid.uncertainty.axes import changed, covariance_axes, room
-from hydroid.uncertainty.covariance import COVERAGE, NULL_COMPONENT, RANK_TOLERANCE, Uncertainty
+from hydroid.uncertainty.axes import RANK_TOLERANCE, changed, covariance_axes, room
+from hydroid.uncertainty.covariance import COVERAGE, NULL_COMPONENT, Uncertainty
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE
 
 STEP = 0.1

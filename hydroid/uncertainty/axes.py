@@ -20,7 +20,7 @@ EDGE = 0.1
 """standard deviations from a bound, below which a parameter counts as held by it"""
 UNBALANCED = 0.3
 """part of a step within which both sides must have room; else it goes twice to one side"""
-NEGLIGIBLE = 1e-12
+RANK_TOLERANCE = 1e-12
 """singular values below this part of the largest are zero"""
 
 
@@ -98,7 +98,7 @@ def covariance_axes(root: Array, within: Array, step: float) -> Axes:
             axes = np.linalg.svd(root[:, inner])[2]
             values, left = np.append(values, np.zeros(missing)), np.pad(left, ((0, 0), (0, missing)))
         directions[: len(inner), inner] = axes
-        known = values > NEGLIGIBLE * values.max(initial=0.0)
+        known = values > RANK_TOLERANCE * values.max(initial=0.0)
         follow = axes[known].T @ ((left[:, known].T @ root[:, at_edge]) / values[known, None])
         directions[len(inner) :, inner] = -follow.T
     length = np.linalg.norm(root @ directions.T, axis=0)
@@ -110,7 +110,7 @@ def deviations(root: Array) -> Array:
     """Relative standard deviation of each parameter, shape (p,), from G, (k, p); inf where not measured."""
     _, values, axes = np.linalg.svd(root)
     values = np.append(values, np.zeros(len(axes) - len(values)))
-    measured = values > NEGLIGIBLE * values.max(initial=0.0)
+    measured = values > RANK_TOLERANCE * values.max(initial=0.0)
     known = np.linalg.norm(axes[measured] / values[measured, None], axis=0)
     return np.where(np.linalg.norm(axes[~measured], axis=0) > 1e-6, np.inf, known)
 

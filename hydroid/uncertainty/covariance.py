@@ -32,6 +32,7 @@ from scipy.stats import norm as normal
 
 from hydroid.parameters import Array, Parameter, ParameterSet
 from hydroid.problem.problem import Problem
+from hydroid.uncertainty.axes import RANK_TOLERANCE
 from hydroid.uncertainty.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.uncertainty.jacobian import Jacobian, jacobian
 from hydroid.uncertainty.noise import Noise, channel_noise, covariances, unbiased
@@ -42,8 +43,6 @@ COVERAGE = 0.95
 """probability with which an interval covers the true value"""
 BOUND_MARGIN = 1e-3
 """part of the range within which an estimate is called at a bound"""
-RANK_TOLERANCE = 1e-12
-"""singular values below this part of the largest are zero"""
 NULL_COMPONENT = 0.01
 """component in an unmeasured direction below which a parameter does not depend on it"""
 DOUBT_ABOVE = 0.25

@@ -13,7 +13,8 @@ import numpy as np
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.covariance import RANK_TOLERANCE, Uncertainty
+from hydroid.uncertainty.axes import RANK_TOLERANCE
+from hydroid.uncertainty.covariance import Uncertainty
 from hydroid.uncertainty.flags import WEAK_ABOVE, Flag, flag_of
 from hydroid.uncertainty.patterns import DirectionKind, Pattern, patterns
 

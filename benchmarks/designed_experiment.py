@@ -26,10 +26,10 @@ from typing import Any
 import numpy as np
 
 from hydroid import load_settings
+from hydroid.advice.commands import RandomExperiments, violation
+from hydroid.advice.design import design
+from hydroid.advice.information import ExperimentSimulator, prior_information
 from hydroid.estimate import read_values
-from hydroid.experiment.commands import RandomExperiments, violation
-from hydroid.experiment.design import design
-from hydroid.experiment.information import ExperimentSimulator, prior_information
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log

@@ -19,15 +19,15 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid import load_settings
-from hydroid.experiment.pseudo_random import pseudo_random_log
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
+from hydroid.posterior.covariance import quantile, uncertainty, uncertainty_from
+from hydroid.posterior.jacobian import Jacobian, jacobian
+from hydroid.posterior.noise import Noise
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.covariance import quantile, uncertainty, uncertainty_from
-from hydroid.uncertainty.jacobian import Jacobian, jacobian
-from hydroid.uncertainty.noise import Noise
 
 LEVEL = np.deg2rad(0.1)
 JOINTS = [2, 3]

@@ -28,7 +28,7 @@ from pathlib import Path
 
 from hydroid.cli.app import main as hydroid
 from hydroid.fitting import search
-from hydroid.reporting import page_file
+from hydroid.report import page_file
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600

@@ -20,8 +20,8 @@ import scipy.optimize
 from mujoco import minimize
 
 from hydroid import load_settings, read_logs
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.estimate import read_values
-from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import fit
 from hydroid.fitting.refinement import refine
 from hydroid.prediction import simulate_log

@@ -18,10 +18,10 @@ import numpy as np
 
 import hydroid
 from hydroid.log import Log
+from hydroid.posterior.by_log import by_log
+from hydroid.posterior.covariance import uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.by_log import by_log
-from hydroid.uncertainty.covariance import uncertainty
 
 LOGS = Path(__file__).parents[1] / "examples" / "logs"
 CUTS = {"rig_shoulder_1": 2200, "rig_shoulder_2": 3300}

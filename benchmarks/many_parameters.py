@@ -22,15 +22,15 @@ from scipy.stats import norm
 from sysid_peer import Peer
 
 from hydroid import load_settings
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.api.fit import Silent
-from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import Fit, fit
 from hydroid.log import Log
+from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.flags import WEAK_ABOVE
 
 JOINTS = range(1, 8)
 MASSES = {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}

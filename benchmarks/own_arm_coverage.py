@@ -21,9 +21,9 @@ import hydroid
 from hydroid.fitting.refinement import refine
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
+from hydroid.posterior.covariance import uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.covariance import uncertainty
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "urdf"
 SPEC = importlib.util.spec_from_file_location("make_example", EXAMPLE / "make_example.py")

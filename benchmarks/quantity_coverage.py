@@ -18,15 +18,15 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid import load_settings
-from hydroid.experiment.pseudo_random import pseudo_random_log
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
+from hydroid.posterior.bench import make_bench
+from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.delta import precision
+from hydroid.posterior.quantities import joint_measure
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.quantities.bench import make_bench
-from hydroid.quantities.delta import precision
-from hydroid.quantities.quantities import joint_measure
-from hydroid.uncertainty.covariance import uncertainty
 
 LEVEL = np.deg2rad(0.1)
 TRUTH = {"A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}

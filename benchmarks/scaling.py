@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from hydroid import load_settings
-from hydroid.experiment.pseudo_random import pseudo_random_log
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.parallel.cluster import open_workers
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem, Spread

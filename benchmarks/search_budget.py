@@ -18,8 +18,8 @@ import numpy as np
 from least_squares import TRUTH, Silent
 
 from hydroid import load_settings, read_logs
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.estimate import read_values
-from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Checkpoint, SearchState

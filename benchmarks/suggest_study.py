@@ -26,18 +26,18 @@ from typing import Any
 import numpy as np
 
 from hydroid import load_settings
+from hydroid.advice.missing import missing_terms
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.model import load_model
-from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
+from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem, make_simulation
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.simulation import HydraulicSimulation
-from hydroid.suggestion.missing import missing_terms
-from hydroid.uncertainty.covariance import uncertainty
 
 NOISE = np.deg2rad(0.1)
 REST = 100

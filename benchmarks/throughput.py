@@ -16,10 +16,10 @@ import numpy as np
 from mujoco.batch import Batch
 
 from hydroid import load_settings
+from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
-from hydroid.experiment.pseudo_random import pseudo_random_log
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import Search
 from hydroid.prediction import simulate_log

@@ -21,12 +21,12 @@ import numpy as np
 from PIL import Image
 
 from hydroid.api.studies import article_items
-from hydroid.reporting.article_report import tally
-from hydroid.reporting.study_report import QUICK, conclusions, study_table
-from hydroid.reporting.table import Cell, Table
+from hydroid.report.article_report import tally
+from hydroid.report.study_report import QUICK, conclusions, study_table
+from hydroid.report.table import Cell, Table
 from hydroid.settings.study import StudySettings, cell_settings
-from hydroid.studies.claims import Outcome, Verdict, verdicts
-from hydroid.studies.measures import Row, measures
+from hydroid.study.claims import Outcome, Verdict, verdicts
+from hydroid.study.measures import Row, measures
 
 HERE = Path(__file__).parent
 PAGE, RESULTS, CONFIGS = HERE / "reproduction.md", HERE / "reproduction", HERE.parent / "configs" / "article"

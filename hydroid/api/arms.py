@@ -83,7 +83,7 @@ def collisions(
 
     logs = _by_arm(trajectory, settings, arm, read)
     from hydroid.arm.machine import load_machine
-    from hydroid.reporting.collision_report import collision_page
+    from hydroid.report.collision_report import collision_page
 
     machine = load_machine(settings.arm, pair=arm is not None)
     rest = settings.arm.pose(settings.start_pose)

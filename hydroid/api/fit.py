@@ -128,10 +128,10 @@ def fit(
 
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "Fit":
     """Begin the folder's run, or continue it, to its report."""
+    from hydroid.advice.suggest import suggestions
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.reporting.fit_report import fit_page
-    from hydroid.reporting.page_file import write_page
-    from hydroid.suggestion.suggest import suggestions
+    from hydroid.report.fit_report import fit_page
+    from hydroid.report.page_file import write_page
 
     checkpoint = folder.begin_or_continue(problem.settings, problem.logs)
     result = run_fit(problem, folder.save, progress, checkpoint, folder.refinements())

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from hydroid.api.look import LogSources
     from hydroid.log import Log
     from hydroid.parameters import Array
+    from hydroid.posterior.sweep import Surface, Sweep
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.page import Page
-    from hydroid.reporting.uncertainty_report import UncertaintyStudy
-    from hydroid.reporting.validation_report import Validation
-    from hydroid.uncertainty.sweep import Surface, Sweep
+    from hydroid.report.page import Page
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.report.validation_report import Validation
 
 _log = logging.getLogger(__name__)
 
@@ -62,9 +62,9 @@ def validate(
         raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     read = [read_logs(logs, model.settings, repair=repair) for model in opened]
     from hydroid.fitting.validation import error_indices
+    from hydroid.posterior.band import prediction_bands
     from hydroid.prediction import predict
-    from hydroid.quantities.band import prediction_bands
-    from hydroid.reporting.validation_report import Validation, validation_page
+    from hydroid.report.validation_report import Validation, validation_page
     from hydroid.run.identity import was_fitted
 
     folds: list[IdentifiedModel] = []
@@ -95,8 +95,8 @@ def validate(
 def _show_in_report(model: IdentifiedModel, page: "Page") -> None:
     """Add a validation to the report of the run that a model is from, if its settings are the run's."""
     from hydroid.estimate import NAME
-    from hydroid.reporting.page_file import content_html, drawings, page_content, read_page
-    from hydroid.reporting.validated import with_validation
+    from hydroid.report.page_file import content_html, drawings, page_content, read_page
+    from hydroid.report.validated import with_validation
 
     source = Path(model.source)
     file = source.parent / "report.html"
@@ -114,12 +114,12 @@ def _refined_without(model: IdentifiedModel, logs: "Sequence[Log]", left_out: in
     """Return the model refined on all logs but one, with its own uncertainty."""
     from hydroid.estimate import FitSummary
     from hydroid.fitting.refinement import refine
+    from hydroid.posterior.covariance import uncertainty
+    from hydroid.posterior.delta import precision
     from hydroid.problem.problem import Problem
-    from hydroid.quantities.delta import precision
-    from hydroid.reporting.page import log_names
+    from hydroid.report.page import log_names
     from hydroid.run.summary import left_out_levels, noise_levels, parameter_estimates
     from hydroid.settings.search import RefinementSettings
-    from hydroid.uncertainty.covariance import uncertainty
 
     if len(logs) < 2:
         raise SettingsError("needs two logs or more", where="--leave-one-out")
@@ -166,10 +166,10 @@ def identifiability(
         RunError: the simulation diverged, or the folder cannot be written.
     """
     from hydroid.fitting.refinement import refine
+    from hydroid.posterior import intervals
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.uncertainty_report import uncertainty_page
+    from hydroid.report.uncertainty_report import uncertainty_page
     from hydroid.settings.search import RefinementSettings
-    from hydroid.uncertainty import intervals
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))
@@ -197,8 +197,8 @@ def _analysed(
     asked: tuple[Sequence[str], tuple[int, int], Progress],
 ) -> "UncertaintyStudy":
     """Return the study of an estimate: `asked` are profiles, refits with their seed, and the progress."""
-    from hydroid.reporting.uncertainty_report import UncertaintyStudy
-    from hydroid.uncertainty import covariance, directions, intervals
+    from hydroid.posterior import covariance, directions, intervals
+    from hydroid.report.uncertainty_report import UncertaintyStudy
 
     profile, (refits, seed), progress = asked
     uncertainty = covariance.uncertainty(problem, theta)
@@ -231,9 +231,9 @@ def sensitivity(
     Raises:
         RunError: the folder cannot be written.
     """
+    from hydroid.posterior.sweep import sweep
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.sensitivity_report import sensitivity_page
-    from hydroid.uncertainty.sweep import sweep
+    from hydroid.report.sensitivity_report import sensitivity_page
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))
@@ -270,9 +270,9 @@ def surface(
     for pair in over:
         if len(pair) != 2:
             raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
+    from hydroid.posterior import sweep as sweeps
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.objectives import surface_page
-    from hydroid.uncertainty import sweep as sweeps
+    from hydroid.report.objectives import surface_page
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))

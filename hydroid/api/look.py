@@ -186,10 +186,10 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
     """
     model = open_model(model)
     require_hydraulics(model)
+    from hydroid.posterior.delta import stored_precision
     from hydroid.problem.stage import Stage
-    from hydroid.quantities.delta import stored_precision
-    from hydroid.reporting.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
-    from hydroid.reporting.page_file import write_page
+    from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
+    from hydroid.report.page_file import write_page
 
     stage, arm = Stage(model.settings), model.settings.arm
     actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)

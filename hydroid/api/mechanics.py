@@ -10,11 +10,11 @@ from hydroid.errors import SettingsError
 from hydroid.estimate import ParameterEstimate, estimate_file, read_values
 from hydroid.files import is_file
 from hydroid.identified_model import ARM, CONFIG
+from hydroid.posterior.flags import Flag
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
 from hydroid.settings.parameters import nominal_value
 from hydroid.settings.problem import MECHANICAL_UNITS
-from hydroid.uncertainty.flags import Flag
 
 MOVED = 0.1
 """relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""

@@ -15,9 +15,9 @@ from hydroid.log import write_log
 from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
+    from hydroid.advice.design import Design
+    from hydroid.advice.suggest import Suggestions
     from hydroid.api.look import LogSources
-    from hydroid.experiment.design import Design
-    from hydroid.suggestion.suggest import Suggestions
 
 
 def suggest(
@@ -46,10 +46,10 @@ def suggest(
         SettingsError: no log is given, and `model` is no run folder.
         RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
     """
+    from hydroid.advice.suggest import suggestions
+    from hydroid.posterior.covariance import uncertainty
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.suggestion_report import suggestion_page
-    from hydroid.suggestion.suggest import suggestions
-    from hydroid.uncertainty.covariance import uncertainty
+    from hydroid.report.suggestion_report import suggestion_page
 
     opened = open_model(model)
     given = logs if not isinstance(logs, Sequence) or len(logs) else run_logs(model)
@@ -106,8 +106,8 @@ def design(
         SettingsError: limits that no experiment keeps.
         RunError: the folder cannot be written.
     """
-    from hydroid.experiment import design as experiment
-    from hydroid.reporting.design_report import design_page
+    from hydroid.advice import design as experiment
+    from hydroid.report.design_report import design_page
 
     model = open_model(model)
     settings = model.settings

@@ -55,7 +55,7 @@ def quantity(
         RunError: the folder has no covariance of these parameters, or a simulation diverged.
     """
     from hydroid.plant import Plant
-    from hydroid.quantities.delta import required_precision
+    from hydroid.posterior.delta import required_precision
 
     opened = open_model(model)
     precision = required_precision(opened)

@@ -25,8 +25,8 @@ def report(folders: Sequence[str | Path], out: str | Path = "runs/report") -> Pa
         RunError: a folder holds no report, or one of another version; or the page cannot be written.
     """
     from hydroid.files import write_atomic
-    from hydroid.reporting.comparison import comparison, names_of
-    from hydroid.reporting.page_file import content_html, read_page
+    from hydroid.report.comparison import comparison, names_of
+    from hydroid.report.page_file import content_html, read_page
 
     files = [_page(Path(folder)) for folder in folders]
     contents = [read_page(file) for file in files]

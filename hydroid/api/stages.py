@@ -19,7 +19,7 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     from hydroid.fitting.fit import Watcher as Progress
     from hydroid.problem.problem import Spread
-    from hydroid.reporting.page import Page
+    from hydroid.report.page import Page
     from hydroid.run.collection import Collection
 
 
@@ -135,7 +135,7 @@ def collect(runs: Sequence[str | Path], out: str | Path = "runs/collected") -> "
     Raises:
         RunError: no run is left, runs differ in more than their seeds, or `out` cannot be written.
     """
-    from hydroid.reporting.spread import spread_page
+    from hydroid.report.spread import spread_page
     from hydroid.run.collection import read_runs
 
     collection = read_runs([str(run) for run in runs], Path(out))
@@ -213,8 +213,8 @@ def _workers(settings: FitSettings, options: FitOptions) -> "AbstractContextMana
 
 
 def _spread(out: Path, results: Sequence[FitResult]) -> "Page":
-    from hydroid.reporting.page_file import write_page
-    from hydroid.reporting.spread import run_result, spread_page
+    from hydroid.report.page_file import write_page
+    from hydroid.report.spread import run_result, spread_page
 
     parameters = results[0].problem.parameters
     runs = [

@@ -18,7 +18,7 @@ from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from hydroid.settings.study import StudySettings
-    from hydroid.studies.study import StudyPlan, StudyRuns
+    from hydroid.study.study import StudyPlan, StudyRuns
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def article(
         SettingsError: no such item.
         RunError: as of `study`.
     """
-    from hydroid.reporting.article_report import account, article_page
+    from hydroid.report.article_report import account, article_page
     from hydroid.run.lock import locked
 
     plans = [_plan(path, options) for path in _chosen(items)]
@@ -141,7 +141,7 @@ def _plan(path: Path, options: StudyOptions) -> "StudyPlan":
     from hydroid.settings.study import load_study
 
     load_study(path)  # a wrong file is refused before anything heavy is imported
-    from hydroid.studies.study import plan_study
+    from hydroid.study.study import plan_study
 
     def read(paths: Any, settings: Any) -> Any:
         return read_logs(paths, settings)
@@ -153,8 +153,8 @@ def _run(
     plan: "StudyPlan", shared: Path, out: Path, executor: Executor, options: StudyOptions
 ) -> "Study[StudyRuns]":
     """Run a study whose runs lie in `shared`, and write its page to `out`."""
-    from hydroid.reporting.study_report import study_page
-    from hydroid.studies.study import run_study
+    from hydroid.report.study_report import study_page
+    from hydroid.study.study import run_study
 
     runs = run_study(plan, shared, executor, options.progress)
     return Study(runs, study_page(runs)).write(out)
@@ -164,7 +164,7 @@ def _run(
 def _executor(options: StudyOptions) -> Generator[Executor]:
     from hydroid.parallel.cluster import open_workers
     from hydroid.settings.simulation import ClusterSettings
-    from hydroid.studies.execution import processes
+    from hydroid.study.execution import processes
 
     with open_workers(options.dask, ClusterSettings(), insecure=options.dask_insecure) as workers:
         if workers is None:

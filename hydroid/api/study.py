@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
-    from hydroid.reporting.page import Page
-    from hydroid.reporting.table import Table
+    from hydroid.report.page import Page
+    from hydroid.report.table import Table
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ class Study(Generic[T]):
             RunError: the folder cannot be written.
         """
         if out is not None:
-            from hydroid.reporting.page_file import write_page
+            from hydroid.report.page_file import write_page
 
             write_page(self.page, Path(out))
         return self

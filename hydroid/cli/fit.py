@@ -174,7 +174,7 @@ def collect(
     Unfinished runs and damaged runs are left out, with a warning.
     """
     from hydroid.api.stages import collect
-    from hydroid.reporting.spread import final_spread
+    from hydroid.report.spread import final_spread
 
     study = collect(runs, out)
     best, table = study.result.best, final_spread(study.page)
@@ -188,10 +188,10 @@ def collect(
 
 
 def _show(runs: "FitRuns", output: Output) -> None:
-    from hydroid.reporting.fit_tables import objective_table, parameter_table
-    from hydroid.reporting.phrases import fit_summary, fit_warnings
-    from hydroid.reporting.quantities_report import best_known
-    from hydroid.reporting.spread import final_spread
+    from hydroid.report.fit_tables import objective_table, parameter_table
+    from hydroid.report.phrases import fit_summary, fit_warnings
+    from hydroid.report.quantities_report import best_known
+    from hydroid.report.spread import final_spread
 
     first = runs.results[0]
     if runs.spread is not None:

@@ -13,9 +13,9 @@ from hydroid.cli.progress import Progress
 
 if TYPE_CHECKING:
     from hydroid.identified_model import IdentifiedModel
-    from hydroid.quantities.band import Band
-    from hydroid.reporting.uncertainty_report import UncertaintyStudy
-    from hydroid.reporting.validation_report import Validation
+    from hydroid.posterior.band import Band
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.report.validation_report import Validation
 
 
 class Stage(Enum):
@@ -99,7 +99,7 @@ def identifiability(
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
     from hydroid.identified_model import load_identified, start_values
-    from hydroid.reporting.phrases import direction_phrases
+    from hydroid.report.phrases import direction_phrases
 
     default, changes = f"fit-{stage.value}", overrides(setting)
     if fit is None:

@@ -13,7 +13,7 @@ import typer
 
 if TYPE_CHECKING:
     from hydroid.errors import HydroidError
-    from hydroid.reporting.table import Table
+    from hydroid.report.table import Table
 
 FLAGS = {
     "search.algorithm": "--algorithm",

@@ -31,7 +31,7 @@ def suggest(
     """
     from hydroid.api.plan import suggest
     from hydroid.identified_model import load_identified
-    from hydroid.reporting.suggestion_report import suggestion_content
+    from hydroid.report.suggestion_report import suggestion_content
 
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
     with Progress(quiet=output.silent) as progress:

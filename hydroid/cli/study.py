@@ -14,8 +14,8 @@ from hydroid.cli.output import show
 if TYPE_CHECKING:
     from hydroid.api.studies import StudyOptions
     from hydroid.cli.progress import Progress
-    from hydroid.reporting.table import Table
-    from hydroid.studies.study import StudyRuns
+    from hydroid.report.table import Table
+    from hydroid.study.study import StudyRuns
 
 
 @dataclass(kw_only=True)
@@ -116,7 +116,7 @@ def article(
 
 def _made(runs: "StudyRuns", folder: Path, chosen: list[str]) -> "list[Table | str]":
     """Return what was made of a study, found, and where it stands; of all items or of those chosen."""
-    from hydroid.reporting.study_report import study_tables
+    from hydroid.report.study_report import study_tables
 
     items = [item for item in runs.plan.study.items if item in chosen or not chosen]
     names = tuple(item.replace(" ", "_") for item in items if item in chosen)
@@ -134,7 +134,7 @@ def _made(runs: "StudyRuns", folder: Path, chosen: list[str]) -> "list[Table | s
 
 def _sentences(runs: "StudyRuns", chosen: Sequence[str] = ()) -> list[str]:
     """Return the verdicts in sentences, of all items or of those chosen; many of one reason in one."""
-    from hydroid.studies.claims import Outcome
+    from hydroid.study.claims import Outcome
 
     verdicts = [v for v in (*runs.verdicts, *runs.findings) if v.item in chosen or not chosen]
     few = Counter(v.detail for v in verdicts if v.outcome is Outcome.UNTESTED)

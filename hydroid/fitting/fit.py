@@ -14,14 +14,14 @@ from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.refinement import Checkpoints, Refinement, refine
 from hydroid.fitting.search import Checkpoint, Search, SearchState
 from hydroid.parameters import Array
+from hydroid.posterior.covariance import Uncertainty, uncertainty
+from hydroid.posterior.directions import Identifiability, identifiability
+from hydroid.posterior.quantities import Quantities, quantities
+from hydroid.posterior.sources import Strain, strains
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.quantities.quantities import Quantities, quantities
 from hydroid.search import compromise
 from hydroid.search.pareto import non_dominated
-from hydroid.uncertainty.covariance import Uncertainty, uncertainty
-from hydroid.uncertainty.directions import Identifiability, identifiability
-from hydroid.uncertainty.sources import Strain, strains
 
 _log = logging.getLogger(__name__)
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from hydroid.fitting import search
 from hydroid.parameters import Array
+from hydroid.posterior.noise import prior_weight
+from hydroid.posterior.open_start import with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import start, step
 from hydroid.search.least_squares_state import Ending, State
 from hydroid.settings.search import RefinementSettings
-from hydroid.uncertainty.noise import prior_weight
-from hydroid.uncertainty.open_start import with_open_start
 
 ROUNDS = 4
 """times at most that the noise is estimated, to weigh the logs against the priors"""

@@ -19,8 +19,8 @@ from hydroid.project.fit_files import Names, fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
-from hydroid.reporting.arm_figure import arm_figure
-from hydroid.reporting.style import rendered, style
+from hydroid.report.arm_figure import arm_figure
+from hydroid.report.style import rendered, style
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings

@@ -13,10 +13,10 @@ from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, NamedEstimate, read_estimate
 from hydroid.identified_model import ARM, CONFIG
 from hydroid.parameters import Array, ParameterSet
+from hydroid.posterior.flags import Flag
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import file_hash, other_settings
 from hydroid.settings.fit import FitSettings
-from hydroid.uncertainty.flags import Flag
 
 _log = logging.getLogger(__name__)
 

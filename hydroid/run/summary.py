@@ -4,10 +4,10 @@ import numpy as np
 
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.fit import Fit
+from hydroid.posterior.by_log import by_log
+from hydroid.posterior.covariance import Uncertainty
+from hydroid.posterior.left_out import left_out_errors
 from hydroid.problem.problem import Problem
-from hydroid.uncertainty.by_log import by_log
-from hydroid.uncertainty.covariance import Uncertainty
-from hydroid.uncertainty.left_out import left_out_errors
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:

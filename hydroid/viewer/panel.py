@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hydroid.parameters import Array
-from hydroid.reporting import style
+from hydroid.report import style
 from hydroid.viewer.motion import JointSignals, Motion
 
 MOST_JOINTS = 7

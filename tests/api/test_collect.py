@@ -17,8 +17,8 @@ from hydroid.cli.app import app
 from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.reporting.page_file import write_page
-from hydroid.reporting.spread import final_spread, run_result, spread_page
+from hydroid.report.page_file import write_page
+from hydroid.report.spread import final_spread, run_result, spread_page
 
 SMALL = {
     "search.algorithm": "ga",
@@ -41,7 +41,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory):
     results = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "hydroid.reporting.page_file.write_page", lambda *_: []
+            "hydroid.report.page_file.write_page", lambda *_: []
         )  # figures take longer than all else here
         for seed in SEEDS:
             seeded = load_settings("article-mech", SMALL | {"search.seed": seed})

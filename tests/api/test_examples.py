@@ -48,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         logs = hydroid.read_logs([folder / "a.csv"], settings)
         out = folder / "runs" / "array" / f"seed-{seed}"
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("hydroid.reporting.page_file.write_page", lambda *_: [])  # figures take longest
+            patch.setattr("hydroid.report.page_file.write_page", lambda *_: [])  # figures take longest
             hydroid.fit(settings, logs, out)
     for name in ("a", "mech"):
         (folder / "runs" / name).symlink_to(folder / "runs" / "array" / "seed-1")
@@ -90,5 +90,5 @@ def test_an_example_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr("hydroid.api.stages.load_settings", quick)
     monkeypatch.setattr("hydroid.load_settings", quick)
-    monkeypatch.setattr("hydroid.reporting.page_file.write_page", lambda *_: [])
+    monkeypatch.setattr("hydroid.report.page_file.write_page", lambda *_: [])
     exec(compile(code, name, "exec"), {"hydroid": hydroid})

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hydroid.reporting.page_file import read_page
+from hydroid.report.page_file import read_page
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"

@@ -11,9 +11,9 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.reporting.fit_report import fit_page
-from hydroid.reporting.fit_tables import objective_table, parameter_table
-from hydroid.reporting.phrases import fit_warnings
+from hydroid.report.fit_report import fit_page
+from hydroid.report.fit_tables import objective_table, parameter_table
+from hydroid.report.phrases import fit_warnings
 
 STEPS = 2**16 - 1
 """of a parameter's 16 bits"""

@@ -7,12 +7,12 @@ import numpy as np
 
 import hydroid
 from hydroid.log import Log
+from hydroid.posterior.covariance import Uncertainty, uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
-from hydroid.uncertainty.covariance import Uncertainty, uncertainty
 
 NOISE_DEG = 0.02
 

@@ -9,19 +9,19 @@ from hydroid.fitting.fit import Estimate, Fit
 from hydroid.fitting.refinement import Refinement
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.posterior.covariance import Uncertainty, uncertainty_from
+from hydroid.posterior.delta import precision
+from hydroid.posterior.directions import identifiability
+from hydroid.posterior.jacobian import Jacobian, relative_scale
+from hydroid.posterior.noise import channel_noise
+from hydroid.posterior.quantities import Quantities
 from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.quantities.delta import precision
-from hydroid.quantities.quantities import Quantities
 from hydroid.search.least_squares_state import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
-from hydroid.uncertainty.covariance import Uncertainty, uncertainty_from
-from hydroid.uncertainty.directions import identifiability
-from hydroid.uncertainty.jacobian import Jacobian, relative_scale
-from hydroid.uncertainty.noise import channel_noise
 
 MODEL = {"K": (0.05, 0.5), "D": (50.0, 500.0), "M1": (1.0, 10.0), "M2": (1.5, 12.75)}
 

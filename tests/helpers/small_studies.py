@@ -8,7 +8,7 @@ import yaml
 
 from hydroid import read_logs
 from hydroid.progress import no_progress
-from hydroid.studies.study import StudyRuns, plan_study, run_study
+from hydroid.study.study import StudyRuns, plan_study, run_study
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 

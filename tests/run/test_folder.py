@@ -65,7 +65,7 @@ def made(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def _no_report(monkeypatch):
     """Figures take longer than all else here."""
-    monkeypatch.setattr("hydroid.reporting.page_file.write_page", lambda *_: [])
+    monkeypatch.setattr("hydroid.report.page_file.write_page", lambda *_: [])
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""What to change next: missing terms, residuals, actions, and the next experiment."""

@@ -1,0 +1,134 @@
+"""Score test: does a residual resemble the effect of something that the model lacks?
+
+Let r be the residual of a least-squares fit and d the change of the residual with a quantity that the fit
+holds. What the free parameters can do as well as d, the fit has done already. So d is projected off their
+effects, with the priors as further residuals: d' = d - U' U d with orthonormal rows U. The statistic is the
+score of C. R. Rao (1948), robust to autocorrelated noise of covariance S (H. White, 1982):
+
+    z = -d' r / sqrt(d' S d').
+
+The change of the quantity that would explain most is a = -d' r / |d'|². S is that of the noise which the
+residual shows without what d' explains, r + a d': a term that explains nearly everything is no noise. z then
+follows about Student's t. Where d' and the noise are slow it has few degrees of freedom: the variance d' S d'
+is a sum over frequencies, each of which is known from two numbers of the record. As many degrees count as the
+sum has terms of equal size (F. E. Satterthwaite, 1946), or as the level of an autoregressive noise has, half
+its effective samples; less the one that a took.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import matmul_toeplitz
+from scipy.stats import t as student
+
+from hydroid.parameters import Array
+from hydroid.posterior.covariance import Uncertainty, decompose
+from hydroid.posterior.noise import Noise, channel_noise
+from hydroid.problem.problem import Problem
+
+
+@dataclass(frozen=True)
+class Score:
+    """Statistic of one change of the model.
+
+    Attributes:
+        statistic: z; positive where the change lowers the error.
+        amount: of the change that lowers it most, by the linear approximation.
+        part: of the rms residual that this saves, by the same approximation.
+        strength: the statistic that the whole change would have without noise: what can be seen at all.
+        freedom: degrees of freedom of the statistic.
+    """
+
+    statistic: float
+    amount: float
+    part: float
+    strength: float
+    freedom: float
+
+    def chance(self, *, one_sided: bool) -> float:
+        """Return the probability of such a statistic where the model lacks nothing."""
+        if one_sided:
+            return float(student.sf(self.statistic, self.freedom))
+        return float(2 * student.sf(abs(self.statistic), self.freedom))
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What a fit has explained, and the noise that it has left.
+
+    Attributes:
+        effects: of the free parameters, orthonormal rows of residuals with the priors behind, (k, R + M).
+        residual: of the fit with the priors' weighted scores behind, shape (R + M,).
+        noise_of: the noise of each channel, from a row of residuals, shape (R,).
+        rows: of each channel.
+        prior_weight: standard deviation of a prior's row.
+    """
+
+    effects: Array
+    residual: Array
+    noise_of: Callable[[Array], Sequence[Noise]]
+    rows: Sequence[slice]
+    prior_weight: float
+
+    @staticmethod
+    def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
+        """Return it for an estimate. A parameter at a bound counts as held."""
+        at, channels = uncertainty.jacobian, problem.channels
+        inside = uncertainty.free & [status.at_bound is None for status in uncertainty.status]
+        values, effects = np.empty(0), np.empty((0, at.residual.size + len(problem.priors)))
+        if inside.any():
+            _, values, effects = decompose(inside, at)
+        scores = at.prior_weight * problem.priors.scores(uncertainty.theta[None])[0]
+
+        def noise_of(residual: Array) -> list[Noise]:
+            return [channel_noise(c, residual[c.rows], problem.settings.objective) for c in channels]
+
+        residual = np.concatenate([at.residual, scores])
+        rows = [channel.rows for channel in channels]
+        return Explained(effects[values > 0], residual, noise_of, rows, at.prior_weight)
+
+    def score(self, change: Array, after: Array | None = None) -> Score:
+        """Return the score of a change of the residuals, shape (R,).
+
+        `after`, shape (R,), is the residual of a fit with the change, if one was made; it then is the noise.
+        """
+        row = np.concatenate([change, np.zeros(self.residual.size - change.size)])
+        row -= self.effects.T @ (self.effects @ row)
+        length = float(row @ row)
+        if not length > 0:
+            return Score(0.0, 0.0, 0.0, 0.0, 1.0)
+        gain = -float(row @ self.residual)
+        left = (self.residual + gain / length * row)[: change.size]
+        variance, freedom = self._variance(row, self.noise_of(left if after is None else after))
+        deviation = float(np.sqrt(variance))
+        before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
+        saved = 1.0 - float(np.linalg.norm(left)) / before
+        return Score(gain / deviation, gain / length, saved, length / deviation, freedom)
+
+    def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
+        """Variance of the product of a row, (R + M,), with the residuals, and its degrees of freedom."""
+        samples = sum(part.stop - part.start for part in self.rows)
+        variance, spectra = self.prior_weight**2 * float(np.sum(row[samples:] ** 2)), list[Array]()
+        for process, part in zip(noise, self.rows, strict=True):
+            own = row[part]
+            weighed = matmul_toeplitz(process.autocovariance, own)
+            variance += float(own @ weighed)
+            spectra.append(
+                np.maximum(np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed)), 0.0) / own.size
+            )
+        spectrum = np.concatenate(spectra)
+        terms = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
+        level = 0.5 * sum(process.effective_sample_size for process in noise)
+        return variance, max(max(2 * terms, level) - 1, 1.0)
+
+
+def holm(chances: Sequence[float], level: float) -> NDArray[np.bool_]:
+    """Return which findings hold, any false one with at most a probability `level` (S. Holm, 1979)."""
+    p = np.array(chances, dtype=float)
+    order = np.argsort(p)
+    holds = p[order] <= level / np.arange(len(p), 0, -1)
+    kept = np.zeros(len(p), dtype=bool)
+    kept[order] = np.cumprod(holds, dtype=bool)
+    return kept

@@ -1,1 +1,0 @@
-"""The next experiment: its commands, what it would measure, and how precisely."""

@@ -1,0 +1,1 @@
+"""What the logs say about an estimate: derivatives, noise, covariance, intervals, quantities, bands."""

@@ -1,0 +1,125 @@
+"""Prediction band: where the samples of a log lie if the model is no worse than on the fitted logs.
+
+A predicted angle errs by the uncertainty of the parameters, by the delta method, by the noise of the
+measurement as the fit saw it, and because the start of the log is measured with noise too. Where several logs
+were fitted, each of them is predicted without it (`left_out`): an error beyond that of noise and parameters
+is the model's, as far as the fit can know it. It is known from as many errors as there are logs, hence
+Student's t. What an unseen log shows beyond all this is a further error of the model.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+from scipy.stats import norm as normal
+from scipy.stats import t as student
+
+from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.posterior.covariance import COVERAGE
+from hydroid.posterior.delta import stored_precision
+from hydroid.posterior.open_start import start_deviations
+from hydroid.problem.problem import Problem
+
+MOST_OUTSIDE = 0.1
+"""part of the samples outside the band, above which the model is at fault; 5 % are expected"""
+_END = 0.5 + COVERAGE / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The 95 % prediction band of one joint's angle in one log, and the error that was found.
+
+    Attributes:
+        noise: standard deviation of the fit's noise [rad].
+        half: of the band's width [rad], shape (T,); infinite where the parameters leave the angle open.
+        inside: part of the samples whose error lies within it.
+        error: rms error [rad].
+        expected: rms error that all of this explains [rad].
+        limit: rms error that is larger for 5 % of the logs only, if nothing else is wrong [rad]. Errors of
+            the start and of the parameters are few random numbers for a whole log: far above `expected`.
+    """
+
+    noise: float
+    half: Array
+    inside: float
+    error: float
+    expected: float
+    limit: float
+
+    @property
+    def exists(self) -> bool:
+        """Whether the parameters are known well enough for a band."""
+        return bool(np.isfinite(self.expected))
+
+    @property
+    def model_error(self) -> float:
+        """Rms error that neither noise nor parameters explain [rad]."""
+        return float(np.sqrt(max(self.error**2 - self.expected**2, 0.0)))
+
+    @property
+    def model_limits(self) -> bool:
+        """Whether the model, not the noise, limits the prediction."""
+        return self.inside < 1 - MOST_OUTSIDE and self.error > self.limit
+
+
+def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:
+    """Return the band of each compared joint, numbered from 1, around a response [rad], shape (T, K).
+
+    Empty where the model's values are not those of a fit, which alone knows its covariance and noise.
+    """
+    precision, outputs = stored_precision(model), model.settings.outputs
+    if precision is None or model.summary is None:
+        return {}
+    levels, left_out = model.summary.noise_deg, model.summary.left_out_deg
+    if any(f"q{joint}" not in levels for joint in outputs):
+        return {}
+    problem = Problem(model.settings, [log])
+    angles = precision.propagate(
+        lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1), positive=False
+    )
+    noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
+    start = start_effects(problem, model.theta, noises)
+    parts = precision.parts(angles.slopes).reshape(-1, *response.shape)
+    bands: dict[int, Band] = {}
+    for column, (joint, deviation) in enumerate(
+        zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
+    ):
+        noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
+        begun = np.sum(start[joint] ** 2, axis=0)
+        right, unseen = deviation**2 + noise**2, np.radians(left_out.get(f"q{joint}", ()))
+        wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
+        widened = wrong * float(student.ppf(_END, unseen.size or 1) / normal.ppf(_END)) ** 2
+        half = np.sqrt(precision.quantile**2 * (right + begun) + float(normal.ppf(_END)) ** 2 * widened)
+        inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
+        expected = float(np.mean(right + begun)) + wrong
+        few = np.vstack([parts[:, :, column], start[joint]])
+        shares = np.append(np.linalg.eigvalsh(few @ few.T / few.shape[1]), widened)
+        limit = _limit(expected - wrong + widened, shares)
+        bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(expected)), limit)
+    return bands
+
+
+def _limit(mean: float, shares: Array) -> float:
+    """Root of the mean square error that 5 % of the logs exceed.
+
+    `mean` is its expected value. `shares` of it are the squares of one normal number each; the rest is the
+    mean of many. The sum is about a multiple of chi-square (F. E. Satterthwaite, 1946).
+    """
+    if not np.isfinite(mean):
+        return np.inf
+    freedom = mean**2 / max(float(np.sum(shares**2)), 1e-3 * mean**2)
+    return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
+
+
+def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:
+    """What one standard deviation of each start angle does to each compared angle [rad], (k, T), by joint.
+
+    `levels` [rad] are those of the compared angles' noise, by joint. The problem has one log.
+    """
+    rows = np.zeros((0, len(problem.measured)))
+    for each in problem.start_slopes(theta, everywhere=True):
+        rows = start_deviations(problem.logs[0], each.joints, levels)[:, None] * each.slopes
+    angles = (channel for channel in problem.channels if channel.quantity == "angle")
+    return {channel.joint: rows[:, channel.rows] / channel.weight for channel in angles}

@@ -1,0 +1,81 @@
+"""The prior of open start angles: how well a log's sensor shows where the arm starts.
+
+A start is wrong by the noise of one reading, or of the mean of a few. A residual shows this noise, and the
+error of the model besides. So it is no more than the residual's level, and no more than WORST unless the
+signal itself jumps more between samples. What the start angles may explain then stays small where the model
+errs by degrees. A joint that is not compared has a sensor like the others', and no more noise than its angle
+spreads.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.posterior.noise import channel_noise, prior_weight
+from hydroid.problem.free_start import OpenStart
+from hydroid.problem.problem import Problem
+
+WORST = float(np.radians(0.2))
+"""noise of a joint's sensor above which a residual is the model's error (ours)"""
+UNBOUND = 1e9
+"""weight of a start angle without a prior"""
+
+
+def with_open_start(problem: Problem, theta: Array) -> Problem:
+    """Return the problem whose residuals hold for any start angle that its logs leave open.
+
+    The effect of the start angles, and the noise that their priors follow from, are those at theta, (P,). It
+    is the same problem where all logs show where they start.
+    """
+    if not problem.leaves_start_open:
+        return problem
+    return _opened(problem, tuple(theta.tolist()))
+
+
+@lru_cache(maxsize=1)  # a refinement asks for the same once more
+def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
+    theta = np.array(values)
+    slopes = problem.start_slopes(theta)
+    compared = problem.settings.outputs
+    without_prior = problem.with_open_starts(
+        [each.opened(np.where(np.isin(each.joints, compared), UNBOUND, 0.0)) for each in slopes]
+    )
+    row = without_prior.residuals(theta[None])[0]
+    if not np.isfinite(row).all():
+        return without_prior
+    objective = problem.settings.objective
+    weight = prior_weight(problem.channels, row, objective)
+    opened: list[OpenStart] = []
+    for each in slopes:
+        levels = {
+            channel.joint: channel_noise(channel, row[channel.rows], objective).level / channel.weight
+            for channel in problem.channels
+            if channel.log == each.log and channel.quantity == "angle"
+        }
+        deviations = start_deviations(problem.logs[each.log], each.joints, levels)
+        opened.append(each.opened(deviations / weight))
+    return problem.with_open_starts(opened)
+
+
+def start_deviations(log: Log, joints: Sequence[int], levels: Mapping[int, float]) -> Array:
+    """Return how well a log shows the start angles of some of its joints [rad], shape (k,).
+
+    `levels` [rad] are those of the compared angles' residuals, by joint.
+    """
+    noise = {joint: sensor_noise(log, joint, level) for joint, level in levels.items()}
+    worst = max(noise.values())
+    found = [noise.get(j, min(worst, float(np.std(log.angle[:, j - 1])))) for j in joints]
+    samples = np.array([log.start_samples[joint - 1] for joint in joints])
+    return np.array(found) / np.sqrt(np.maximum(samples, 1.0))
+
+
+def sensor_noise(log: Log, joint: int, level: float) -> float:
+    """Standard deviation of one reading of a joint's angle [rad], no more than `level`.
+
+    The third difference of white noise has 20 times its variance, and that of a motion is next to nothing.
+    """
+    jumps = np.diff(log.angle[:, joint - 1], n=3)
+    return min(level, max(WORST, float(np.sqrt(np.mean(jumps**2) / 20)) if len(jumps) else 0.0))

@@ -1,0 +1,147 @@
+"""The runs of a study: each is a fit of one cell and one seed, and leaves one small file.
+
+A file's name is a digest of all that decides its content: settings, arm, data and versions. So a study that
+was killed goes on where it was, and studies in one folder share the runs that they have in common.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from hydroid.errors import RunError
+from hydroid.estimate import finite
+from hydroid.fitting.fit import fit
+from hydroid.identified_model import IdentifiedModel, portable
+from hydroid.log import Log
+from hydroid.prediction import predict
+from hydroid.problem.problem import Problem
+from hydroid.run.identity import ELSEWHERE, FREE, model_hash
+from hydroid.search.compromise import segment_best
+from hydroid.settings.fit import FitSettings
+from hydroid.study.data import StudyData
+
+Result = dict[str, Any]
+"""what `perform` returns, or {"failed": why}"""
+
+VERSIONS = ("hydroid", "mujoco", "numpy")
+ALGORITHMS = ("ga", "nsga2", "cmaes", "pymoo", "multistart")
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One run: a cell, a seed, the settings with it, the logs, and checks as (name, settings, log)."""
+
+    cell: str
+    seed: int
+    settings: FitSettings
+    logs: tuple[Log, ...]
+    checks: tuple[tuple[str, FitSettings, Log], ...]
+
+    def key(self) -> str:
+        """Return the digest of all that decides the run's result."""
+        checks = [(name, _plain(settings), _samples(log)) for name, settings, log in self.checks]
+        content = {
+            "versions": {name: version(name) for name in VERSIONS},
+            "settings": _plain(self.settings),
+            "model": model_hash(self.settings.arm),
+            "logs": [_samples(log) for log in self.logs],
+            "checks": checks,
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def _plain(settings: FitSettings) -> dict[str, Any]:
+    """Return the settings that decide a result: without threads and without unused searches."""
+    values = portable(settings)
+    for group, name in (key.split(".") for key in FREE):
+        values[group].pop(name, None) if name else values.pop(group)
+    for name in ALGORITHMS:
+        if name != settings.search.algorithm:
+            del values["search"][name]
+    arm = settings.arm.model_dump(mode="json", exclude=set(ELSEWHERE))
+    return values | {"arm": arm}
+
+
+def _samples(log: Log) -> str:
+    return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
+
+
+def perform(task: Task) -> Result:
+    """Fit, and return what tables and figures of a study need, as plain values.
+
+    Angles are in degrees. `history` has generation, simulations and best objective; `segment_bests` are the
+    parameters of the best candidate of each segment, as `theta` are those of the estimate.
+
+    Raises:
+        RunError: every candidate diverged.
+    """
+    problem = Problem(task.settings, task.logs)
+    result = fit(problem, lambda *_: None, _Silent())
+    if not result.best.usable:
+        raise RunError("the estimate diverged when it was simulated")
+    error = problem.residuals(result.best.theta[None])[0]
+    angles = np.degrees(
+        np.concatenate([error[c.rows] / c.weight for c in problem.channels if c.quantity == "angle"])
+    )
+    front, evaluation = result.front
+    bests = front[segment_best(evaluation.segments)]
+    unit = 1.0 if task.settings.objective.relative else 180 / math.pi
+    refined = sum(r.evaluations for r in result.refinements.values())
+    return {
+        "theta": problem.parameters.mapping(result.best.theta),
+        "segment_bests": [problem.parameters.mapping(theta) for theta in bests],
+        "objective": unit * result.best.overall,
+        "largest_deg": float(np.abs(angles).max()),
+        "rms_deg": float(np.sqrt(np.mean(angles**2))),
+        "mean_deg": float(np.abs(angles).mean()),
+        "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
+        "simulations": int(result.history[-1, 2]) + refined,
+        "diverged": int(result.history[-1, 3]),
+        "checks": {name: _check_error(s, log, result.best.theta) for name, s, log in task.checks},
+        "seconds": round(sum(result.seconds.values()), 3),
+    }
+
+
+class _Silent:
+    def generation(self, row: Any) -> None:
+        pass
+
+    def refining(self, simulated: int, rms: float) -> None:
+        pass
+
+
+def _check_error(settings: FitSettings, log: Log, theta: np.ndarray) -> float | None:
+    """Return the mean absolute error on a log [deg]; None where the simulation diverged."""
+    try:
+        angle = predict(IdentifiedModel(settings, theta, "the estimate"), log, settings.outputs)
+    except RunError:
+        return None
+    measured = log.angle[:, [j - 1 for j in settings.outputs]]
+    return float(np.degrees(np.abs(angle - measured)).mean())
+
+
+def make_tasks(cells: Mapping[str, FitSettings], seeds: Iterable[int], data: StudyData) -> list[Task]:
+    """Return all runs of a study, seed by seed."""
+    return [
+        Task(
+            name,
+            seed,
+            _seeded(settings, seed),
+            data.logs,
+            tuple((check, by_cell[name], log) for check, (log, by_cell) in data.checks.items()),
+        )
+        for seed in seeds
+        for name, settings in cells.items()
+    ]
+
+
+def _seeded(settings: FitSettings, seed: int) -> FitSettings:
+    search = settings.search.model_copy(update={"seed": seed})
+    simulation = settings.simulation.model_copy(update={"threads": 1})
+    return settings.model_copy(update={"search": search, "simulation": simulation})

@@ -1,1 +1,0 @@
-"""Uncertainty of an estimate: derivatives, noise, covariance, unidentifiable directions, profiles."""

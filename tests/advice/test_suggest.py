@@ -1,0 +1,206 @@
+"""Suggestions on simulated logs of which the truth is known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid import load_settings
+from hydroid.advice.actions import ActionKind, least_squares_information, next_actions
+from hydroid.advice.missing import Verdict, missing_terms
+from hydroid.advice.residuals import Regressor, residual_checks
+from hydroid.advice.suggest import suggestions
+from hydroid.advice.terms import ExtendedModel, terms
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.posterior.covariance import Uncertainty, uncertainty
+from hydroid.posterior.noise import Noise
+from hydroid.posterior.open_start import with_open_start
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.report.page_file import write_page
+from hydroid.report.suggestion_report import setting_line, suggestion_content, suggestion_page
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.hydraulics import QUANTITIES, SPANS, TARGETS
+from hydroid.settings.problem import ParameterSettings
+
+TRUTH = {"A_A": 1000.0, "A_B": 750.0, "D": 150.0}
+LEVELS = [0.0, 60.0, -40.0, 80.0, -70.0, 30.0, -20.0, 50.0]
+
+
+def make_settings(**hydraulics: float) -> FitSettings:
+    """Stage 2 of the shoulder, areas and damping free."""
+    settings = load_settings("fit-hyd", {f"hydraulics.{name}": v for name, v in hydraulics.items()})
+    quantities = {"A_A": "area_a", "A_B": "area_b", "D": "damping"}
+    free = {
+        name: ParameterSettings(quantity=quantity, joints=(2,), bounds=(0.2 * TRUTH[name], 5 * TRUTH[name]))
+        for name, quantity in quantities.items()
+    }
+    return settings.model_copy(update={"parameters": free})
+
+
+def make_log(settings: FitSettings, noise_deg: float = 0.1) -> Log:
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), LEVELS, joint=2), TRUTH, "truth")
+    noise = np.random.default_rng(1).normal(0.0, np.radians(noise_deg), log.angle.shape)
+    noise[:, np.arange(log.joints) != 1] = 0.0
+    return replace(log, angle=log.angle + noise)
+
+
+def at_truth(truth: FitSettings, model: FitSettings) -> tuple[Problem, Uncertainty]:
+    problem = Problem(model, [make_log(truth)])
+    return problem, uncertainty(problem, problem.parameters.vector(TRUTH, "truth"))
+
+
+@pytest.fixture(scope="module")
+def late() -> tuple[Problem, Uncertainty]:
+    """A model without the delay that its log has."""
+    return at_truth(make_settings(delay=0.03), make_settings())
+
+
+def test_every_quantity_that_is_switched_off_by_default_is_tested():
+    settings = load_settings("fit-hyd")
+    off = [n for n in QUANTITIES if getattr(settings.hydraulics, n, 1.0) in (0.0, None)]
+    tested = {target for name in SPANS for target in TARGETS[name]}
+    # what acts only at a stop (tested below), and what is 0 in nature
+    assert set(off) - tested <= {"trapped_pressure", "vapour_pressure"}
+
+
+def test_oil_that_is_trapped_at_a_stop_is_named():
+    """Three movements off the lower stop, where the oil must first be pressed."""
+    changes = {"leakage": 0.0, "dead_volume": 200.0}
+    truth, model = make_settings(**changes, trapped_pressure=5.0), make_settings(**changes)
+    stopped = np.radians([0, -30, -60, 0, 0, 0, 20])
+    logs = []
+    for seed, level in enumerate((25.0, 50.0, 100.0)):
+        log = simulate_log(truth, step_log(stopped, [level], joint=2), TRUTH, "truth")
+        noise = np.zeros_like(log.angle)
+        noise[:, 1] = np.random.default_rng(seed).normal(0, np.radians(0.05), len(noise))
+        logs.append(replace(log, angle=log.angle + noise))
+    problem = Problem(model, logs)
+    known = uncertainty(problem, problem.parameters.vector(TRUTH, "truth"))
+    (term,) = (t for t in terms(problem, known.theta) if t.settings.quantity == "trapped_pressure")
+    assert term.span[0] == 0.0
+    assert term.begins == term.span[1] > 5.0
+    extended = ExtendedModel(problem, known.theta)
+    opened = with_open_start(problem, known.theta)
+    np.testing.assert_array_equal(extended.residual, opened.residuals(known.theta[None])[0])
+    found = {t.term.settings.quantity: t for t in missing_terms(problem, known).free}
+    assert found["trapped_pressure"].value == pytest.approx(5.0, rel=0.3)
+
+
+def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
+    problem, known = late
+    theta = known.theta
+    names = {term.name for term in terms(problem, theta)}
+    assert {"delay", "delay_a", "delay_b", "overlap", "leakage", "dry_friction", "stiffness"} <= names
+    assert not {"damping", "area_a", "area", "pump_flow"} & names
+    freed = problem.extended({"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))})
+    assert not {"delay", "delay_a"} & {term.name for term in terms(freed, theta)}
+    assert "delay_b" in {term.name for term in terms(freed, theta)}
+    (log,) = problem.logs
+    gauged = replace(log, pressure=np.zeros((*log.angle.shape, 2)))
+    assert "start_pressure" in names
+    assert "start_pressure" not in {term.name for term in terms(Problem(problem.settings, [gauged]), theta)}
+
+
+def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: tuple[Problem, Uncertainty]):
+    problem, known = late
+    model, opened = ExtendedModel(problem, known.theta), with_open_start(problem, known.theta)
+    np.testing.assert_array_equal(model.residual, opened.residuals(known.theta[None])[0])
+    i = [term.name for term in model.terms].index("delay")
+    changed = model.residuals(known.theta[None], [i], [0.03 / 2.0])[0]
+    delayed = Problem(make_settings(delay=0.03), problem.logs).with_open_starts(opened.open_starts)
+    right = delayed.residuals(known.theta[None])[0]
+    np.testing.assert_allclose(changed, right, atol=1e-12)
+
+
+def test_a_limit_that_is_switched_off_changes_by_its_reciprocal(late: tuple[Problem, Uncertainty]):
+    (limit,) = (term for term in terms(late[0], late[1].theta) if term.name == "flow_limit")
+    assert limit.value == np.inf
+    assert limit.at(0.0) == np.inf
+    assert limit.at(0.5) == pytest.approx(2 * limit.span[0])
+
+
+def test_a_missing_delay_is_named_with_its_value_and_a_line_that_frees_it(late: tuple[Problem, Uncertainty]):
+    result = missing_terms(*late)
+    first = result.tests[0]
+    assert (first.term.name, first.verdict) == ("delay", Verdict.FREE)
+    assert first.value == pytest.approx(0.03, rel=0.1)
+    assert np.degrees(first.rms) == pytest.approx(0.1, rel=0.05)
+    assert setting_line(first).startswith("delay: {quantity: delay, joints: [2], bounds: [0, 0.1")
+
+
+def test_nothing_is_named_where_nothing_is_missing():
+    problem, known = at_truth(make_settings(), make_settings())
+    result = missing_terms(problem, known, thorough=False)
+    assert result.free == ()
+    assert result.tests
+
+
+def test_a_residual_that_depends_on_the_command_is_described(late: tuple[Problem, Uncertainty]):
+    problem, known = late
+    error = np.where(problem.logs[0].command[:, 1] > 55.0, 0.004, 0.0)
+    residual = np.random.default_rng(2).normal(0.0, 0.001, len(error)) + error
+    biased = replace(known, jacobian=replace(known.jacobian, residual=residual))
+    (check,) = residual_checks(problem, biased)
+    place = check.binned[Regressor.COMMAND].clearest(check.rms)
+    assert place is not None
+    assert check.binned[Regressor.COMMAND].mean[place] == pytest.approx(0.004, rel=0.1)
+    assert not check.at_stop.any()
+    noise = replace(known, jacobian=replace(known.jacobian, residual=residual - error))
+    (silent,) = residual_checks(problem, noise)
+    assert all(binned.clearest(silent.rms) is None for binned in silent.binned.values())
+
+
+def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: tuple[Problem, Uncertainty]):
+    problem, known = late
+    # two parameters of which only the sum is known well
+    root = np.array([[100.0, 100.0, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 50.0]])
+    difference = {"difference": np.array([1.0, -1.0, 0.0])}
+    actions = next_actions(problem, replace(known, root=root), difference, simulate=False)
+    assert {action.kind for action in actions} == {ActionKind.STATE}
+    assert {action.subject for action in actions} == {"A_A", "A_B"}
+    for action in actions:
+        assert action.known == (1, 3)
+        assert action.parameter in {"A_A", "A_B"} - {action.subject}
+        assert action.deviations[1] == pytest.approx(0.05, rel=0.05)
+        # one up, the other down: twice what one of them is known to
+        assert action.quantity == "difference"
+        np.testing.assert_allclose(action.quantity_deviations, 2 * np.array(action.deviations), rtol=0.03)
+
+
+def test_the_information_of_white_noise_is_fishers_and_of_slow_noise_what_least_squares_gets():
+    rng = np.random.default_rng(3)
+    slopes: Array = rng.normal(size=(3, 400))
+    white = Noise(400, 0.5, np.empty(0))
+    np.testing.assert_allclose(least_squares_information(slopes, white), slopes @ slopes.T / 0.25, rtol=1e-9)
+    slow = Noise(400, 0.5, np.array([-0.8]))
+    bread = np.linalg.inv(slopes @ slopes.T)
+    covariance = bread @ slow.covariance_of(slopes) @ bread
+    np.testing.assert_allclose(np.linalg.inv(least_squares_information(slopes, slow)), covariance, rtol=1e-6)
+
+
+def test_a_perfect_fit_and_one_at_its_bounds_are_tested_too(late: tuple[Problem, Uncertainty]):
+    settings = make_settings()
+    problem = Problem(settings, [make_log(settings, noise_deg=0.0)])
+    known = uncertainty(problem, problem.parameters.vector(TRUTH, "truth"))
+    assert suggestions(problem, known, thorough=False).missing.free == ()
+    held = tuple(replace(status, at_bound="lower") for status in known.status)
+    assert missing_terms(problem, replace(known, status=held), thorough=False).free == ()
+
+
+@pytest.mark.slow
+def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncertainty], tmp_path: Path):
+    problem, known = late
+    result = suggestions(problem, known)
+    kinds = {action.kind for action in result.actions}
+    assert kinds <= set(ActionKind)
+    page = suggestion_page(problem, result, "here")
+    assert "Freeing delay would lower the rms error" in page.lead
+    write_page(page, tmp_path)
+    assert "parameters.delay={quantity: delay" in (tmp_path / "suggestions.html").read_text(encoding="utf-8")
+    content = suggestion_content(result)
+    assert content["missing"][0]["name"] == "delay"
+    assert len(content["actions"]) == len(result.actions)

@@ -1,0 +1,113 @@
+"""The prediction band: it holds its share of a log where the model is right, and says where it is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hydroid
+from hydroid.fitting.validation import error_indices
+from hydroid.log import Log
+from hydroid.posterior.band import Band, prediction_bands, start_effects
+from hydroid.prediction import predict, simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.report.validation_report import Validation, validation_page
+
+TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+CHANGES = {
+    "simulation.other_joints": "locked",
+    **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
+    **{f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name.startswith("M")},
+    "search.algorithm": "ga",
+    "search.ga.generations": 4,
+}
+
+
+def noisy(settings, levels, seed: int, values=TRUTH) -> Log:
+    """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
+    pose, period = settings.arm.pose("study"), 0.01
+    command = np.zeros((100 * len(levels), len(pose)))
+    command[:, 1] = np.repeat(levels, 100)
+    time = period * np.arange(len(command))
+    drive = Log(f"steps{seed}.csv", time, command, np.tile(pose, (len(time), 1)), period)
+    log = simulate_log(settings, drive, values, "test")
+    noise = np.random.default_rng(seed).normal(0, np.deg2rad(0.1), log.angle.shape)
+    noise[0] = 0.0
+    return replace(log, angle=log.angle + noise)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    settings = hydroid.load_settings("article-mech", CHANGES)
+    return settings, hydroid.fit(settings, [noisy(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
+
+
+@pytest.mark.parametrize(("factor", "limits"), [(1.0, False), (1.5, True)])
+def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
+    settings, model = fitted
+    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH | {"S": factor * TRUTH["S"]})
+    response = predict(model, log, settings.outputs)
+    band = prediction_bands(model, log, response)[2]
+    assert band.model_limits is limits
+    assert np.degrees(band.noise) == pytest.approx(0.1, rel=0.15)
+    if not limits:
+        assert band.inside > 0.9
+        # this log's start has no noise, which the fit cannot know
+        start = start_effects(Problem(settings, [log]), model.theta, {2: band.noise})[2]
+        assert band.error**2 == pytest.approx(band.expected**2 - np.sum(start**2) / len(log.time), rel=0.3)
+        assert band.limit > band.expected
+    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
+    page = validation_page([Validation("one", log, response, indices, {2: band})])
+    (verdict,) = page.sections[1].points
+    assert ("is clearly larger than the fitted logs" in verdict) is limits
+
+
+def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
+    settings, model = fitted
+    log, rng = noisy(settings, [-30.0, 50.0], 2), np.random.default_rng(4)
+    off = []
+    for _ in range(60):
+        angle = log.angle.copy()
+        angle[0] += rng.normal(0, np.radians(0.1), angle.shape[1])
+        off.append(predict(model, replace(log, angle=angle), settings.outputs)[:, 0])
+    effects = start_effects(Problem(settings, [log]), model.theta, {2: np.radians(0.1)})[2]
+    variance = np.sum(effects**2, axis=0)
+    np.testing.assert_allclose(np.var(off, axis=0).mean(), variance.mean(), rtol=0.4)
+
+
+def test_values_that_no_fit_gave_have_no_band(fitted):
+    settings, model = fitted
+    log = noisy(settings, [40.0, -40.0], 3)
+    response = predict(model, log, settings.outputs)
+    assert prediction_bands(replace(model, summary=None), log, response) == {}
+    assert prediction_bands(replace(model, theta=1.1 * model.theta), log, response) == {}
+
+
+def test_leaving_out_each_log_predicts_it(fitted):
+    settings, model = fitted
+    logs = [
+        noisy(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
+    ]
+    study = hydroid.validate(model, logs, None, leave_one_out=True)
+    assert len(study.result) == 3
+    for result in study.result:
+        band = result.bands[2]
+        assert 0.5 < band.error / band.expected < 1.2
+    (table,) = [s.tables["folds"] for s in study.page.sections if "folds" in s.tables]
+    spread = [row[-1] for row in table.rows]
+    assert len(spread) == 3
+    assert max(spread) < 5
+    with pytest.raises(hydroid.errors.SettingsError, match="two logs"):
+        hydroid.validate(model, logs[:1], None, leave_one_out=True)
+
+
+def test_without_a_band_nothing_is_called_as_expected(fitted):
+    settings, model = fitted
+    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
+    response = predict(model, log, settings.outputs)
+    band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf, limit=np.inf)
+    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
+    page = validation_page([Validation("one", log, response, indices, {2: band})])
+    assert page.sections[1].points[0].endswith("There is no band: the fit leaves this angle open.")
+    assert page.verdict is not None
+    assert [light.state for light in page.verdict.lights][-1] == "open"

@@ -1,0 +1,134 @@
+"""Covariance by log, and noise that is not white, against statsmodels and arch on linear problems."""
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from arch.bootstrap import CircularBlockBootstrap
+from linear_problem import AR1, DEG, THETA, Linear, ar1, least_squares, slow
+from scipy.stats import t as student
+
+from hydroid.posterior.by_log import by_log
+from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.intervals import bootstrap
+from hydroid.report.by_log_report import by_log_table, by_log_warning
+
+LEVEL = 0.5 * DEG
+
+
+def several(logs, rng, *, alike=False, spread=0.0, samples=400):
+    """Logs of slow signals, and a truth that differs from log to log by a part `spread`."""
+    seeds = [rng.integers(1 << 30)] * logs if alike else rng.integers(1 << 30, size=logs)
+    factors = np.ones(logs) if alike else rng.uniform(0.5, 2.0, logs)
+    columns = np.hstack([f * slow(3, samples, seed=s) for f, s in zip(factors, seeds, strict=True)])
+    truth = THETA[:, None] * (1 + spread * rng.normal(size=(3, logs)))
+    measured = np.sum(np.repeat(truth, samples, axis=1) * columns, axis=0)
+    measured += rng.normal(0, LEVEL, measured.size)
+    problem = Linear(columns, measured, THETA, weights=(1.0,) * logs, noise_deg=0.5)
+    return problem, least_squares(columns, measured), np.repeat(np.arange(logs), samples)
+
+
+def test_logs_that_excite_alike_give_the_cluster_sandwich_of_statsmodels():
+    problem, theta, groups = several(5, np.random.default_rng(1), alike=True, spread=0.02)
+    found = by_log(problem, uncertainty(problem, theta))
+    assert found is not None
+    fit = sm.OLS(problem.measured, problem.columns.T).fit(cov_type="cluster", cov_kwds={"groups": groups})
+    count = len(groups)
+    expected = fit.bse * np.sqrt((count - 3) / (count - 1))  # its correction for the parameters is of samples
+    np.testing.assert_allclose(found.relative * np.abs(theta), expected, rtol=1e-6)
+    np.testing.assert_allclose(found.freedom, 4, rtol=1e-9)
+    half = student.ppf(0.975, 4) * expected
+    np.testing.assert_allclose(found.interval, np.stack([theta - half, theta + half], axis=1), rtol=1e-6)
+
+
+def test_the_spread_is_that_of_refits_without_each_log():
+    """Two draws of the noise differ by what refits say: the expected sum is that of both."""
+    sums, variances = [], []
+    for draw in (2, 3):
+        problem, _, groups = several(4, np.random.default_rng(7))
+        rng = np.random.default_rng(draw)
+        problem.measured = THETA @ problem.columns + rng.normal(0, LEVEL, groups.size)
+        theta = least_squares(problem.columns, problem.measured)
+        kept = [groups != log for log in range(4)]
+        refits = [least_squares(problem.columns[:, k], problem.measured[k]) for k in kept]
+        sums.append(np.sum((np.array(refits) - theta) ** 2, axis=0))
+        found = by_log(problem, uncertainty(problem, theta))
+        assert found is not None
+        variances.append((found.relative * theta) ** 2)
+    np.testing.assert_allclose(variances[0] / variances[1], sums[0] / sums[1], rtol=1e-5)
+
+
+def test_one_log_has_no_spread_and_a_log_alone_leaves_a_parameter_unknown():
+    rng = np.random.default_rng(4)
+    problem, theta, groups = several(3, rng)
+    problem.columns[2, groups > 0] = 0.0  # only the first log shows c
+    found = by_log(problem, uncertainty(problem, theta))
+    assert found is not None
+    assert np.isinf(found.relative[2])
+    assert np.isfinite(found.relative[:2]).all()
+    alone, theta, _ = several(1, rng)
+    assert by_log(alone, uncertainty(alone, theta)) is None
+
+
+@pytest.mark.parametrize("logs", [3, 8])
+def test_intervals_by_log_hold_where_the_logs_differ_and_the_pooled_ones_do_not(logs):
+    rng, hits, pooled, named = np.random.default_rng(5), [], [], []
+    for _ in range(150):
+        problem, theta, _ = several(logs, rng, spread=0.05)
+        known = uncertainty(problem, theta)
+        found = by_log(problem, known)
+        assert found is not None
+        for each, ends in ((hits, found.interval), (pooled, known.interval)):
+            each.append((ends[:, 0] <= THETA) & (ends[:, 1] >= THETA))
+        named.append(bool(found.differing))
+    assert np.mean(hits) > 0.93
+    assert np.mean(pooled) < 0.5
+    assert np.mean(named) > 0.9
+
+
+def test_the_report_names_what_differs_from_log_to_log():
+    problem, theta, _ = several(8, np.random.default_rng(5), spread=0.2)
+    known = uncertainty(problem, theta)
+    found = by_log(problem, known)
+    assert found is not None
+    (warning,) = by_log_warning(found)
+    assert found.differing[0] in warning
+    rows = by_log_table(problem, known, found).rows
+    assert [row[0] for row in rows] == ["a", "b", "c"]
+    assert by_log_warning(None) == ()
+
+
+def test_few_right_models_are_said_to_differ():
+    rng, named = np.random.default_rng(6), 0
+    for _ in range(200):
+        problem, theta, _ = several(4, rng)
+        found = by_log(problem, uncertainty(problem, theta))
+        assert found is not None
+        named += bool(found.differing)
+    assert named <= 18  # 5 % and three standard deviations
+
+
+def slow_noise(samples=6000):
+    columns, rng = slow(3, samples, seed=7), np.random.default_rng(11)
+    measured = THETA @ columns + ar1(rng, samples, AR1, 0.1 * DEG)
+    return Linear(columns, measured, THETA), least_squares(columns, measured)
+
+
+def test_the_sandwich_of_slow_noise_is_that_of_statsmodels():
+    problem, theta = slow_noise(20_000)
+    # Newey and West with a window of twenty correlation times
+    fit = sm.OLS(problem.measured, problem.columns.T).fit(cov_type="HAC", cov_kwds={"maxlags": 300})
+    np.testing.assert_allclose(uncertainty(problem, theta).standard_deviation, fit.bse, rtol=0.2)
+
+
+def test_the_bootstrap_spreads_as_that_of_arch():
+    problem, theta = slow_noise()
+    found = uncertainty(problem, theta)
+    residual = problem.residuals(theta[None])[0]
+    noise = found.noise[0]
+    block = int(10 * noise.correlation_time)
+    scale = noise.level / np.sqrt(np.mean(residual**2))  # what the fit absorbed
+    inverse = np.linalg.pinv(problem.columns.T)
+    draws = CircularBlockBootstrap(block, scale * (residual - residual.mean()), seed=1)
+    theirs = np.array([inverse @ positional[0] for positional, _ in draws.bootstrap(400)])
+    ours = bootstrap(problem, found, 400, 1, lambda *_: None)
+    np.testing.assert_allclose(ours.std(axis=0), theirs.std(axis=0), rtol=0.15)

@@ -1,0 +1,316 @@
+"""Uncertainty by laws: closed forms of linear problems, known noise, how often intervals cover the truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_problem import AR1, DEG, THETA, Linear, ar1, least_squares, slow
+from scipy.linalg import toeplitz
+
+from hydroid.errors import SettingsError
+from hydroid.posterior.covariance import quantile, uncertainty, uncertainty_from
+from hydroid.posterior.flags import Flag, ParameterStatus
+from hydroid.posterior.intervals import THRESHOLD, better_optimum, bootstrap, profile
+from hydroid.posterior.jacobian import jacobian
+from hydroid.posterior.noise import MIN_LEVEL, Noise, channel_noise, fit_noise, unbiased
+from hydroid.posterior.noise_error import STEP, neighbours
+
+
+def flags(found):
+    return [status.flag for status in found.status]
+
+
+def white_problem(**how):
+    columns, rng = slow(3), np.random.default_rng(1)
+    measured = THETA @ columns + rng.normal(0, 0.1 * DEG, columns.shape[1])
+    return Linear(columns, measured, THETA, **how), least_squares(columns, measured)
+
+
+def test_a_given_white_noise_gives_the_textbook_covariance():
+    problem, theta = white_problem(noise_deg=0.2)
+    found = uncertainty(problem, theta)
+    expected = (0.2 * DEG) ** 2 * np.linalg.inv(problem.columns @ problem.columns.T)
+    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-7)
+    outer = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    sign = np.sign(np.outer(theta, theta))  # relative changes of a negative parameter count the other way
+    np.testing.assert_allclose(found.correlation * np.abs(sign), expected / outer, atol=1e-6)
+    assert problem.simulated == 1 + 2 * 3 + 4 * 3  # by each parameter, and one round along the axes
+
+
+def test_the_sandwich_is_right_where_weights_and_noise_do_not_match():
+    weights, levels = (1.0, 5.0), np.array([0.1, 0.4]) * DEG
+    columns, rng = slow(3), np.random.default_rng(2)
+    scatter = np.repeat(levels, 500)
+    problem = Linear(columns, THETA @ columns + rng.normal(0, scatter), THETA, weights=weights)
+    weight = problem.weight
+    bread = np.linalg.inv(columns * weight**2 @ columns.T)
+    expected = bread @ (columns * weight**4 * scatter**2 @ columns.T) @ bread
+    at = jacobian(problem, THETA)
+    noise = tuple(Noise(500, w * s, np.empty(0), "settings") for w, s in zip(weights, levels, strict=True))
+    found = uncertainty_from(problem, THETA, at, noise)
+    np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-6)
+
+
+def test_a_unit_changes_no_relative_deviation():
+    (one, theta), (other, _) = white_problem(), white_problem(unit=1000.0)
+    a, b = uncertainty(one, theta), uncertainty(other, 1000 * theta)
+    np.testing.assert_allclose(a.relative, b.relative, rtol=1e-9)
+    np.testing.assert_allclose(1000 * a.interval, b.interval, rtol=1e-9)
+
+
+def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
+    columns = slow(4)
+    columns[1], columns[2] = 2 * columns[0], 0.0  # a and b trade, c does nothing
+    theta = np.array([1.0, 2.0, 3.0, 4.0])
+    rng = np.random.default_rng(3)
+    problem = Linear(columns, theta @ columns + rng.normal(0, 0.1 * DEG, 1000), theta, noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    assert flags(found) == [Flag.UNIDENTIFIABLE, Flag.UNIDENTIFIABLE, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
+    assert np.isinf(found.interval[:3]).all()
+    pair = columns[[0, 3]]
+    expected = 0.1 * DEG * np.sqrt(np.linalg.inv(pair @ pair.T)[1, 1])
+    assert found.standard_deviation[3] == pytest.approx(expected, rel=1e-6)
+    fixed = Linear(columns, problem.measured, theta, fixed="b", noise_deg=0.1)
+    expected = [Flag.IDENTIFIABLE, Flag.FIXED, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
+    assert flags(uncertainty(fixed, theta)) == expected
+
+
+def test_a_prior_is_one_more_measurement():
+    columns = slow(3)
+    columns[1] = columns[0]
+    theta, rng = np.array([1.0, 2.0, 4.0]), np.random.default_rng(4)
+    measured = theta @ columns + rng.normal(0, 0.1 * DEG, 1000)
+    known = {"sum": {"of": ["a", "c"], "value": 5.0, "sd": 0.05}}
+    problem = Linear(columns, measured, theta, known=known, noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    prior = np.array([[1.0, 0.0, 1.0]]) / 0.05
+    information = columns @ columns.T / (0.1 * DEG) ** 2 + prior.T @ prior
+    # the residual's level, which weighs the prior, is the noise to about 2 %
+    np.testing.assert_allclose(
+        found.standard_deviation, np.sqrt(np.diag(np.linalg.inv(information))), rtol=1e-3
+    )
+    assert flags(found) == [Flag.IDENTIFIABLE] * 3
+    assert flags(uncertainty(Linear(columns, measured, theta), theta))[0] is Flag.UNIDENTIFIABLE
+
+
+def test_a_bound_takes_the_interval():
+    problem, theta = white_problem(noise_deg=0.1)
+    at = theta.copy()
+    at[2] = problem.parameters.upper[2]
+    found = uncertainty(problem, at)
+    assert found.status[2] == ParameterStatus(Flag.IDENTIFIABLE, at_bound="upper")
+    assert np.isnan(found.interval[2]).all()
+    assert np.isfinite(found.interval[:2]).all()
+
+
+def jumping(size):
+    """A linear problem whose response jumps at the estimate, with the estimate."""
+    problem, theta = white_problem()
+    smooth, jump = problem.residuals, size * problem.columns[0]
+    problem.residuals = lambda t: smooth(t) + np.where(t[:, :1] > theta[0], 1.0, 0.0) * jump
+    return problem, theta
+
+
+def test_a_step_is_as_wide_as_the_uncertainty_where_the_response_jumps():
+    problem, theta = jumping(1e-5)
+    smooth, _ = white_problem()
+    expected = uncertainty(smooth, theta).standard_deviation
+    found = uncertainty(problem, theta)
+    np.testing.assert_allclose(found.standard_deviation, expected, rtol=0.1)
+    assert [status.doubt for status in found.status] == [None] * 3
+
+
+def test_parameters_that_trade_have_their_interval_though_the_response_is_rough():
+    """Two nearly equal effects, and a response in steps of 1e-5 rad, as where oil cavitates."""
+    columns, rng = slow(3), np.random.default_rng(4)
+    columns[1] = columns[0] + 1e-2 * slow(1, seed=9)[0]
+    measured = THETA @ columns + rng.normal(0, 0.05 * DEG, columns.shape[1])
+    problem, theta = Linear(columns, measured, THETA), least_squares(columns, measured)
+    expected = uncertainty(problem, theta).standard_deviation
+    smooth = problem.residuals
+    problem.residuals = lambda t: np.round(smooth(t) / 1e-5) * 1e-5
+    np.testing.assert_allclose(uncertainty(problem, theta).standard_deviation, expected, rtol=0.05)
+
+
+def test_an_interval_is_doubted_where_the_response_is_rougher_than_the_noise():
+    problem, theta = white_problem()
+    smooth = problem.residuals
+    problem.residuals = lambda t: np.round(smooth(t) / DEG) * DEG
+    assert any(status.doubt is not None for status in uncertainty(problem, theta).status)
+
+
+def test_derivatives_at_a_bound_stay_inside():
+    problem, theta = white_problem()
+    seen = []
+    inner = problem.residuals
+    problem.residuals = lambda t: (seen.append(t), inner(t))[1]
+    at = theta.copy()
+    at[0], at[2] = problem.parameters.upper[0], problem.parameters.lower[2]
+    found = jacobian(problem, at)
+    points = np.vstack(seen)
+    assert (points <= problem.parameters.upper).all()
+    assert (points >= problem.parameters.lower).all()
+    np.testing.assert_allclose(found.slopes, -problem.columns * np.abs(at)[:, None], atol=1e-8)
+
+
+@pytest.mark.parametrize("reflection", [[], [-AR1], [0.5, -0.3, 0.8]])
+def test_the_autocovariance_and_its_whitening_belong_together(reflection):
+    noise = Noise(60, 2.0, np.array(reflection))
+    covariance = toeplitz(noise.autocovariance)
+    white = noise.whitened(np.eye(60))  # rows L^-1 e_i
+    np.testing.assert_allclose(white @ white.T @ covariance, np.eye(60), atol=1e-9)
+    rows = slow(3, 60)
+    np.testing.assert_allclose(noise.covariance_of(rows), rows @ covariance @ rows.T, rtol=1e-9)
+
+
+def test_a_first_order_process_has_the_textbook_autocovariance():
+    noise = Noise(200, 3.0, np.array([-AR1]))
+    np.testing.assert_allclose(noise.autocovariance, 9 * AR1 ** np.arange(200), rtol=1e-9)
+    assert noise.correlation_time == pytest.approx(15, abs=1)
+    # the variance of the mean of 200 such samples, directly
+    variance = toeplitz(noise.autocovariance).mean()
+    assert noise.effective_sample_size == pytest.approx(9 / variance)
+    assert Noise(200, 3.0, np.empty(0)).effective_sample_size == 200
+
+
+def test_a_known_process_is_found_and_whitened():
+    rng = np.random.default_rng(5)
+    series = ar1(rng, 20_000, AR1, 0.1 * DEG)
+    noise = fit_noise(series)
+    assert 1 <= len(noise.reflection) <= 8
+    assert -noise.reflection[0] == pytest.approx(AR1, abs=0.005)
+    assert noise.level == pytest.approx(0.1 * DEG, rel=0.05)
+    white = noise.whitened(series[None])[0]
+    assert np.mean(white**2) == pytest.approx(1, rel=0.03)
+    lagged = [np.mean(white[k:] * white[:-k]) for k in range(1, 6)]
+    assert np.abs(lagged).max() < 0.03
+    assert len(fit_noise(rng.normal(size=20_000)).reflection) <= 8
+
+
+def test_noise_is_taken_from_settings_residual_or_floor():
+    problem, _ = white_problem()
+    (channel,) = problem.channels
+    how, rng = problem.settings.objective, np.random.default_rng(6)
+    residual = rng.normal(0, 0.3 * DEG, 1000)
+    assert channel_noise(channel, residual, how).source == "residual"
+    quiet = channel_noise(channel, 1e-6 * residual, how)
+    assert (quiet.source, quiet.level) == ("smallest", pytest.approx(MIN_LEVEL["angle"]))
+    assert quiet.correlation_time == 0
+    # a slow residual just below the smallest level stays slow
+    slow_residual = ar1(rng, 1000, AR1, 0.04 * DEG)
+    assert channel_noise(channel, slow_residual, how).correlation_time > 5
+    given = channel_noise(channel, residual, how.model_copy(update={"noise_deg": {2: 0.7}}))
+    assert (given.source, given.level) == ("settings", pytest.approx(0.7 * DEG))
+    weighted = channel_noise(
+        replace(channel, weight=3.0), residual, how.model_copy(update={"noise_deg": 0.7})
+    )
+    assert weighted.level == pytest.approx(2.1 * DEG)
+
+
+def test_what_a_fit_absorbs_comes_back():
+    """Three slow effects take a part of slow noise out of a residual; the corrected process has it again."""
+    samples, phi = 4000, np.exp(-0.01 / 0.5)  # eighty correlation times
+    effects = np.linalg.svd(slow(3, samples, seed=3), full_matrices=False)[2]
+    rng, raw, restored = np.random.default_rng(4), [], []
+    for _ in range(100):
+        noise = ar1(rng, samples, phi, 0.1 * DEG)
+        process = fit_noise(noise - effects.T @ (effects @ noise))
+        raw.append(process.covariance_of(effects).trace())
+        process = unbiased(process, effects, process.covariance_of(effects))
+        restored.append(process.covariance_of(effects).trace())
+    true = Noise(samples, 0.1 * DEG, np.array([-phi])).covariance_of(effects).trace()
+    assert np.mean(raw) < 0.95 * true
+    assert np.mean(restored) == pytest.approx(true, rel=0.1)
+
+
+def test_the_errors_of_a_process_are_those_of_its_estimates():
+    """Variances that follow from estimated processes scatter as the delta method says."""
+    samples, rng, rows = 4000, np.random.default_rng(5), slow(2, 4000)
+    true = Noise(samples, 1.0, np.array([-AR1]))
+    seen = [fit_noise(ar1(rng, samples, AR1, 1.0), 1).covariance_of(rows).diagonal() for _ in range(400)]
+    base = true.covariance_of(rows).diagonal()
+    moved = [(other.covariance_of(rows).diagonal() / base - 1) / STEP for other in neighbours(true)]
+    expected = np.sqrt(np.sum(np.square(moved), axis=0))
+    np.testing.assert_allclose(np.std(np.log(seen), axis=0), expected, rtol=0.1)
+    assert neighbours(replace(true, source="settings")) == []
+
+
+def test_the_quantile_covers_an_estimate_whose_variance_is_log_normal():
+    rng = np.random.default_rng(6)
+    estimates = rng.normal(size=200_000)
+    assert quantile(0.0) == pytest.approx(1.95996, abs=1e-4)
+    for spread in (0.3, 1.0, 2.0):
+        deviation = np.exp(spread * rng.normal(size=estimates.size) / 2)
+        assert np.mean(np.abs(estimates) <= quantile(spread) * deviation) == pytest.approx(0.95, abs=0.002)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("phi", [0.0, AR1, float(np.exp(-0.01 / 4.0))])
+def test_intervals_cover_the_truth_as_often_as_they_say(phi):
+    """400 linear fits, noise estimated from the residual each time; a binomial 95 % is 0.93 to 0.97."""
+    samples = 1500 if phi <= AR1 else 7500  # nineteen correlation times of the slowest noise
+    columns, hits, rng = slow(3, samples, seed=7), [], np.random.default_rng(8)
+    deviations, estimates = [], []
+    for _ in range(400):
+        measured = THETA @ columns + ar1(rng, samples, phi, 0.1 * DEG)
+        theta = least_squares(columns, measured)
+        found = uncertainty(Linear(columns, measured, THETA), theta)
+        hits.append((found.interval[:, 0] <= THETA) & (found.interval[:, 1] >= THETA))
+        deviations.append(found.standard_deviation)
+        estimates.append(theta)
+    cover = np.mean(hits, axis=0)
+    assert (cover > 0.92).all(), cover
+    assert (cover < 0.985).all(), cover
+    np.testing.assert_allclose(np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1)
+
+
+def test_the_profile_of_a_linear_problem_is_its_parabola():
+    problem, theta = white_problem(noise_deg=0.1)
+    found = uncertainty(problem, theta)
+    one = profile(problem, found, "b")
+    deviation = found.standard_deviation[1]
+    np.testing.assert_allclose(one.deviance, ((one.values - theta[1]) / deviation) ** 2, atol=2e-3)
+    # half a standard deviation a step, until beyond the interval
+    np.testing.assert_allclose(one.values, theta[1] + np.arange(-4, 4.5) / 2 * deviation)
+    assert not one.better_optimum
+    half = np.sqrt(THRESHOLD) * deviation
+    np.testing.assert_allclose(one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4)
+    with pytest.raises(SettingsError, match="no free parameter 'z'"):
+        profile(problem, found, "z")
+
+
+def test_the_profile_of_an_unidentifiable_parameter_is_unlimited():
+    columns = slow(3)
+    columns[1] = columns[0]
+    problem = Linear(columns, THETA @ columns + np.random.default_rng(0).normal(0, DEG, 1000), THETA)
+    found = uncertainty(problem, THETA)
+    assert profile(problem, found, "a").interval == (-np.inf, np.inf)
+
+
+def test_a_profile_from_no_optimum_finds_the_better_one():
+    problem, theta = white_problem(noise_deg=0.1)
+    deviation = uncertainty(problem, theta).standard_deviation[1]
+    off = theta + np.array([0.0, 2 * deviation, 0.0])
+    found = profile(problem, uncertainty(problem, off), "b")
+    assert found.better_optimum
+    np.testing.assert_allclose(found.lowest, theta, atol=0.3 * deviation)
+    cost = np.sum(problem.residuals(np.stack([off, found.lowest])) ** 2, axis=1)
+    assert cost[1] < cost[0]
+    assert better_optimum(problem, uncertainty(problem, off), [found], None) is found.lowest
+    at = uncertainty(problem, theta)
+    assert better_optimum(problem, at, [profile(problem, at, "b")], theta[None]) is None
+
+
+@pytest.mark.parametrize("phi", [0.0, AR1])
+def test_the_bootstrap_spreads_as_the_linear_covariance(phi):
+    columns, rng = slow(3, 6000, seed=7), np.random.default_rng(11)
+    measured = THETA @ columns + ar1(rng, 6000, phi, 0.1 * DEG)
+    theta = least_squares(columns, measured)
+    problem = Linear(columns, measured, THETA)
+    found = uncertainty(problem, theta)
+    drawn = bootstrap(problem, found, 400, 1, lambda *_: None)
+    assert drawn.shape == (400, 3)
+    # blocks of finite length miss a part of slow noise, the more the longer it lasts
+    np.testing.assert_allclose(drawn.std(axis=0), found.standard_deviation, rtol=0.1 if phi == 0 else 0.25)
+    np.testing.assert_allclose(drawn.mean(axis=0), theta, atol=3 * found.standard_deviation.max())
+    np.testing.assert_array_equal(drawn, bootstrap(problem, found, 400, 1, lambda *_: None))

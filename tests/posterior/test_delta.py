@@ -1,0 +1,98 @@
+"""The delta method against closed forms: linear quantities, ratios, directions that nothing measures."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from hydroid.parameters import Parameter, ParameterSet
+from hydroid.posterior.delta import Precision
+
+THETA = np.array([2.0, 5.0, 0.1])
+COVARIANCE = np.array([[0.04, 0.03, 0.0], [0.03, 0.09, -0.01], [0.0, -0.01, 0.01]])  # of relative changes
+Z = float(norm.ppf(0.975))
+
+
+def precision(root: np.ndarray, fixed: tuple[str, ...] = ()) -> Precision:
+    parameters = ParameterSet(
+        tuple(
+            Parameter(name, "kg", 0.01 * value, 100 * value, value if name in fixed else None)
+            for name, value in zip("abc", THETA.tolist(), strict=True)
+        )
+    )
+    return Precision(parameters, THETA, np.abs(THETA), root, Z)
+
+
+def known(covariance: np.ndarray = COVARIANCE, **how) -> Precision:
+    return precision(np.linalg.cholesky(np.linalg.inv(covariance)).T, **how)
+
+
+def test_the_interval_of_a_linear_quantity_is_the_textbooks():
+    weights = np.array([[3.0, -1.0, 10.0], [0.0, 2.0, 0.0]]).T
+    found = known().propagate(lambda theta: theta @ weights, positive=False)
+    slopes = weights * THETA[:, None]
+    sd = np.sqrt(np.diag(slopes.T @ COVARIANCE @ slopes))
+    np.testing.assert_allclose(found.sd, sd, rtol=1e-9)
+    np.testing.assert_allclose(found.interval, np.stack([found.value - Z * sd, found.value + Z * sd], 1))
+
+
+def test_a_ratio_has_a_multiplicative_interval_that_its_inverse_shares():
+    def ratios(theta: np.ndarray) -> np.ndarray:
+        return np.stack([theta[:, 0] / theta[:, 1], theta[:, 1] / theta[:, 0]], axis=1)
+
+    found = known().propagate(ratios, positive=True)
+    sd = np.sqrt(COVARIANCE[0, 0] + COVARIANCE[1, 1] - 2 * COVARIANCE[0, 1])
+    np.testing.assert_allclose(found.interval[0], 0.4 * np.exp([-Z * sd, Z * sd]), rtol=1e-3)
+    np.testing.assert_allclose(found.interval[0], 1 / found.interval[1, ::-1], rtol=1e-3)
+
+
+def test_only_the_direction_that_nothing_measures_makes_a_quantity_unknown():
+    root = np.array([[20.0, -20.0, 0.0], [0.0, 0.0, 10.0], [0.0, 0.0, 0.0]])  # a and b may grow together
+
+    def quantities(theta: np.ndarray) -> np.ndarray:
+        a, b, c = theta.T
+        return np.stack([a / b, a, b, c, a * c / b, a * b], axis=1)
+
+    found = precision(root).propagate(quantities, positive=True)
+    assert np.isfinite(found.sd).tolist() == [True, False, False, True, True, False]
+    np.testing.assert_allclose(found.sd[0], found.value[0] / 20, rtol=1e-5)
+    assert found.interval[1].tolist() == [0.0, np.inf]
+    signed = precision(root).propagate(quantities, positive=False)
+    assert signed.interval[1].tolist() == [-np.inf, np.inf]
+
+
+def test_a_first_order_interval_wider_than_the_value_says_nothing():
+    wide = known(np.diag([1.1, 0.9, 0.01]) ** 2).propagate(lambda theta: theta, positive=True)
+    assert np.isfinite(wide.sd).tolist() == [False, True, True]
+    assert wide.interval[0].tolist() == [0.0, np.inf]
+
+
+def test_a_quantity_that_no_free_parameter_changes_is_given():
+    held = known(COVARIANCE[1:, 1:], fixed=("a",))
+    found = held.propagate(lambda theta: theta, positive=True)
+    assert found.given.tolist() == [True, False, False]
+    concerned = held.propagate(lambda theta: theta, True, np.array([True, True, False]))
+    assert concerned.given.tolist() == [True, False, True]
+    np.testing.assert_allclose(concerned.interval[1], found.interval[1])
+
+
+def test_a_quantity_that_does_not_exist_leaves_the_others_alone():
+    found = known().propagate(lambda theta: np.stack([theta[:, 0], np.full(len(theta), np.nan)], 1), True)
+    assert np.isfinite(found.interval[0]).all()
+    assert np.isnan(found.value[1])
+    assert not np.isfinite(found.interval[1]).any()
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_derivative_at_a_bound_looks_inwards(side: str):
+    at = known()
+    bound = THETA[0]
+    limits = (bound, 10 * bound) if side == "lower" else (0.1 * bound, bound)
+    first = Parameter("a", "kg", *limits)
+    inside = Precision(ParameterSet((first, *at.parameters.parameters[1:])), THETA, at.scale, at.root, Z)
+
+    def refuses(theta: np.ndarray) -> np.ndarray:
+        assert np.all((theta[:, 0] >= limits[0]) & (theta[:, 0] <= limits[1]))
+        return theta[:, :1] ** 2
+
+    found = inside.propagate(refuses, positive=True)
+    np.testing.assert_allclose(found.sd, 2 * THETA[0] ** 2 * np.sqrt(COVARIANCE[0, 0]), rtol=1e-6)

@@ -1,0 +1,161 @@
+"""The directions that the article's protocol leaves open are found and named, and pins close them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid import load_settings
+from hydroid.hydraulics.solenoid import force_curve
+from hydroid.posterior.covariance import Uncertainty, uncertainty
+from hydroid.posterior.directions import Identifiability, identifiability
+from hydroid.posterior.flags import WEAK_ABOVE, Flag, Source
+from hydroid.posterior.patterns import DirectionKind
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+
+MECH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+HYD = {"A_A": 1e3, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
+COIL = {"F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0}
+QUIET = {"objective.noise_deg": 0.01}  # so that ten seconds determine what is not exactly open
+OPEN = {f"parameters.{name}.fixed": None for name in ("F1", "x1", "x2")}
+LEVELS = [60.0, -80.0, 30.0, 0.0, -40.0, 70.0, -60.0, 20.0]
+
+
+def look(config: str, truth: dict[str, float], **changes) -> tuple[Problem, Uncertainty, Identifiability]:
+    """The article's protocol, ten seconds of it: joint 2 driven and measured with 0.1 deg of noise."""
+    settings = load_settings(config, changes)
+    levels = LEVELS if config == "article-mech" else [0.4 * level for level in LEVELS]
+    log = simulate_log(settings, step_log(settings.arm.pose("study"), levels, 1.25), truth, "truth")
+    noise = np.random.default_rng(0).normal(0, np.deg2rad(0.1), log.angle.shape)
+    noise[0] = 0
+    problem = Problem(settings, [replace(log, angle=log.angle + noise)])
+    told = uncertainty(problem, problem.parameters.vector(truth, "truth"))
+    return problem, told, identifiability(problem, told)
+
+
+def flags_of(problem: Problem, told: Uncertainty) -> dict[str, Flag]:
+    return {n: s.flag for n, s in zip(problem.parameters.names, told.status, strict=True)}
+
+
+@pytest.fixture(scope="module")
+def mech():
+    return look("article-mech", MECH)
+
+
+@pytest.fixture(scope="module")
+def hyd():
+    return look("article-hyd", HYD | COIL, **QUIET, **OPEN)
+
+
+def test_m1_has_no_effect_and_one_scale_of_all_is_open(mech):
+    problem, told, found = mech
+    first, *others = found.unidentifiable
+    assert (first.kind, list(first.parameters)) == (DirectionKind.NO_EFFECT, ["M1"])
+    direction = next(d for d in others if d.kind is DirectionKind.COMMON_SCALE)
+    assert list(direction.parameters) == ["K", "D", "S", "M2", "M3", "M4", "M5", "M6"]
+    assert direction.flag is Flag.UNIDENTIFIABLE
+    # but for the known jaws K, D and S scale by one factor, and so does the one mass that dwarfs the jaws
+    (scale,) = direction.changes
+    np.testing.assert_allclose(scale[:3] / scale[0], 1.0, atol=0.02)
+    assert flags_of(problem, told)["M1"] is Flag.NO_EFFECT
+    assert flags_of(problem, told)["K"] is Flag.UNIDENTIFIABLE
+    assert np.isinf(told.interval[problem.parameters.names.index("K")]).all()
+    assert 3 <= found.rank <= 5
+    assert sum(len(direction.changes) for direction in found.unidentifiable) == 9 - found.rank
+    assert found.singular[-1] == 0  # M1, exactly
+    assert found.singular[-2] > 0
+
+
+def test_directions_belong_to_the_singular_values(mech):
+    _, told, found = mech
+    assert (np.diff(found.singular) <= 0).all()
+    np.testing.assert_allclose(np.linalg.norm(told.root @ found.axes.T, axis=0), found.singular, atol=1e-9)
+    np.testing.assert_allclose(found.axes @ found.axes.T, np.eye(9), atol=1e-9)
+    for direction in found.unidentifiable:
+        felt = np.linalg.norm(told.root @ direction.changes.T, axis=0)
+        assert (felt < 1 / WEAK_ABOVE).all()
+        np.testing.assert_allclose(direction.changes.max(axis=1), 1)
+
+
+def test_effects_are_what_one_per_cent_does(mech):
+    problem, told, _ = mech
+    truth = problem.parameters.vector(MECH, "truth")
+    more = truth * np.where(np.arange(9) == 0, 1.01, 1.0)
+    change = np.diff(problem.residuals(np.vstack([truth, more])), axis=0)
+    assert told.jacobian.effects[0] == pytest.approx(np.sqrt(np.mean(change**2)), rel=0.02)
+
+
+def test_pins_close_directions_one_by_one(mech):
+    _, _, free = mech
+    held = {f"parameters.{name}.fixed": MECH[name] for name in MECH if name[0] == "M"}
+    problem, told, found = look("article-mech", MECH, **held)
+    assert found.rank == 3
+    assert not found.unidentifiable
+    assert set(flags_of(problem, told).values()) == {Flag.IDENTIFIABLE, Flag.FIXED}
+    inside = told.interval[:3] / np.array([0.2, 231.8, 53.4])[:, None]
+    assert (np.abs(inside - 1) < WEAK_ABOVE * 2.1).all()
+    # a plausible value of each mass instead, to 5 %: K, D, S are known about as well as the masses
+    priors = {
+        name: {"of": name, "value": MECH[name], "sd": 0.05 * MECH[name]} for name in MECH if name[0] == "M"
+    }
+    problem, told, found = look("article-mech", MECH, priors=priors)
+    assert found.rank == 9 > free.rank
+    sources = {n: s.source for n, s in zip(problem.parameters.names, told.status, strict=True)}
+    assert flags_of(problem, told)["M1"] is Flag.NO_EFFECT
+    assert sources["M1"] is sources["M4"] is Source.PRIOR
+    assert sources["K"] is Source.DATA  # it has no prior of its own
+    deviation = dict(zip(problem.parameters.names, told.relative, strict=True))
+    assert deviation["M1"] == pytest.approx(0.05, rel=0.02)  # its prior, and nothing else
+    assert deviation["K"] < 0.05
+    assert deviation["M3"] < 0.05
+
+
+def test_the_three_null_directions_of_the_hydraulics_are_named_with_their_values(hyd):
+    problem, told, found = hyd
+    assert list(found.singular[-3:]) == [0.0, 0.0, 0.0]
+    assert found.singular[-4] > 0
+    coil, currents = found.unidentifiable[:2]
+    assert (coil.kind, [*coil.parameters], len(coil.changes)) == (DirectionKind.SOLENOID, [*COIL], 2)
+    assert currents.kind is DirectionKind.CURRENT_SCALE
+    assert list(currents.parameters) == [*COIL, "I_max", "I_min"]
+    assert coil.flag is currents.flag is Flag.UNIDENTIFIABLE
+    numbers = {"delta": 3.9, "k_i0": 177.0, "k_imax": 177.0, "k_imin": 19.7}  # [mm], [N mm²]
+    assert coil.numbers == currents.numbers == pytest.approx(numbers, rel=0.01)
+    flags = flags_of(problem, told)
+    assert {n for n, f in flags.items() if f is Flag.UNIDENTIFIABLE} == {"I_max", "I_min", *COIL}
+    # moved along what was found, the solenoid's two numbers stay
+    names = found.names
+    start = np.array([COIL[n] for n in COIL])
+    at = [names.index(n) for n in COIL]
+    for change in coil.changes:
+        values = [force_curve(*(start * (1 + step * change[at])), 0.9) for step in (1e-4, -1e-4)]
+        for high, low in zip(*values, strict=True):
+            assert high == pytest.approx(low, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pins", "open_"),
+    [
+        ({"parameters.F1.fixed": None}, {"I_max", "I_min", "F1", "F2"}),
+        ({}, set()),
+        (OPEN | {"parameters.I_max.fixed": 0.9}, {"F1", "F2", "x1", "x2"}),
+        (OPEN | {"priors": {"rated": {"of": "I_max", "value": 0.9, "sd": 0.009}}}, {"F1", "F2", "x1", "x2"}),
+    ],
+)
+def test_pins_close_the_hydraulic_directions(pins, open_):
+    problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **pins)
+    known = zip(problem.parameters.names, told.status, strict=True)
+    assert {n for n, s in known if s.flag is Flag.UNIDENTIFIABLE and s.source is not Source.PRIOR} == open_
+    assert bool(open_) == any(direction.flag is Flag.UNIDENTIFIABLE for direction in found.unidentifiable)
+
+
+def test_a_parameter_that_drowns_in_the_noise_by_itself_is_named_so():
+    held = {f"parameters.{name}.fixed": value for name, value in MECH.items() if name not in ("K", "M4")}
+    _, told, found = look("article-mech", MECH, **held, **{"objective.noise_deg": 300.0})
+    assert [(d.kind, list(d.parameters)) for d in found.unidentifiable] == [
+        (DirectionKind.SINGLE, ["K"]),
+        (DirectionKind.SINGLE, ["M4"]),
+    ]
+    assert told.noise[0].source == "settings"

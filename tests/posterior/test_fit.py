@@ -1,0 +1,107 @@
+"""What a fit states of its quantities, keeps in its folder, and gives back."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import step_log
+
+import hydroid
+from hydroid import load_settings
+from hydroid.api.fit import FitResult
+from hydroid.errors import RunError
+from hydroid.estimate import read_estimate
+from hydroid.posterior.delta import stored_precision
+from hydroid.prediction import simulate_log
+from hydroid.report.quantities_report import best_known, curves_csv, quantity_table
+
+TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
+FIXED = {"I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
+SMALL = {
+    **{f"parameters.{name}.fixed": value for name, value in FIXED.items()},
+    "search.algorithm": "ga",
+    "search.ga": {"population": 6, "generations": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
+    """A small fit of stage 2 to six simulated seconds with noise."""
+    settings = load_settings("article-hyd", SMALL)
+    steps = step_log(settings.arm.pose("study"), [0.0, 60.0, -40.0, 90.0, -80.0, 30.0])
+    clean = simulate_log(settings, steps, TRUTH | FIXED, "truth")
+    noise = np.random.default_rng(0).normal(0, np.deg2rad(0.05), clean.angle.shape)
+    log = replace(clean, angle=clean.angle + noise)
+    return hydroid.fit(settings, log, tmp_path_factory.mktemp("fit") / "run")
+
+
+def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fitted):
+    summary = fitted.summary
+    assert read_estimate(fitted.folder / "estimate.yaml") == summary
+    json.dumps(summary.plain(), allow_nan=False)
+    ratio = summary.quantities["joint2_area_ratio"]
+    values = summary.values
+    assert ratio.value == pytest.approx(values["A_A"] / values["A_B"])
+    assert ratio.interval[0] < ratio.value < ratio.interval[1]
+    speed = summary.curves["joint2_speed"]
+    assert len(speed.at) == len(speed.value) == len(speed.interval)
+    at_50 = dict(zip(speed.at, speed.value, strict=True))[50.0]
+    assert summary.quantities["joint2_speed_50_positive"].value == pytest.approx(at_50)
+
+
+def test_what_no_free_parameter_changes_is_not_stated(fitted):
+    assert not any("gravity" in name for name in fitted.summary.quantities)  # all masses are fixed
+
+
+def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
+    model = hydroid.load_identified(fitted.folder)
+    kept = stored_precision(model)
+    i, j = (model.settings.parameter_set().names.index(name) for name in ("A_A", "A_B"))
+    found = kept.propagate(lambda theta: theta[:, [i]] / theta[:, [j]], positive=True)
+    np.testing.assert_allclose(
+        found.interval[0], fitted.summary.quantities["joint2_area_ratio"].interval, rtol=1e-5
+    )
+
+
+def test_other_values_or_free_parameters_are_not_the_fits(fitted):
+    changed = hydroid.load_identified(fitted.folder, overrides={"parameters.A_A.fixed": 900})
+    assert stored_precision(changed) is None
+    with pytest.raises(RunError, match="holds no covariance of these parameters"):
+        hydroid.quantity(changed, lambda plant: plant.time)
+    moved = replace(fitted.model, theta=1.01 * fitted.model.theta)
+    assert stored_precision(moved) is None
+
+
+def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):
+    def speeds(plant: hydroid.Plant) -> np.ndarray:
+        plant.reset("study")
+        angle = np.array([plant.step([0, 50, 0, 0, 0, 0, 0]) for _ in range(40)])
+        return np.degrees(np.diff(angle[[0, 20, 39], 1])).reshape(2, 1)
+
+    found = hydroid.quantity(fitted.folder, speeds, unit="deg")
+    assert found.value.shape == found.sd.shape == (2, 1)
+    assert found.interval.shape == (2, 1, 2)
+    assert np.all((found.interval[..., 0] < found.value) & (found.value < found.interval[..., 1]))
+    hydroid.load_plant(fitted.folder).save(tmp_path / "plant")
+    saved = hydroid.quantity(tmp_path / "plant", speeds)
+    np.testing.assert_array_equal(saved.interval, found.interval)
+
+
+def test_the_report_tells_the_best_known_and_names_what_is_not(fitted):
+    quantities = fitted.fit.quantities
+    table = quantity_table(quantities)
+    labels = [row[1] for row in table.rows]
+    heading, *lines = best_known(quantities)
+    assert "95 %" in heading
+    assert 3 <= len(lines) <= 6
+    assert all(any(label in line for label in labels) for line in lines)
+    rows = curves_csv(quantities.curves).splitlines()
+    assert len(rows) == 1 + sum(len(curve.at) for curve in quantities.curves.values())
+
+
+def test_the_curves_of_an_identified_actuator_have_bands(fitted, tmp_path):
+    files = hydroid.plot_actuator(fitted.folder, 2, tmp_path)
+    assert "Bands: 95 % intervals" in files[-1].read_text(encoding="utf-8")
+    nominal = hydroid.load_identified(None, "fit-hyd", nominal=True)
+    assert "Bands" not in hydroid.plot_actuator(nominal, 2, tmp_path)[-1].read_text(encoding="utf-8")

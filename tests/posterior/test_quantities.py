@@ -1,0 +1,177 @@
+"""Quantities of an arm by laws: ratios, gravity, symmetry, the plant, analytic dead bands, delays."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import step_log
+
+from hydroid import load_settings
+from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.plant import Plant
+from hydroid.posterior.bench import Bench, make_bench
+from hydroid.posterior.quantities import joint_measure
+from hydroid.posterior.statics import actuator
+from hydroid.problem.stage import Stage
+from hydroid.simulation import Candidates
+
+TRUE = {"A_A": 1000, "A_B": 750, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2, "F2": 0.7, "x2": 12}
+MECHANICAL = {"K": 0.2, "D": 231.8, "S": 53.4}
+MECHANICAL |= {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:
+    springs = {"parameters.S.fixed": 0.0} if stage == "hyd" else {}
+    settings = load_settings(f"article-{stage}", springs | changes)
+    return identified(settings, TRUE if stage == "hyd" else MECHANICAL, "test")
+
+
+def shoulder_bench(one: IdentifiedModel, joint: int = 2) -> tuple[Bench, Candidates]:
+    log = step_log(one.settings.arm.pose("study"), [50.0], joint=joint)
+    log.angle[-1, joint - 1] += 0.6  # the travel
+    return make_bench(one.settings, [log], joint), Stage(one.settings).candidates(one.theta[None])
+
+
+def measured(bench: Bench, estimate: Candidates) -> dict[str, list[float]]:
+    """All quantities of one candidate by name; curves in the order of their points."""
+    found: dict[str, list[float]] = {}
+    for column, value in sorted(joint_measure(bench, estimate)(estimate), key=lambda pair: pair[0].at):
+        found.setdefault(column.name, []).append(float(value[0]))
+    return found
+
+
+@pytest.fixture(scope="module")
+def shoulder() -> tuple[IdentifiedModel, Bench, Candidates, dict[str, list[float]]]:
+    one = model()
+    bench, estimate = shoulder_bench(one)
+    return one, bench, estimate, measured(bench, estimate)
+
+
+def test_the_ratio_of_areas_is_exact(shoulder):
+    assert shoulder[3]["joint2_area_ratio"] == [pytest.approx(1000 / 750, rel=1e-12)]
+
+
+def test_gravity_torque_is_what_mujoco_needs_to_hold_the_whole_arm(shoulder):
+    one, bench, estimate, found = shoulder
+    arm = one.settings.arm
+    whole = mujoco.MjModel.from_xml_path(str(arm.model))
+    for link, mass in zip(arm.link_names, estimate.mass[0], strict=True):
+        body = whole.body(link)
+        body.inertia[:] *= mass / body.mass[0]
+        body.mass[0] = mass
+    data = mujoco.MjData(whole)
+    angles = np.linspace(*bench.travel, len(found["joint2_gravity_torque"]))
+    for angle, torque in zip(angles, found["joint2_gravity_torque"], strict=True):
+        data.qpos[:] = arm.pose("study")
+        data.qpos[1] = angle
+        mujoco.mj_inverse(whole, data)
+        assert torque == pytest.approx(data.qfrc_inverse[1], rel=1e-6)
+
+
+def test_a_speed_is_that_of_the_plant_when_it_passes_the_pose(shoulder):
+    one, bench, _, found = shoulder
+    plant = Plant(one, joints=[2])
+    for sign, name in ((1.0, "positive"), (-1.0, "negative")):
+        pose = one.settings.arm.pose("study")
+        pose[1] = bench.angle - sign * np.radians(8.0)
+        plant.reset(pose)
+        angle = [plant.step([0, sign * 50.0, 0, 0, 0, 0, 0])[1] for _ in range(200)]
+        speed = sign * np.degrees(np.gradient(angle, 0.01))
+        passes = (
+            np.interp(bench.angle, angle, speed)
+            if sign > 0
+            else np.interp(-bench.angle, -np.array(angle), speed)
+        )
+        assert found[f"joint2_speed_50_{name}"] == [pytest.approx(passes, rel=0.02)]
+
+
+def test_a_symmetric_actuator_without_gravity_moves_alike_both_ways():
+    one = model(**{"hydraulics.onset_b": 1.4})
+    bench, estimate = shoulder_bench(one, joint=6)  # rotary: no moment arm that changes with the angle
+    bench.scenario.arm.model.opt.gravity[:] = 0.0
+    found = measured(bench, estimate)
+    speed = np.array(found["joint6_speed"])
+    np.testing.assert_allclose(speed, -speed[::-1], rtol=1e-6)
+    assert found["joint6_dead_time_positive"] == pytest.approx(found["joint6_dead_time_negative"], rel=1e-6)
+
+
+def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
+    changes = {"hydraulics.overlap_a": 0.5, "hydraulics.overlap_b": 0.3, "hydraulics.leakage": 0.0}
+    bench, estimate = shoulder_bench(model(**changes))
+    found, (c, _) = measured(bench, estimate), actuator(bench, estimate)
+
+    def spool(command: float, onset: float, full: float) -> float:
+        current = coil_current(side_voltage(command, onset, full), c.current_max[0], c.current_min[0])
+        rest = (
+            resting_stroke(c.coil[0] * i**2, c.gap[0], c.plunger_stiffness[0])
+            for i in (current, c.current_min[0])
+        )
+        moved, resting = rest
+        return float(moved - resting)
+
+    commands = np.linspace(1, 60, 1000)
+    for name, onset, full, overlap in (
+        ("positive", c.onset_a[0], c.full_a[0], c.overlap_a[0]),
+        ("negative", c.onset_b[0], c.full_b[0], c.overlap_b[0]),
+    ):
+        opens = np.interp(overlap, [spool(u, onset, full) for u in commands], commands)
+        (band,) = found[f"joint2_dead_band_{name}"]
+        assert opens < band < opens + 5.0  # 2 % of full speed needs a little more
+
+
+def test_a_transport_delay_adds_to_the_dead_time_and_to_nothing_else(shoulder):
+    found = measured(*shoulder_bench(model(**{"hydraulics.delay": 0.1})))
+    for name in ("joint2_dead_time_positive", "joint2_dead_time_negative"):
+        assert found[name][0] - shoulder[3][name][0] == pytest.approx(0.1, abs=2e-3)
+    for name in ("joint2_time_constant_positive", "joint2_speed_50_positive"):
+        assert found[name] == pytest.approx(shoulder[3][name], rel=0.02)
+
+
+def test_the_natural_frequency_is_that_of_the_oscillation_after_a_step(shoulder):
+    _, bench, estimate, found = shoulder
+    angle = bench.drive(estimate, 5.0, bench.angle, 60)[0]
+    speed = np.diff(angle) - np.linspace(0, 1, 60) * (angle[-1] - angle[-2])
+    peaks = np.flatnonzero((speed[1:-1] > speed[:-2]) & (speed[1:-1] > speed[2:]))[:3]
+    assert 1 / (np.diff(peaks).mean() * 0.01) == pytest.approx(found["joint2_natural_frequency"][0], rel=0.15)
+
+
+def test_stage_1s_quantities_are_its_ratios():
+    bench, estimate = shoulder_bench(model("mech"))
+    found = measured(bench, estimate)
+    gain = np.degrees(0.2 / 231.8)
+    assert found["joint2_gain"] == [pytest.approx(gain)]
+    np.testing.assert_allclose(
+        found["joint2_speed"], gain * np.array([-100, -75, -50, -25, -10, 10, 25, 50, 75, 100])
+    )
+    scaled = replace(estimate, gain=3 * estimate.gain, damping=3 * estimate.damping)
+    assert measured(bench, scaled)["joint2_gain"] == [pytest.approx(gain)]
+
+
+def test_quantities_are_smooth_in_the_parameters(shoulder):
+    one, bench, estimate, _ = shoulder
+    measure = joint_measure(bench, estimate)
+    step = np.zeros_like(one.theta)
+    step[one.settings.parameter_set().names.index("A_A")] = 1e-3
+    rows = one.theta * (1 + np.outer([-10, -1, 0, 1, 10], step))
+    for column, value in measure(Stage(one.settings).candidates(rows)):
+        near, far = (value[3] - value[1]) / 2, (value[4] - value[0]) / 20
+        assert near == pytest.approx(far, rel=0.2, abs=2e-5 * (abs(value[2]) + 1)), column.label
+
+
+def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(shoulder):
+    one = model()
+    joints = list(one.settings.arm.joints)
+    cylinder = joints[1].actuator
+    turned = cylinder.model_copy(
+        update={"extends": "negative", "theta0": 180 - cylinder.theta0, "area_a": 750.0, "area_b": 1000.0}
+    )
+    joints[1] = joints[1].model_copy(update={"actuator": turned})
+    arm = one.settings.arm.model_copy(update={"joints": tuple(joints)})
+    settings = one.settings.model_copy(update={"arm": arm})
+    found = measured(*shoulder_bench(replace(one, settings=settings)))
+    assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)
+    speed = np.array(found["joint2_speed"])
+    assert np.all(np.diff(speed) < 0)
+    assert found["joint2_full_flow_positive"][0] > 0

@@ -1,0 +1,343 @@
+"""Figures: they hold what they claim, and stand whatever a fit looks like."""
+
+import itertools
+import json
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from report_fits import make_fit, make_problem, make_uncertainty
+
+from hydroid.posterior.directions import identifiability
+from hydroid.posterior.intervals import THRESHOLD, Profile
+from hydroid.posterior.sweep import Surface
+from hydroid.problem.problem import Evaluation
+from hydroid.report.chart import Chart, Mark, Panel, figure
+from hydroid.report.estimates import estimates, spread
+from hydroid.report.objectives import contours, learning, pareto
+from hydroid.report.responses import draw, joint_responses
+from hydroid.report.style import MAX_BINS, decimated, rendered, style
+from hydroid.report.uncertainty_report import UncertaintyStudy, draw_profiles
+from hydroid.settings.problem import ObjectiveSettings
+
+pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
+
+
+@pytest.fixture(autouse=True)
+def _styled():
+    with style():
+        yield
+
+
+def draw_all(problem, fit) -> list[Figure | Chart]:
+    objective = problem.settings.objective
+    return [
+        *(draw(response) for response in joint_responses(problem, fit)),
+        learning(fit, objective),
+        pareto(fit, objective),
+        estimates(problem, fit),
+    ]
+
+
+def check(drawn: Figure | Chart) -> None:
+    if isinstance(drawn, Chart):
+        json.dumps(drawn.plain(), allow_nan=False)
+        drawn = figure(drawn)
+    drawn.draw_without_rendering()
+    for axes in drawn.axes:
+        assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
+
+
+def labelled(panel: Panel, start: str = "") -> dict[str, Mark]:
+    return {mark.label: mark for mark in panel.marks if mark.label.startswith(start)}
+
+
+TWO = {"K": (0.05, 0.5), "D": (80.0, 80.0)}
+SHAPES = {
+    "one segment, one parameter, simple GA": (
+        {"segments": 1, "parameters": {"K": (0.05, 0.5)}},
+        {"names": ("best", "refined")},
+    ),
+    "several logs and outputs": ({"sources": ("a.csv", "b.csv"), "outputs": (1, 2)}, {"names": ("best",)}),
+    "no refinement, one estimate diverged": (
+        {},
+        {"names": ("average", "utopia", "best"), "diverged": ("average",)},
+    ),
+    "nothing but diverged": (
+        {},
+        {
+            "names": ("best", "refined"),
+            "diverged": ("best", "refined"),
+            "front": 0,
+            "effects": (np.nan,) * 4,
+        },
+    ),
+    "fixed without bounds, relative": ({"parameters": TWO, "fixed": {"D": 80.0}, "relative": True}, {}),
+    "names that are markup": ({"sources": ("<b>&_%$a$.csv",)}, {}),
+    "names without glyphs": ({"sources": ("日志🦾.csv",)}, {}),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_any_fit_can_be_drawn(shape: str):
+    of_problem, of_fit = SHAPES[shape]
+    problem = make_problem(**of_problem)
+    fit = make_fit(problem, **of_fit)
+    for drawn in draw_all(problem, fit):
+        if shape == "names without glyphs":
+            rendered(figure(drawn) if isinstance(drawn, Chart) else drawn)  # with boxes, without a warning
+        else:
+            check(drawn)
+
+
+def test_what_is_not_finite_is_left_out():
+    problem = make_problem()
+    fit = make_fit(problem)
+    history = fit.history.copy()
+    history[:3, 4:] = np.inf
+    segments = fit.front[1].segments.copy()
+    segments[0] = np.inf
+    broken = replace(fit, history=history, front=(fit.front[0], Evaluation(segments, fit.front[1].overall)))
+    for drawn in draw_all(problem, broken):
+        check(drawn)
+    check(learning(replace(fit, history=np.full((2, 6), np.inf)), problem.settings.objective))
+    check(learning(replace(fit, history=np.empty((0, 6))), problem.settings.objective))
+
+
+def test_the_response_shows_measured_angle_every_estimate_residual_and_command():
+    problem = make_problem()
+    fit = make_fit(problem)
+    (record,) = joint_responses(problem, fit)
+    upper, middle, lower = draw(record).panels
+    measured = np.degrees(record.measured)
+    assert labelled(upper)["measured"].y == pytest.approx(measured)
+    for name, estimate in fit.estimates.items():
+        label = name if name != "average" else "search (average)"
+        simulated = np.degrees(estimate.responses[0][:, 0])
+        ((label, mark),) = labelled(upper, f"{label} (").items()
+        assert mark.y == pytest.approx(simulated)
+        assert f"{np.degrees(estimate.rms):.3g}"[:3] in label
+        assert labelled(middle)[label].y == pytest.approx(measured - simulated)
+        assert mark.off == (name != fit.final)  # the others are shown when a reader asks for them
+    band = labelled(middle)["95 % band of refined"]
+    assert np.all(band.end > 0)
+    assert np.array_equal(band.y, -band.end)
+    assert np.array_equal(lower.marks[0].y, record.command)
+
+
+def test_pressures_are_drawn_where_they_are_logged():
+    problem = make_problem()
+    (record,) = joint_responses(problem, make_fit(problem))
+    pressed = replace(record, pressures=np.tile([5e6, 2e6], (len(record.time), 1)))
+    panels = draw(pressed).panels
+    assert [panel.y for panel in panels] == ["angle [deg]", "residual [deg]", "pressure [bar]", "command [%]"]
+    assert labelled(panels[2])["chamber A"].y == pytest.approx(np.full(len(record.time), 50.0))
+
+
+def test_a_response_that_runs_away_does_not_flatten_the_others():
+    problem = make_problem()
+    fit = make_fit(problem)
+    away = replace(fit.estimates["utopia"], responses=(np.linspace(0, 1e6, 120)[:, None],))
+    fit = replace(fit, estimates=fit.estimates | {"utopia": away})
+    record = joint_responses(problem, fit)[0]
+    reach = 4 * max(np.degrees(np.ptp(record.measured)), 1.0)
+    for panel, middle in zip(draw(record).panels, (np.degrees(record.measured.mean()), 0.0), strict=False):
+        (runaway,) = labelled(panel, "utopia").values()
+        assert np.isnan(runaway.y).any()
+        assert np.nanmax(np.abs(runaway.y - middle), initial=0.0) < reach
+
+
+def test_the_front_is_one_line_with_gaps_and_estimates_on_top():
+    problem = make_problem()
+    fit = make_fit(problem, front=9)
+    (panel,) = pareto(fit, problem.settings.objective).panels
+    front, *others = panel.marks
+    order = np.argsort(fit.front[1].overall, kind="stable")
+    drawn = front.y.reshape(9, -1)
+    assert drawn[:, :-1] == pytest.approx(np.degrees(fit.front[1].segments)[order])
+    assert np.isnan(drawn[:, -1]).all()
+    assert len({mark.label for mark in others if mark.label}) == len(fit.estimates)
+
+
+def test_the_learning_curve_shows_best_and_median_in_deg():
+    problem = make_problem()
+    fit = make_fit(problem)
+    values = labelled(learning(fit, problem.settings.objective).panels[0])
+    assert values["best so far"].y == pytest.approx(np.degrees(fit.history[:, 4]))
+    assert values["median of the population"].y == pytest.approx(np.degrees(fit.history[:, 5]))
+
+
+@pytest.mark.parametrize(("ratio", "log"), [(5.0, False), (20.0, True), (1e6, True)])
+def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bool):
+    problem = make_problem()
+    fit = make_fit(problem)
+    history = fit.history.copy()
+    history[:, 4] = history[:, 5] = np.geomspace(0.1 * ratio, 0.1, 7)
+    chart = learning(replace(fit, history=history), problem.settings.objective)
+    assert chart.panels[0].log_y == log
+    drawn = figure(chart)
+    drawn.draw_without_rendering()
+    assert drawn.axes[0].get_yscale() == ("log" if log else "linear")
+    labels = [label.get_text() for label in drawn.axes[0].get_yticklabels()]
+    assert sum(bool(label) for label in labels) >= 2
+
+
+def test_a_file_leaves_out_what_is_off_and_has_every_label_once():
+    x = np.arange(3.0)
+    shown, off = Mark("line", x, x, label="a"), Mark("line", x, 9 * x, label="b", off=True)
+    chart = Chart((Panel("x", "y", (shown, off)), Panel("x", "y", (shown,))), linked=True)
+    drawn = figure(chart, "A title")
+    assert [len(axes.lines) for axes in drawn.axes] == [1, 1]
+    apart = Chart((Panel("x", "y", (shown,)), Panel("x", "y", (replace(shown, label="c"),))))
+    assert apart.legends_apart
+    assert not chart.legends_apart
+
+
+def test_every_kind_of_mark_can_be_drawn():
+    x = np.arange(1.0, 4.0)
+    marks = (
+        Mark("step", x, x),
+        Mark("points", x, x, look="diamond", label="p"),
+        Mark("band", x, x, x + 1, alpha=0.3),
+        Mark("bars", x, x, x + 1, label="b"),
+        Mark("spans", x[:1], end=x[1:2]),
+        Mark("rule", y=x[:1], look="dashed"),
+        Mark("rule", x[:1], look="dotted"),
+    )
+    check(
+        Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4], names=("a", "b"))), columns=2)
+    )
+
+
+def test_estimates_stand_where_they_are_within_their_bounds():
+    problem = make_problem()
+    fit = make_fit(problem)
+    (axes,) = estimates(problem, fit).axes
+    unit = problem.parameters.to_unit(fit.best.theta[None])[0]
+    big = [line for line in axes.lines if len(line.get_xdata()) and line.get_markersize() > 8]
+    assert [float(np.ravel(line.get_xdata())[0]) for line in big] == pytest.approx(unit)
+    assert len(axes.patches) == len(problem.parameters.names)
+
+
+@pytest.mark.parametrize("count", [1, 4, 27])
+def test_no_text_lies_over_another(count: int):
+    bounds = {f"M{i}": (1.23456e-6 * 10 ** (i % 11), 1234.56 * 10 ** (i % 11)) for i in range(count)}
+    problem = make_problem(parameters=bounds)
+    fit = make_fit(problem, effects=(1.0, *(0.0,) * (count - 1)))
+    drawn = estimates(problem, fit)
+    drawn.draw_without_rendering()
+    texts = [t for t in drawn.axes[0].texts if t.get_text()] + drawn.axes[0].get_yticklabels()
+    boxes = [t.get_window_extent() for t in texts]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    whole = drawn.get_window_extent()
+    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 and whole.y0 <= b.y0 and b.y1 <= whole.y1 for b in boxes)
+
+
+def test_validation_overlays_every_fit():
+    problem = make_problem()
+    record = joint_responses(problem, make_fit(problem))[0]
+    simulated = {f"fit {i} $x$": record.measured + 0.01 * i for i in range(9)} | {
+        "gone": record.measured * np.nan
+    }
+    chart = draw(replace(record, simulated=simulated))
+    check(chart)
+    assert len(labelled(chart.panels[0])) == 11
+    assert list(labelled(chart.panels[0]))[-1] == "gone (diverged)"
+
+
+@pytest.mark.parametrize("names", [("search",), ("search", "refined")])
+@pytest.mark.parametrize("count", [1, 10])
+def test_runs_show_one_dot_per_seed(names: tuple[str, ...], count: int):
+    problem = make_problem(fixed={"D": 80.0})
+    rng = np.random.default_rng(0)
+    theta = problem.parameters.from_unit(rng.uniform(0, 1, (count, 3)))
+    drawn = spread(problem.parameters, {n: (theta, rng.uniform(0.01, 0.02, count)) for n in names})
+    check(drawn)
+    upper, lower = drawn.axes
+    for axes, rows in ((upper, 4), (lower, 1)):
+        dots = [line for line in axes.lines if line.get_marker() in ("o", "D") and len(line.get_xdata())]
+        assert len(dots) == rows * len(names)
+        assert all(len(line.get_xdata()) == count for line in dots)
+
+
+def test_runs_say_what_lies_at_a_bound_or_has_no_effect_and_may_have_diverged():
+    problem = make_problem()
+    theta = problem.parameters.from_unit(np.array([[1.0, 0.5, 0.3, 0.0], [1.0, 0.6, 0.3, 0.4]]))
+    drawn = spread(problem.parameters, {"search": (theta, np.full(2, np.nan))}, ["M1"])
+    check(drawn)
+    texts = [text.get_text() for text in drawn.axes[0].texts]
+    for words in ("at upper bound in 2 of 2 runs", "no effect", "at lower bound in 1 of 2 runs"):
+        assert texts.count(words) == 1
+
+
+def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
+    fit = make_fit(make_problem())
+
+    def drawn() -> tuple[bytes, bytes]:
+        with style():
+            return rendered(figure(pareto(fit, ObjectiveSettings())))
+
+    plain = drawn()
+    with mpl.rc_context({"font.size": 30.0, "svg.fonttype": "none", "axes.grid": False}):
+        before = dict(mpl.rcParams)
+        assert drawn() == plain
+        assert dict(mpl.rcParams) == before
+
+
+def test_a_dollar_in_a_name_is_a_dollar():
+    problem = make_problem(("a$x^2$.csv",))
+    drawn = figure(draw(joint_responses(problem, make_fit(problem))[0]))
+    named = [text for text in drawn.findobj(Text) if "$" in text.get_text()]
+    assert named
+    assert not any(text.get_parse_math() for text in named)
+
+
+@pytest.mark.parametrize("samples", [1, 7, 2 * MAX_BINS, 2 * MAX_BINS + 1, 100_003])
+def test_a_decimated_curve_keeps_its_ends_extremes_and_gaps(samples: int):
+    rng = np.random.default_rng(0)
+    time, curve = np.arange(samples) * 0.01, rng.normal(size=samples).cumsum()
+    at, kept = decimated(time, curve)
+    assert len(kept) <= max(2 * MAX_BINS + 2, 3)
+    assert np.array_equal(curve[np.searchsorted(time, at)], kept)
+    assert (kept[0], kept[-1], kept.min(), kept.max()) == (curve[0], curve[-1], curve.min(), curve.max())
+    gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
+    if samples > 1:
+        assert np.isnan(decimated(time, gap)[1]).any()
+
+
+def make_surface(estimate: tuple[float, float]) -> Surface:
+    parameters = make_problem().parameters.parameters[:2]
+    values = np.union1d(np.linspace(0.05, 0.5, 9), estimate[0]), np.linspace(50.0, 500.0, 7)
+    error = np.abs(values[0][:, None] - estimate[0]) + np.abs(values[1] - 200.0) / 1e3
+    return Surface(parameters, values, error, estimate, abs(estimate[1] - 200.0) / 1e3)
+
+
+def test_a_surface_marks_the_estimate_and_the_lowest_point_where_they_are():
+    for estimate in ((0.2, 200.0), (0.21, 260.0)):
+        surface = make_surface(estimate)
+        drawn = contours(surface, ObjectiveSettings())
+        check(drawn)
+        marks = {line.get_label().split(" (")[0]: line for line in drawn.axes[0].lines}
+        for label, (x, y, *_) in (("estimate", estimate), ("lowest point drawn", surface.lowest)):
+            assert (marks[label].get_xdata()[0], marks[label].get_ydata()[0]) == pytest.approx((x, y))
+        assert surface.lowest[2] <= surface.estimate_error
+
+
+def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_ends():
+    uncertainty = make_uncertainty(problem := make_problem(), make_fit(problem).best.theta)
+    centre, deviation = uncertainty.theta[0], uncertainty.standard_deviation[0]
+    values = centre + deviation * np.linspace(-40, 40, 13)
+    deviance = ((values - centre) / deviation) ** 2
+    half = deviation * np.sqrt(THRESHOLD)
+    profile = Profile("K", values, deviance, (centre - half, centre + half), uncertainty.theta)
+    shown = identifiability(problem, uncertainty)
+    chart = draw_profiles(UncertaintyStudy(problem, "test", uncertainty, shown, (profile,)))
+    check(chart)
+    (panel,) = chart.panels
+    assert panel.x_limits is not None
+    assert np.ptp(panel.x_limits) < 4 * half
+    curve = labelled(panel)["profile"]
+    assert np.interp(centre + half, curve.x, curve.y) == pytest.approx(THRESHOLD, rel=0.02)

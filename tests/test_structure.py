@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 # a package may import packages of a lower layer, and itself
 LAYERS = [
     {"errors"},
-    {"assets", "files", "parameters", "progress", "settings"},
+    {"assets", "files", "findings", "parameters", "progress", "settings", "words"},
     {"estimate"},
     {"identified_model"},
     {"log", "arm", "hydraulics"},

@@ -188,10 +188,12 @@ def collect(
 
 
 def _show(runs: "FitRuns", output: Output) -> None:
+    from hydroid.fitting.findings import fit_findings
     from hydroid.report.fit_tables import objective_table, parameter_table
-    from hydroid.report.phrases import fit_summary, fit_warnings
+    from hydroid.report.phrases import fit_summary
     from hydroid.report.quantities_report import best_known
     from hydroid.report.spread import final_spread
+    from hydroid.words import sentence
 
     first = runs.results[0]
     if runs.spread is not None:
@@ -201,6 +203,6 @@ def _show(runs: "FitRuns", output: Output) -> None:
         return
     problem, fit = first.problem, first.fit
     tables = [objective_table(problem, fit), parameter_table(problem, fit)]
-    words = [fit_summary(fit), *best_known(fit.quantities), *fit_warnings(problem, fit)]
+    words = [fit_summary(fit), *best_known(fit.quantities), *map(sentence, fit_findings(problem, fit))]
     content = partial(dict[str, Any], first.summary.plain(), out=str(runs.out))
     show(output, content, [*tables, *words, str(runs.out / "report.html")])

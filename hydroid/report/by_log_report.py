@@ -1,11 +1,8 @@
 """What a fit of several logs says about each parameter by log, beside the pooled standard deviation."""
 
-import numpy as np
-
 from hydroid.posterior.by_log import FEW, ByLog
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.report.phrases import listed
 from hydroid.report.table import Cell, Table, unless_nan
 
 
@@ -32,19 +29,3 @@ def by_log_table(problem: Problem, uncertainty: Uncertainty, found: ByLog) -> Ta
     )
     header = ("name", "unit", "pooled", "by log", "from", "to", "degrees of freedom", "flag")
     return Table("Standard deviation by log", header, tuple(rows), note, ("degrees of freedom",))
-
-
-def by_log_warning(found: ByLog | None) -> tuple[str, ...]:
-    """Say which parameters differ between the logs by more than the noise explains."""
-    if found is None or not found.differing:
-        return ()
-    differing = listed(found.differing)
-    if max(found.freedom[np.isfinite(found.freedom)], default=0.0) < FEW:
-        return (
-            f"The logs disagree about {differing} by more than the noise explains. So few logs cannot tell "
-            "why: add logs before you use these values.",
-        )
-    return (
-        f"{differing} would change from log to log by more than the noise explains: the model "
-        "errs, and the intervals in the table of parameters are too narrow. Take those by log.",
-    )

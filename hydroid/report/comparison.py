@@ -7,7 +7,7 @@ from typing import Any
 
 from hydroid.report.page import Bar
 from hydroid.report.page_file import SCHEMA
-from hydroid.report.table import number, plain
+from hydroid.words import number, plain
 
 _SERIES = ("orange", "blue", "green", "pink", "yellow", "sky")
 

@@ -12,9 +12,10 @@ from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
 from hydroid.report import style
 from hydroid.report.chart import Chart, Mark, Panel
 from hydroid.report.page import Light, Page, Plot, Section, Step, Verdict
-from hydroid.report.table import Cell, Table, number
+from hydroid.report.table import Cell, Table
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
+from hydroid.words import number
 
 _SHOWN = 0.15
 """parts of the weakest direction below this share of the largest are not named"""

@@ -13,7 +13,7 @@ from hydroid.posterior.flags import Flag
 from hydroid.problem.problem import Problem
 from hydroid.report import style
 from hydroid.report.phrases import estimate_label, runs_phrase, status_phrase
-from hydroid.report.table import number, plain
+from hydroid.words import number, plain
 
 _BAR = 0.36
 _ROW = 0.44  # [in]

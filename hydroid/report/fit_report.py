@@ -12,13 +12,12 @@ import numpy as np
 from hydroid.advice.suggest import Suggestions
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
+from hydroid.fitting.findings import fit_findings
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.search import HISTORY
 from hydroid.parameters import Array
-from hydroid.posterior.by_log import by_log
 from hydroid.problem.problem import Problem
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
-from hydroid.report.by_log_report import by_log_warning
 from hydroid.report.estimates import estimates as draw_estimates
 from hydroid.report.fit_tables import objective_table, parameter_table
 from hydroid.report.motion_report import motion_section
@@ -33,7 +32,6 @@ from hydroid.report.phrases import (
     STAGES,
     direction_phrases,
     fit_summary,
-    fit_warnings,
     norm_label,
     parameter_advice,
     prior_phrase,
@@ -42,9 +40,10 @@ from hydroid.report.phrases import (
 from hydroid.report.quantities_report import curves_csv, lost_quantities, quantity_section
 from hydroid.report.responses import joint_responses, response_data, response_tabs
 from hydroid.report.suggestion_report import action_effect, action_name, suggestion_sections
-from hydroid.report.table import Table, number, numbers_csv
+from hydroid.report.table import Table, numbers_csv
 from hydroid.report.uncertainty_report import determined_sections
 from hydroid.report.verdict import fit_verdict
+from hydroid.words import number, sentence
 
 FITTED = "Prediction of the fitted logs"
 """title of a section"""
@@ -110,7 +109,7 @@ def fit_page(
         title,
         fit_summary(fit),
         sections,
-        (*fit_warnings(last, fit), *by_log_warning(by_log(last, fit.uncertainty))),
+        tuple(sentence(finding) for finding in fit_findings(last, fit)),
         versions,
         _data(problem, fit) | response_data(responses),
         fit_verdict(last, fit),

@@ -6,8 +6,9 @@ from hydroid.advice.suggest import Suggestions
 from hydroid.fitting.fit import Fit
 from hydroid.problem.problem import Problem
 from hydroid.report.page import Section, Step
-from hydroid.report.phrases import at_limits, listed
+from hydroid.report.phrases import at_limits
 from hydroid.report.suggestion_report import MOST_STEPS, suggested_steps
+from hydroid.words import listed
 
 PREDICT_UNSEEN = "Predict a log that this fit has not seen."
 

@@ -17,8 +17,9 @@ from hydroid.report import style
 from hydroid.report.chart import SERIES, Chart, Mark, Panel
 from hydroid.report.page import Page, Plot, Section
 from hydroid.report.phrases import estimate_label, in_reader_units, norm_label
-from hydroid.report.table import Cell, Table, number, numbers_csv
+from hydroid.report.table import Cell, Table, numbers_csv
 from hydroid.settings.problem import ObjectiveSettings
+from hydroid.words import number
 
 _MOST_LINES = 100
 """candidates of the Pareto set that are drawn, those with the lowest errors"""

@@ -12,8 +12,8 @@ from hydroid.problem.problem import Problem
 from hydroid.report.names import plain_name
 from hydroid.report.page import Bar
 from hydroid.report.phrases import runs_phrase, status_phrase
-from hydroid.report.table import number, plain
 from hydroid.settings.problem import ParameterSettings
+from hydroid.words import number, plain
 
 _STATES = {
     Flag.IDENTIFIABLE: "known",

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -13,10 +12,9 @@ from hydroid.posterior.directions import Direction, Identifiability
 from hydroid.posterior.flags import WEAK_ABOVE, Flag, ParameterStatus, Source
 from hydroid.posterior.intervals import Profile
 from hydroid.posterior.patterns import CURRENTS, DirectionKind
-from hydroid.posterior.sources import Strain
 from hydroid.problem.problem import Problem
-from hydroid.report.table import number, plain
 from hydroid.settings.problem import ObjectiveSettings, PriorSettings
+from hydroid.words import listed, number
 
 ALGORITHMS = {
     "ga": "simple genetic algorithm",
@@ -156,12 +154,6 @@ def outputs_phrase(problem: Problem) -> str:
     return f"{which} and the pressures" if pressed else which
 
 
-def listed(names: Sequence[str]) -> str:
-    """Join names as in a sentence."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
-
-
 def prior_phrase(prior: PriorSettings) -> str:
     """Write a prior as an equation."""
     if prior.ratio is not None:
@@ -182,49 +174,6 @@ def fit_summary(fit: Fit) -> str:
     return f"The estimate '{fit.final}' {error}; its refinement {ending}."
 
 
-def fit_warnings(problem: Problem, fit: Fit) -> tuple[str, ...]:
-    """Say what a reader must know before using the estimate, the most important first."""
-    said: list[str] = []
-    if fit.refinement is None:
-        said.append("The estimate is the search's own, without a refinement: it need not be an optimum.")
-    said += [
-        f"The least-squares refinement did not converge: {refinement.ending.value}. The estimate '{name}' "
-        "need not be an optimum. Allow more iterations (refinement.iterations)."
-        for name, refinement in fit.refinements.items()
-        if not refinement.ending.converged
-    ]
-    if nothing := at_zero(problem, fit.uncertainty):
-        said.append(
-            f"At 0, the least that is possible: {listed(nothing)}. The logs show none of it. Such an "
-            "estimate has no interval."
-        )
-    limited = at_limits(problem, fit.uncertainty)
-    for side in ("lower", "upper"):
-        at_bound = [
-            f"{p.name} ({plain(getattr(p, side))} {p.unit})"
-            for p, status in zip(problem.parameters.parameters, fit.uncertainty.status, strict=True)
-            if status.at_bound == side and p.name in limited
-        ]
-        if at_bound:
-            said.append(
-                f"At the {side} bound: {listed(at_bound)}. The error would fall further beyond the bound. "
-                "Widen it if such values are possible; otherwise the model lacks something. Such an estimate "
-                "has no interval."
-            )
-    said += [strain_phrase(problem, strain) for strain in fit.strains]
-    said += [
-        f"The estimate '{name}' diverged when it was simulated and was not used."
-        for name, estimate in fit.estimates.items()
-        if not math.isfinite(estimate.rms)
-    ]
-    if fit.refinement is not None and fit.best.overall > fit.searched.overall:
-        norm = _NORMS[problem.settings.objective.norm]
-        said.append(
-            f"The refinement lowered the rms error but raised the {norm}, which the search minimised."
-        )
-    return tuple(said)
-
-
 def at_limits(problem: Problem, known: Uncertainty) -> list[str]:
     """Return the parameters that lie at a bound which could be wider."""
     nothing = at_zero(problem, known)
@@ -239,18 +188,6 @@ def at_zero(problem: Problem, known: Uncertainty) -> list[str]:
         for p, status in zip(problem.parameters.parameters, known.status, strict=True)
         if status.at_bound == "lower" and p.lower == 0 and status.flag is not Flag.NO_EFFECT
     ]
-
-
-def strain_phrase(problem: Problem, strain: Strain) -> str:
-    """Say how far the estimate is from a prior, and which channel pulls it there."""
-    what = f"the {strain.quantity.replace('_', ' ')} of joint {strain.joint}"
-    log = f" in {Path(problem.logs[strain.log].source).name}" if len(problem.logs) > 1 else ""
-    side = "above" if strain.score > 0 else "below"
-    return (
-        f"The estimate lies {abs(strain.score):.1f} standard deviations {side} the prior of {strain.prior}; "
-        f"{what}{log} pulls it there. Either the prior is wrong, or the model lacks something and this "
-        "parameter makes up for it."
-    )
 
 
 def profile_warnings(profiles: Sequence[Profile]) -> tuple[str, ...]:

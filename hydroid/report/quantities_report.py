@@ -16,8 +16,8 @@ from hydroid.posterior.quantities import Quantities
 from hydroid.problem.problem import Problem
 from hydroid.report.chart import Chart, Color, Mark, Panel
 from hydroid.report.page import Plot, Section
-from hydroid.report.phrases import listed
-from hydroid.report.table import Cell, Table, number
+from hydroid.report.table import Cell, Table
+from hydroid.words import listed, number
 
 BEST = 6
 """quantities that a fit prints at most"""

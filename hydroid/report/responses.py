@@ -14,7 +14,8 @@ from hydroid.report import style
 from hydroid.report.chart import SERIES, Chart, Mark, Panel
 from hydroid.report.page import FILE, PAGE, Plot, Tab, log_names
 from hydroid.report.phrases import estimate_label
-from hydroid.report.table import number, numbers_csv
+from hydroid.report.table import numbers_csv
+from hydroid.words import number
 
 MOST_FILES = 12
 """responses that are also written as figures, those with the largest errors"""

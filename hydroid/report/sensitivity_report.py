@@ -17,7 +17,8 @@ from hydroid.posterior.sweep import Sweep
 from hydroid.problem.problem import Problem
 from hydroid.report import style
 from hydroid.report.page import Page, Plot, Section, file_name, log_names
-from hydroid.report.table import Cell, Table, number, numbers_csv, plain
+from hydroid.report.table import Cell, Table, numbers_csv
+from hydroid.words import number, plain
 
 _QUANTITIES = {
     "angle": ("Angle", "q", "deg", 180 / np.pi),

@@ -11,10 +11,11 @@ from hydroid.parameters import Array, ParameterSet
 from hydroid.report import estimates as plots
 from hydroid.report.page import FILE, Light, Page, Plot, Section, Verdict
 from hydroid.report.parameter_bars import spread_bars
-from hydroid.report.phrases import listed, runs_phrase
+from hydroid.report.phrases import runs_phrase
 from hydroid.report.table import Cell, Table
 from hydroid.run.collection import RunEstimate, RunResult
 from hydroid.settings.fit import FitSettings
+from hydroid.words import listed
 
 _NEAR = 0.05
 """part of the smallest error by which runs that found the same optimum may differ"""

@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array
-from hydroid.report.table import plain
+from hydroid.words import plain
 
 WIDTH = 6.4  # [in]; at half a page's width the smallest text is still 5 pt
 MEASURED = "#222222"

@@ -17,10 +17,10 @@ from hydroid.estimate import finite
 from hydroid.problem.problem import Problem
 from hydroid.report.page import Page, Section, Step, log_names
 from hydroid.report.page import Verdict as Strip
-from hydroid.report.phrases import listed
 from hydroid.report.residual_chart import UNITS, residual_tabs
-from hydroid.report.table import Cell, Table, number, plain
+from hydroid.report.table import Cell, Table
 from hydroid.settings.problem import MECHANICAL_UNITS
+from hydroid.words import listed, number, plain
 
 _VERDICTS = {
     Verdict.FREE: "free it",

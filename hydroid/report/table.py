@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from hydroid.parameters import Array
+from hydroid.words import number, plain
 
 if TYPE_CHECKING:
     import rich.table
@@ -174,25 +175,6 @@ def shown(cell: Cell) -> str:
 def unless_nan(value: float) -> float | None:
     """Return the number, or an empty cell for NaN; an infinite number stays."""
     return None if math.isnan(value) else float(value)
-
-
-def number(value: float) -> str:
-    """Write four significant digits, without exponent from 0.0001 to ten million; a dash if not finite."""
-    if not math.isfinite(value):
-        return "–"
-    if value == 0:
-        return "0"
-    scientific = f"{value:.3e}"
-    exponent = int(scientific.partition("e")[2])  # of the rounded value: 0.99999 is 1.000, not 1.0000
-    return f"{float(scientific):.{max(0, 3 - exponent)}f}" if -4 <= exponent < 7 else scientific
-
-
-def plain(value: float) -> str:
-    """Write at most six significant digits, without trailing zeros."""
-    if not math.isfinite(value):
-        return "–"
-    text = f"{value:.6g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e9 else text
 
 
 _MARKDOWN = {ord(c): f"\\{c}" for c in r"\`*_<>|&$~"} | {ord(c): " " for c in "\r\n"}

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from hydroid.fitting.findings import log_findings
 from hydroid.parameters import Array
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.covariance import Uncertainty
@@ -16,13 +17,14 @@ from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.intervals import THRESHOLD, Profile
 from hydroid.problem.problem import Problem
 from hydroid.report import style
-from hydroid.report.by_log_report import by_log_table, by_log_warning
+from hydroid.report.by_log_report import by_log_table
 from hydroid.report.chart import Chart, Mark, Panel
 from hydroid.report.page import FILE, PAGE, Page, Plot, Section, Verdict, log_names
 from hydroid.report.parameter_bars import parameter_bar
 from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
 from hydroid.report.table import Cell, Table, unless_nan
 from hydroid.report.verdict import uncertainty_lights
+from hydroid.words import sentence
 
 _SHOWN = 0.1
 """parts of a direction below this are left out of its row"""
@@ -96,7 +98,7 @@ def uncertainty_page(study: UncertaintyStudy) -> Page:
     warnings = (
         *((study.moved,) if study.moved else ()),
         *profile_warnings(study.profiles),
-        *by_log_warning(by_log(problem, found)),
+        *map(sentence, log_findings(by_log(problem, found))),
     )
     verdict = Verdict(lead, f"At {study.source}.", uncertainty_lights(problem, found))
     sections = (intervals, unknown, *determined_sections(problem, found, result))

@@ -8,9 +8,9 @@ from hydroid.report.fit_report import FITTED
 from hydroid.report.motion_report import MOTION
 from hydroid.report.next_steps import PREDICT_UNSEEN
 from hydroid.report.page import Light
-from hydroid.report.phrases import listed
 from hydroid.report.validation_report import FROM_FIT, PREDICTION
 from hydroid.report.verdict import VALIDATED
+from hydroid.words import listed
 
 Content = Mapping[str, Any]
 NOTHING = "Nothing that these logs ask for. hydroid suggest also tests further sensors, logs and experiments."

@@ -10,8 +10,9 @@ from hydroid.posterior.flags import WEAK_ABOVE, Flag
 from hydroid.problem.problem import Problem
 from hydroid.report.arm_picture import arm_picture
 from hydroid.report.page import Light, Verdict
-from hydroid.report.phrases import at_limits, at_zero, listed
+from hydroid.report.phrases import at_limits, at_zero
 from hydroid.report.quantities_report import known_quantities
+from hydroid.words import listed
 
 VALIDATED = "Validated on unseen logs"
 """question of a light"""

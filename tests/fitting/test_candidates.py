@@ -7,13 +7,14 @@ from small_fits import TRUTH, Watcher
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
+from hydroid.findings import Finding
+from hydroid.fitting.findings import fit_findings
 from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.report.fit_report import fit_page
 from hydroid.report.fit_tables import objective_table, parameter_table
-from hydroid.report.phrases import fit_warnings
 
 STEPS = 2**16 - 1
 """of a parameter's 16 bits"""
@@ -79,7 +80,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
     assert "estimate average diverged" in caplog.text
-    assert "The estimate 'average' diverged" in " ".join(fit_warnings(problem, result))
+    assert Finding("diverged", "warning", ("average",)) in fit_findings(problem, result)
     assert "search (utopia)" in parameter_table(problem, result).markdown()
     assert "average" in objective_table(problem, result).markdown()
 

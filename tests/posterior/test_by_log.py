@@ -7,10 +7,11 @@ from arch.bootstrap import CircularBlockBootstrap
 from linear_problem import AR1, DEG, THETA, Linear, ar1, least_squares, slow
 from scipy.stats import t as student
 
+from hydroid.fitting.findings import log_findings
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.covariance import uncertainty
 from hydroid.posterior.intervals import bootstrap
-from hydroid.report.by_log_report import by_log_table, by_log_warning
+from hydroid.report.by_log_report import by_log_table
 
 LEVEL = 0.5 * DEG
 
@@ -90,11 +91,11 @@ def test_the_report_names_what_differs_from_log_to_log():
     known = uncertainty(problem, theta)
     found = by_log(problem, known)
     assert found is not None
-    (warning,) = by_log_warning(found)
-    assert found.differing[0] in warning
+    (warning,) = log_findings(found)
+    assert warning.subjects == found.differing
     rows = by_log_table(problem, known, found).rows
     assert [row[0] for row in rows] == ["a", "b", "c"]
-    assert by_log_warning(None) == ()
+    assert not list(log_findings(None))
 
 
 def test_few_right_models_are_said_to_differ():

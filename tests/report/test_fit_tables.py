@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
+from hydroid.findings import Finding
+from hydroid.fitting.findings import fit_findings
 from hydroid.fitting.validation import error_indices
 from hydroid.posterior.directions import identifiability
 from hydroid.report.fit_tables import objective_table, parameter_table
 from hydroid.report.page import log_names
-from hydroid.report.phrases import fit_warnings, parameter_advice
+from hydroid.report.phrases import parameter_advice
 from hydroid.report.responses import joint_responses
 from hydroid.report.spread import spread_table
 from hydroid.report.table import Table
@@ -56,8 +58,8 @@ def test_flags_name_what_the_data_cannot_tell():
     off = with_theta(fit, problem, effects, K=low + 2e-3 * (high - low))
     assert column(parameter_table(problem, off), "flag")[0] == ""
     assert any(sentence.startswith("M1: no effect") for sentence in parameter_advice(problem, fit))
-    assert any("At the upper bound: M2 (12.75 kg)" in sentence for sentence in fit_warnings(problem, at))
-    assert not fit_warnings(problem, replace(off, estimates={"refined": off.best}))
+    assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in fit_findings(problem, at)
+    assert not fit_findings(problem, replace(off, estimates={"refined": off.best}))
 
 
 def test_errors_are_those_of_the_responses():

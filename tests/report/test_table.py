@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from hydroid.report.table import Given, Table, number, plain
+from hydroid.report.table import Given, Table
+from hydroid.words import number, plain
 
 HOSTILE = r"<b>&_%$#{}~^|\*`[x](http://e.org).csv"
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc",)), max_size=30)

@@ -1,0 +1,27 @@
+"""Findings: what an analysis has to say. Terminal, JSON and report read them; `words` has their sentences."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Level = Literal["error", "warning", "note"]
+"""error: the input or result cannot be used; warning: do not use it unread; note: good to know"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that an analysis found.
+
+    Attributes:
+        kind: key of its words in `words.WORDS`. Decisions are made on it, never on a sentence.
+        level: how much it matters.
+        subjects: names of what it is about: parameters, joints, logs.
+        numbers: what the sentence states, by name, in the units that the sentence prints.
+        where: file with line and column, or a setting; empty where there is none.
+    """
+
+    kind: str
+    level: Level
+    subjects: tuple[str, ...] = ()
+    numbers: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
+    where: str = ""

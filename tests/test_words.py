@@ -1,0 +1,34 @@
+"""Every finding has words, every row of words a finding, and a sentence agrees with its subjects."""
+
+from pathlib import Path
+
+import pytest
+
+from hydroid.findings import Finding
+from hydroid.words import WORDS, listed, sentence, statement
+
+ROOT = Path(__file__).parents[1] / "hydroid"
+
+
+def test_every_row_of_words_is_used():
+    text = "\n".join(file.read_text() for file in ROOT.rglob("*.py") if file.name != "words.py")
+    assert [kind for kind in WORDS if f'"{kind}"' not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("subjects", "expected"),
+    [
+        (("A_A",), "A_A is at the upper bound."),
+        (("A_A", "A_B"), "A_A and A_B are at the upper bound."),
+    ],
+)
+def test_a_sentence_agrees_with_its_subjects(subjects: tuple[str, ...], expected: str):
+    finding = Finding("at bound", "warning", subjects, {"side": "upper"})
+    assert statement(finding).startswith(expected)
+    assert sentence(finding).endswith("Otherwise the model lacks something.")
+
+
+def test_a_long_list_ends_with_how_many_more():
+    assert listed(list("abcdefg"), 4) == "a, b, c, d and 3 more"
+    assert listed(list("abcde"), 4) == "a, b, c, d and e"
+    assert listed([]) == ""

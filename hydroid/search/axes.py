@@ -1,0 +1,177 @@
+"""Derivatives by finite differences along the axes of a covariance, with steps as wide as the uncertainty.
+
+Where parameters trade, their effects nearly cancel: what is left of the derivatives of single parameters is
+the error of their differences. So the step goes along the combination itself, as far as the combination is
+uncertain. Its effect is then as large as the noise, and large against rounding and the small jumps that
+events make.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
+"""points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
+
+LARGEST = 0.1
+"""largest relative change of a coordinate in a step: nothing holds over the width of an unknown direction"""
+EDGE = 0.1
+"""standard deviations from a bound, below which a coordinate counts as held by it"""
+UNBALANCED = 0.3
+"""part of a step within which both sides must have room; else it goes twice to one side"""
+SHORTER = 0.1
+"""a step whose effect may be mostly curvature is taken again, this part as long"""
+CURVED = 0.3
+"""part of the long step's slope; where the short step's is smaller, the long one's is mostly curvature"""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A point between its bounds, and how it may move.
+
+    Attributes:
+        at: the point, shape (P,).
+        lower, upper: its bounds, shape (P,).
+        scale: what a relative change of 1 is, shape (P,).
+        varied: which p of the P coordinates move, shape (P,).
+    """
+
+    at: Array
+    lower: Array
+    upper: Array
+    scale: Array
+    varied: NDArray[np.bool_]
+
+    @property
+    def room(self) -> Array:
+        """Relative changes to the lower and to the upper bound, shape (2, p)."""
+        away = np.stack([self.at - self.lower, self.upper - self.at])[:, self.varied]
+        return np.maximum(away, 0.0) / self.scale[self.varied]
+
+    def points(self, changes: Array) -> Array:
+        """Return points, (n, P), at relative changes, (n, p); rounding does not lead out of the bounds."""
+        moved = np.tile(self.at, (len(changes), 1))
+        moved[:, self.varied] += changes * self.scale[self.varied]
+        return np.clip(moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at))
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """Steps from a point along p directions of its varied coordinates, all within the bounds.
+
+    Attributes:
+        directions: relative changes, independent of each other, one a row, shape (p, p).
+        steps: signed lengths along each: to both sides, or one and two steps to one side, shape (p, 2); to
+            one side only, shape (p, 1).
+    """
+
+    directions: Array
+    steps: Array
+
+    @property
+    def one_sided(self) -> "Axes":
+        """The same with half the steps: for derivatives of first order."""
+        return Axes(self.directions, self.steps[:, :1])
+
+
+def differentiate(
+    function: Function, at: Box, axes: Axes, value: Array | None = None, former: Array | None = None
+) -> Array:
+    """Differentiate a function at a point by relative changes of its p varied coordinates, shape (p, R).
+
+    Along each axis the derivative is that of the parabola through the values at the point and at both steps,
+    or of the line where there is one step or where one of two fails. Where both sides differ more than they
+    have in common, or where the slope exceeds the former one by far, a shorter step tells whether the effect
+    of the long one is mostly curvature.
+
+    Args:
+        function: is called with all points of the differences at once, and with those of the shorter steps.
+        at: the point and its bounds.
+        axes: directions and steps.
+        value: of the function at the point, shape (R,), where it is known.
+        former: derivatives to keep along axes that fail, shape (p, R). Without them, axes that are not
+            single coordinates must not fail; a coordinate's row is NaN.
+    """
+    value = function(at.at[None])[0] if value is None else value
+    expected = None if former is None else axes.directions @ former
+    slopes, curved = _slopes(function, at, axes, value)
+    if axes.steps.shape[1] == 2:
+        if expected is not None:
+            curved |= np.linalg.norm(expected, axis=1) < CURVED * np.linalg.norm(slopes, axis=1)
+        if curved.any():
+            shorter = Axes(axes.directions[curved], SHORTER * axes.steps[curved])
+            short = _slopes(function, at, shorter, value)[0]
+            mostly = np.linalg.norm(short, axis=1) < CURVED * np.linalg.norm(slopes[curved], axis=1)
+            slopes[np.flatnonzero(curved)[mostly]] = short[mostly]
+    failed = ~np.isfinite(slopes).all(axis=1)
+    if expected is not None:
+        slopes[failed] = expected[failed]
+    if np.array_equal(axes.directions, np.eye(len(slopes))):
+        return slopes
+    return np.asarray(np.linalg.solve(axes.directions, slopes), dtype=float)
+
+
+def single_axes(at: Box, step: float) -> Axes:
+    """Return a relative step along each varied coordinate."""
+    room = at.room
+    return _fitted(np.eye(room.shape[1]), np.full(room.shape[1], step), room)
+
+
+def covariance_axes(at: Box, root: Array, step: float) -> Axes:
+    """Return steps of so many standard deviations along the axes of a covariance.
+
+    The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction of its
+    own: the others change with it as the covariance says. So no direction leads out of the bounds to both
+    sides.
+
+    Args:
+        at: the point and its bounds.
+        root: G of C^-1 = G' G, of full rank, shape (p, p): a relative change v is |G v| standard deviations
+            long.
+        step: in standard deviations.
+    """
+    room = at.room
+    deviation = np.linalg.norm(np.linalg.inv(root), axis=1)
+    edge = room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
+    inner, at_edge = np.flatnonzero(~edge), np.flatnonzero(edge)
+    directions = np.eye(len(root))[[*inner, *at_edge]]
+    if len(inner):
+        left, values, axes = np.linalg.svd(root[:, inner], full_matrices=False)
+        directions[: len(inner), inner] = axes
+        follow = axes.T @ ((left.T @ root[:, at_edge]) / values[:, None])
+        directions[len(inner) :, inner] = -follow.T
+    return _fitted(directions, step / np.linalg.norm(root @ directions.T, axis=0), room)
+
+
+def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Slopes along each axis, (p, R), and where both sides differ more than they have in common, (p,)."""
+    steps = axes.steps.T[:, :, None]
+    changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
+    rows = function(at.points(changes)).reshape(*steps.shape[:2], -1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        near, far = (rows[0] - value) / steps[0], (rows[-1] - value) / steps[-1]
+        if len(steps) == 1:
+            return near, np.zeros(len(near), dtype=bool)
+        both = (near * steps[1] - far * steps[0]) / (steps[1] - steps[0])
+    odd = np.linalg.norm(both, axis=1)
+    curved = np.linalg.norm(near - both, axis=1) > odd
+    slopes = np.where(np.isfinite(both), both, np.where(np.isfinite(near), near, far))
+    return slopes, curved
+
+
+def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
+    """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
+    share = np.abs(directions)
+    wanted = np.minimum(wanted, LARGEST / share.max(axis=1))
+    towards = directions > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ahead = np.where(share > 0, np.where(towards, room[1], room[0]) / share, np.inf).min(axis=1)
+        behind = np.where(share > 0, np.where(towards, room[0], room[1]) / share, np.inf).min(axis=1)
+    both = np.minimum(wanted, np.minimum(ahead, behind))
+    one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
+    balanced = (both >= UNBALANCED * wanted) | (both >= one)
+    first = np.where(balanced, both, np.where(ahead >= behind, one, -one))
+    return Axes(directions, np.stack([first, np.where(balanced, -first, 2 * first)], axis=1))

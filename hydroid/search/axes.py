@@ -95,15 +95,15 @@ def differentiate(
         former: derivatives to keep along axes that fail, shape (p, R). Without them, axes that are not
             single coordinates must not fail; a coordinate's row is NaN.
     """
-    value = function(at.at[None])[0] if value is None else value
+    centre = function(at.at[None])[0] if value is None else value
     expected = None if former is None else axes.directions @ former
-    slopes, curved = _slopes(function, at, axes, value)
+    slopes, curved = _slopes(function, at, axes, centre)
     if axes.steps.shape[1] == 2:
         if expected is not None:
             curved |= np.linalg.norm(expected, axis=1) < CURVED * np.linalg.norm(slopes, axis=1)
         if curved.any():
             shorter = Axes(axes.directions[curved], SHORTER * axes.steps[curved])
-            short = _slopes(function, at, shorter, value)[0]
+            short = _slopes(function, at, shorter, centre)[0]
             mostly = np.linalg.norm(short, axis=1) < CURVED * np.linalg.norm(slopes[curved], axis=1)
             slopes[np.flatnonzero(curved)[mostly]] = short[mostly]
     failed = ~np.isfinite(slopes).all(axis=1)

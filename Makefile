@@ -56,11 +56,10 @@ structure: setup  ## size and shape of the code
 	$(BIN)/python benchmarks/structure.py
 
 article: setup  ## the article's tables and figures over ten seeds (docs/reproduction.md); about two hours, goes on where it was
-	$(BIN)/hydroid article --all --out runs/article
-	$(BIN)/python docs/reproduction.py runs/article
+	$(BIN)/python benchmarks/article/run.py
 
 article-quick: setup  ## the same in its short form: shows that everything runs; at most five minutes
-	$(BIN)/hydroid article --all --quick --out runs/article-quick
+	$(BIN)/python benchmarks/article/run.py --quick
 
 accuracy: setup  ## the hydraulics against a stiff reference solver, and 1,000 random sets on all joints
 	$(BIN)/python benchmarks/hydraulic_accuracy.py

@@ -41,7 +41,6 @@ KINDS = {
     "collect": ("collect", "fit-mech", "fit-mech-2"),
     "collisions": ("collisions", ALL_JOINTS),
     "actuator": ("plot-actuator", "--fit", "fit-hyd"),
-    "article": ("article", "--table", "6", "--quick"),
     "compare": ("report", "fit-mech", "fit-hyd", "validate"),
 }
 """the command that makes each report; names of other kinds stand for their folders"""

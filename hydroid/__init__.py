@@ -48,8 +48,6 @@ if TYPE_CHECKING:
     from hydroid.api.stages import fit_hyd as fit_hyd
     from hydroid.api.stages import fit_mech as fit_mech
     from hydroid.api.start import init as init
-    from hydroid.api.studies import StudyOptions as StudyOptions
-    from hydroid.api.studies import article as article
     from hydroid.api.studies import study as study
     from hydroid.api.study import Study as Study
     from hydroid.errors import HydroidError as HydroidError
@@ -79,7 +77,7 @@ _NAMES = {
     "hydroid.api.plan": "design suggest",
     "hydroid.api.quantity": "QuantityResult quantity",
     "hydroid.api.start": "init",
-    "hydroid.api.studies": "StudyOptions article study",
+    "hydroid.api.studies": "study",
     "hydroid.api.study": "Study",
     "hydroid.errors": "HydroidError",
     "hydroid.identified_model": "IdentifiedModel identified load_identified start_values",

@@ -84,7 +84,6 @@ COMMANDS = (
     ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),
     ("model", model.build_model, "make an arm's MJCF model from its meshes", "--arm my-arm.yaml"),
     ("study", study.study, "run a study of your own", "my-study.yaml --seeds 10"),
-    ("study", study.article, "make the article's tables and figures anew", "--table 6 --seeds 10"),
 )
 """group, function, summary and example of each command"""
 

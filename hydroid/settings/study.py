@@ -1,6 +1,5 @@
-"""A study's file: settings of a fit, what of them varies, seeds, data, and what is shown and claimed."""
+"""A study's file: settings of a fit, what of them varies, seeds, and logs."""
 
-from collections.abc import Collection
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -12,25 +11,21 @@ from hydroid.assets import find_config
 from hydroid.errors import SettingsError
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import Positive, Settings, load
-from hydroid.settings.study_data import Changes, DataSettings
-from hydroid.settings.study_shown import Claim, StudyFigure, StudyTable
+from hydroid.settings.load import Settings, load
 
 MOST_CELLS = 1000
-"""cells of a study at most"""
+
+Changes = dict[str, Any]
+"""settings to replace, by dotted key, as `--set` has them"""
 
 
-class QuickSettings(Settings):
-    """The short form, which shows that a study runs, not what is true."""
+class CheckLog(Settings):
+    """A log that every estimate predicts, and that no run is fitted to."""
 
-    seeds: Annotated[int, Field(ge=0, le=10_000)] = 2
-    """number of seeds"""
-    duration_s: Positive = 15.0
-    """length of the data at most [s]"""
+    log: str
+    """file, relative to the study's file"""
     set: Changes = Field(default_factory=dict[str, Any])
-    """settings to replace in every cell, by dotted key"""
-    points: Annotated[int, Field(ge=3, le=101)] = 7
-    """values of each parameter of a surface"""
+    """settings of its own, by dotted key, such as columns that it is read with"""
 
 
 class StudySettings(Settings):
@@ -39,49 +34,26 @@ class StudySettings(Settings):
     title: str
     """what it answers"""
     about: str = ""
-    """a few sentences for its page: what is compared, and what was chosen where the article is silent"""
-    items: tuple[str, ...] = ()
-    """tables and figures of the article that it makes, such as table 6"""
+    """a few sentences for its page"""
     base: str
     """settings of a fit: a shipped name, or a YAML file relative to the study's file"""
     set: Changes = Field(default_factory=dict[str, Any])
     """settings to replace in every cell, by dotted key"""
-    data: DataSettings
+    logs: tuple[str, ...] = ()
+    """fitted logs, relative to the study's file"""
+    checks: dict[str, CheckLog] = Field(default_factory=dict[str, CheckLog])
+    """further logs, by name, that every estimate predicts"""
     axes: dict[str, dict[str, Changes] | tuple[Any, ...]] = Field(default_factory=dict[str, Any])
     """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
-    """number of seeds, from 1; 0: nothing is fitted"""
-    tables: tuple[StudyTable, ...] = ()
-    figures: tuple[StudyFigure, ...] = ()
-    claims: tuple[Claim, ...] = ()
-    quick: QuickSettings = QuickSettings()
+    """number of seeds, from 1"""
 
     @model_validator(mode="after")
-    def _consistent(self) -> "StudySettings":
+    def _few_cells(self) -> "StudySettings":
         count = prod(len(axis) for axis in self.axes.values())
         if not 0 < count <= MOST_CELLS:
             raise ValueError(f"axes give {count} cells; 1 to {MOST_CELLS} are allowed")
-        self._name_cells(self.changes())
-        for i, claim in enumerate(self.claims):
-            if claim.item and claim.item not in self.items:
-                raise ValueError(f"claims.{i}: {claim.item!r} is none of the items {', '.join(self.items)}")
-        for i, table in enumerate(self.tables):
-            for cell, values in table.article.items():
-                if len(values) != len(table.columns):
-                    wanted = f"{len(table.columns)} values, one for each column"
-                    raise ValueError(f"tables.{i}.article.{cell}: needs {wanted}, not {len(values)}")
         return self
-
-    def _name_cells(self, known: Collection[str]) -> None:
-        """Refuse a cell that does not exist."""
-        named = [(f"tables.{i}.article", c) for i, t in enumerate(self.tables) for c in t.article]
-        named += [(f"tables.{i}.cells", c) for i, t in enumerate(self.tables) for c in t.cells]
-        named += [(f"figures.{i}.cells", c) for i, f in enumerate(self.figures) for c in f.cells]
-        tested = [(i, claim) for i, claim in enumerate(self.claims) if not claim.untested]
-        named += [(f"claims.{i}", c) for i, claim in tested for c in (claim.lower, claim.than)]
-        for where, cell in named:
-            if cell not in known:
-                raise ValueError(f"{where}: no cell {cell!r}; the cells: {', '.join(known)}")
 
     def changes(self) -> dict[str, Changes]:
         """Return the settings that each cell replaces, by the cell's name."""
@@ -92,8 +64,8 @@ class StudySettings(Settings):
         cells: dict[str, Changes] = {}
         for choice in product(*options):
             merged: Changes = {}
-            for _, each in choice:
-                merged |= each
+            for _, change in choice:
+                merged |= change
             cells[", ".join(label for label, _ in choice) or "all"] = merged
         return cells
 
@@ -102,14 +74,15 @@ def load_study(path: Path) -> StudySettings:
     """Read a study's file.
 
     Raises:
-        SettingsError: a key or value that is not allowed, with file and line.
+        SettingsError: a key or value that is not allowed, with file and line; no logs.
     """
-    return load(path, StudySettings)
+    study = load(path, StudySettings)
+    if not study.logs:
+        raise SettingsError("logs: names no log", where=str(path), hint="for example logs: [a.csv, b.csv]")
+    return study
 
 
-def cell_settings(
-    study: StudySettings, path: Path, *, quick: bool, extra: Changes | None = None
-) -> dict[str, FitSettings]:
+def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
     """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name.
 
     Raises:
@@ -117,7 +90,7 @@ def cell_settings(
     """
     config, cells = find_config(study.base, path.parent), dict[str, FitSettings]()
     for name, changes in study.changes().items():
-        every = study.set | changes | (study.quick.set if quick else {}) | (extra or {})
+        every = study.set | changes | (extra or {})
         try:
             cells[name] = load(config, FitSettings, every)
         except SettingsError as error:

@@ -1,1 +1,1 @@
-"""Studies: what varies, over which seeds, on which data; their runs; what is measured and claimed of them."""
+"""Studies: settings that vary, over seeds, on the same logs; every run is one file."""

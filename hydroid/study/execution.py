@@ -8,31 +8,36 @@ import logging
 import multiprocessing
 import os
 import signal
+import subprocess
 import threading
 from collections.abc import Generator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
+from hydroid.assets import assets
 from hydroid.errors import HydroidError, RunError
 from hydroid.files import write_atomic
 from hydroid.progress import NOTE, Progress
-from hydroid.study.code import code_version
 from hydroid.study.runs import Result, Task, perform
+
+RUNS = "runs"
+"""folder of the runs' files, which several studies may share"""
 
 _log = logging.getLogger(__name__)
 
 
 def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
-    """Return the result of every task, in order; those that `folder` has are read, the others performed.
+    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
 
     A run that fails is a result too: {"failed": why}.
 
     Raises:
         RunError: a file cannot be written or is damaged, or a process of the executor died.
     """
-    files = [folder / f"{task.key()}.json" for task in tasks]
+    files = [folder / RUNS / f"{task.key()}.json" for task in tasks]
     missing = {file: task for file, task in zip(files, tasks, strict=True) if not file.is_file()}
     results = {file: read_result(file) for file in files if file not in missing}
     failed: dict[Path, Result] = {}
@@ -115,3 +120,16 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def code_version() -> str:
+    """Return hydroid's version, with the commit where it runs from a checkout that has one."""
+    own, folder = version("hydroid"), assets()
+    if not (folder / ".git").exists():
+        return own
+    try:
+        command = ["git", "-C", str(folder), "describe", "--always", "--dirty=, changed"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return own
+    return f"{own} ({done.stdout.strip()})"

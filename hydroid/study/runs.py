@@ -7,7 +7,6 @@ was killed goes on where it was, and studies in one folder share the runs that t
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
@@ -24,7 +23,6 @@ from hydroid.problem.problem import Problem
 from hydroid.run.identity import ELSEWHERE, FREE, model_hash
 from hydroid.search.compromise import segment_best
 from hydroid.settings.fit import FitSettings
-from hydroid.study.data import StudyData
 
 Result = dict[str, Any]
 """what `perform` returns, or {"failed": why}"""
@@ -73,7 +71,7 @@ def _samples(log: Log) -> str:
 
 
 def perform(task: Task) -> Result:
-    """Fit, and return what tables and figures of a study need, as plain values.
+    """Fit, and return what a study needs of the run, as plain values.
 
     Angles are in degrees. `history` has generation, simulations and best objective; `segment_bests` are the
     parameters of the best candidate of each segment, as `theta` are those of the estimate.
@@ -124,24 +122,3 @@ def _check_error(settings: FitSettings, log: Log, theta: np.ndarray) -> float | 
         return None
     measured = log.angle[:, [j - 1 for j in settings.outputs]]
     return float(np.degrees(np.abs(angle - measured)).mean())
-
-
-def make_tasks(cells: Mapping[str, FitSettings], seeds: Iterable[int], data: StudyData) -> list[Task]:
-    """Return all runs of a study, seed by seed."""
-    return [
-        Task(
-            name,
-            seed,
-            _seeded(settings, seed),
-            data.logs,
-            tuple((check, by_cell[name], log) for check, (log, by_cell) in data.checks.items()),
-        )
-        for seed in seeds
-        for name, settings in cells.items()
-    ]
-
-
-def _seeded(settings: FitSettings, seed: int) -> FitSettings:
-    search = settings.search.model_copy(update={"seed": seed})
-    simulation = settings.simulation.model_copy(update={"threads": 1})
-    return settings.model_copy(update={"search": search, "simulation": simulation})

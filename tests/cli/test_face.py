@@ -90,7 +90,6 @@ def test_import_is_light():
         ["view", "--set", "x=1"],
         ["build-model", "--arm", "nowhere"],
         ["study", "nowhere.yaml"],
-        ["article", "--list"],
     ],
 )
 def test_inputs_are_looked_at_before_anything_heavy_is_imported(arguments: list[str]):

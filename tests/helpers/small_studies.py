@@ -1,4 +1,4 @@
-"""A study of seconds for tests: two cells, two seeds, three seconds of simulated data."""
+"""A study of seconds for tests: two cells, two seeds, three seconds of a log of the virtual rig."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -8,44 +8,39 @@ import yaml
 
 from hydroid import read_logs
 from hydroid.progress import no_progress
-from hydroid.study.study import StudyRuns, plan_study, run_study
+from hydroid.study.study import StudyRuns, run_study
 
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
 
 def content(**changes: Any) -> dict[str, Any]:
     """A study's file as plain values."""
-    small = {"search.algorithm": "ga", "search.ga.population": 6, "search.ga.generations": 2}
     study: dict[str, Any] = {
         "title": "Two norms",
         "base": "article-mech",
-        "set": small | {"refinement": None},
-        "data": {"truth": TRUTH, "simulated": {"duration_s": 3}},
+        "set": {
+            "search.algorithm": "ga",
+            "search.ga.population": 6,
+            "search.ga.generations": 2,
+            "refinement": None,
+        },
+        "logs": ["short.csv"],
         "axes": {"norm": {"largest": {"objective.norm": "inf"}, "mean": {"objective.norm": 1}}},
         "seeds": 2,
-        "tables": [
-            {
-                "title": "Errors",
-                "columns": ["parameter error", "identifiable error", "rms error"],
-                "article": {"mean": [9.67, None, None]},
-            }
-        ],
-        "claims": [
-            {"says": "One is better", "column": "parameter error", "lower": "largest", "than": "mean"}
-        ],
     }
     return study | changes
 
 
 def written(folder: Path, **changes: Any) -> Path:
-    """The file, in a folder."""
+    """The file and its log, in a folder."""
+    head = RIG.read_text().splitlines()[:302]
+    (folder / "short.csv").write_text("\n".join(head) + "\n")
     file = folder / "small.yaml"
     file.write_text(yaml.safe_dump(content(**changes), sort_keys=False))
     return file
 
 
-def run(file: Path, out: Path, seeds: int | None = None) -> StudyRuns:
+def run(file: Path, out: Path) -> StudyRuns:
     """Run a study in this process."""
-    plan = plan_study(file, lambda paths, settings: read_logs(paths, settings), seeds=seeds)
     with ThreadPoolExecutor(1) as executor:
-        return run_study(plan, out, executor, no_progress)
+        return run_study(file, out, read_logs, executor, no_progress)

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 from scipy.stats import rankdata, wilcoxon
+from studies import Claim
 
 from hydroid.parameters import Array
-from hydroid.settings.study_shown import Claim
-from hydroid.study.measures import Row
+from hydroid.study.study import Row
 
 SIGNIFICANT = 0.05
 

@@ -1,0 +1,96 @@
+"""The article's studies: every item has one, each file is sound, and the page is what the results say."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from page import DOCS, page
+from statements import local_minima, ranking, turning_points
+from studies import ArticleStudy, Plan, load_studies
+
+from hydroid.posterior.jacobian import jacobian
+from hydroid.problem.problem import Problem
+
+STUDIES = load_studies()
+ITEMS = {f"table {n}" for n in range(1, 10)} | {f"figure {n}" for n in range(9, 21) if n != 12}
+ROOT = Path(__file__).parents[2]
+each_study = pytest.mark.parametrize("name", STUDIES)
+
+
+def test_every_table_and_figure_has_a_study_and_a_verdict():
+    assert {item for study in STUDIES.values() for item in study.items} == ITEMS
+    judged = {claim.item for study in STUDIES.values() for claim in study.claims if not claim.ours}
+    judged |= {f.item for study in STUDIES.values() for f in study.figures if f.says or f.orders}
+    assert judged - {""} == ITEMS
+
+
+@each_study
+def test_a_study_can_run_and_names_only_what_it_has(name: str):
+    plan, study = Plan(name, STUDIES[name], quick=True), STUDIES[name]
+    assert plan.logs[0].duration <= 16
+    assert len(plan.tasks) == (len(plan.cells) * 2 if study.seeds else 0)
+    for cell, settings in plan.cells.items():  # the article refines nothing
+        assert not plan.tasks or (settings.refinement is None) == ("refined" not in cell)
+    named = {c for claim in study.claims if not claim.untested for c in (claim.lower, claim.than)}
+    named |= {c for figure in study.figures for c in figure.cells}
+    named |= {c for table in study.tables for c in (*table.cells, *table.article)}
+    assert named <= set(plan.cells)
+    tested = sum(not claim.untested for claim in study.claims)
+    assert 2.0 ** (1 - study.seeds) * tested < 0.05 or not tested  # Holm's correction leaves a chance
+
+
+@each_study
+def test_printed_sums_are_the_sums_of_the_printed_errors(name: str):
+    """What was typed from the article agrees with itself."""
+    for table in STUDIES[name].tables:
+        errors = [i for i, column in enumerate(table.columns) if column.startswith("error ")]
+        if len(errors) >= 9 and "parameter error" in table.columns:
+            at = table.columns.index("parameter error")
+            for cell, values in table.article.items():
+                assert sum(values[i] or 0.0 for i in errors) == pytest.approx(values[at], abs=0.05), cell
+
+
+def test_the_page_is_what_the_committed_results_say():
+    text = (DOCS / "reproduction.md").read_text(encoding="utf-8")
+    assert page(DOCS / "reproduction") == text
+    for study in STUDIES.values():
+        for claim in study.claims:  # in the table of all, and with its numbers in the study's part
+            assert text.count(claim.says) >= 2
+
+
+def test_peaks_and_troughs_of_a_sine_are_counted_without_its_ripple():
+    time = np.linspace(0, 4, 4001)
+    assert turning_points(np.sin(2 * np.pi * time) + 0.02 * np.sin(200 * time)) == 8
+
+
+def test_minima_of_two_valleys_are_two():
+    x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(-1, 1, 11), indexing="ij")
+    assert local_minima((x**2 - 1) ** 2 + y**2) == 2
+    assert local_minima(x**2 + y**2) == 1
+
+
+def test_an_order_of_effects_holds_or_is_contradicted():
+    study: ArticleStudy = STUDIES["model"]
+    plan = Plan("model", study, quick=True)
+    problem = Problem(next(iter(plan.cells.values())), plan.logs)
+    effects = jacobian(problem, problem.parameters.vector(study.truth, "truth")).effects.tolist()
+    by_name = dict(zip(problem.parameters.names, effects, strict=True))
+    assert ranking(by_name, [["D", "S"], ["M1"]])[0].value == "confirmed"
+    assert ranking(by_name, [["M1"], ["D"]])[0].value == "contradicted"
+
+
+@pytest.mark.slow
+def test_all_studies_run_in_their_short_form():
+    command = [sys.executable, str(ROOT / "benchmarks" / "article" / "run.py"), "--quick"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1200, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    results = ROOT / "runs" / "article-quick" / "results"
+    assert {file.stem for file in results.glob("figure_*.svg")} == {
+        i.replace(" ", "_") for i in ITEMS if "f" in i
+    }
+    text = Path(done.stdout.strip()).read_text(encoding="utf-8")
+    assert "short form" in text
+    for file in results.glob("*_runs.csv"):
+        assert all(not line.split(",")[2] for line in file.read_text().splitlines()[1:])  # no run failed

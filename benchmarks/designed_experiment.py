@@ -1,4 +1,4 @@
-"""A designed experiment against random ones of the same length and limits (`make design-study`; minutes).
+"""A designed experiment against random ones of the same length and limits.
 
     python benchmarks/designed_experiment.py [--random 20] [--improvements 200] [--fits 50] [--duration 30]
         [--without rest slew clearance] [--seed 1]

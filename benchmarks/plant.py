@@ -1,4 +1,4 @@
-"""How fast a plant steps, as a multiple of real time at 0.01 s (`make bench`)."""
+"""How fast a plant steps, as a multiple of real time at 0.01 s (`make bench B=plant`)."""
 
 import time
 

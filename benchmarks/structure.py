@@ -1,28 +1,66 @@
-"""The size and shape of the code: files, lines, functions, arguments, classes, settings, import cycles.
+"""The size and shape of the code, beside what it may be at most: `make bench B=structure`.
 
     python benchmarks/structure.py [FOLDER ...]
 
-Each folder is a checkout; the default is this one. One column per checkout. Lines are physical lines. A
-function's arguments are all but `self` and `cls`; the command line's own functions, whose arguments are its
-options, are counted apart.
+Each folder is a checkout; the default is this one. One column per checkout. Tokens are names, operators,
+numbers and strings: comments and the packing of lines do not count. Statements are those of Python's syntax
+tree, docstrings left out. A function's arguments are all but `self` and `cls`; a command's arguments are its
+options, and are not counted. Constants are names in capitals at the top level of a file.
 """
 
 import ast
+import io
 import os
+import re
 import statistics
 import subprocess
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
-MOST_ARGUMENTS = 6
+MOST = {
+    "files": 160,
+    "lines": 17_500,
+    "tokens": 130_000,
+    "constants": 280,
+    "settings": 130,
+    "commands": 14,
+    "make targets": 14,
+    "functions with more than 6 arguments": 0,
+    "import cycles": 0,
+    "lines of tests": 12_000,
+    "lines of benchmarks": 2_000,
+}
+COMMANDS = {"cli", "commands"}
+TOKENS = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def python_files(root: Path) -> dict[Path, ast.Module]:
-    """Return the parsed files below a folder, by path."""
-    return {path: ast.parse(path.read_text()) for path in sorted(root.rglob("*.py"))}
+def tokens(text: str) -> int:
+    """Return the number of tokens of a file."""
+    return sum(kind.type in TOKENS for kind in tokenize.generate_tokens(io.StringIO(text).readline))
+
+
+def statements(tree: ast.Module) -> int:
+    """Return the number of statements of a file."""
+    every = (node for node in ast.walk(tree) if isinstance(node, ast.stmt))
+    return sum(not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)) for s in every)
+
+
+def constants(tree: ast.Module) -> int:
+    """Return how many names in capitals a file defines at its top level."""
+    names: list[str] = []
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        names += [
+            name.id
+            for target in targets
+            for name in ast.walk(target or ast.Pass())
+            if isinstance(name, ast.Name)
+        ]
+    return sum(bool(re.fullmatch(r"_?[A-Z][A-Z0-9_]*", name)) for name in names)
 
 
 def arguments(function: Function) -> int:
@@ -50,11 +88,27 @@ def imports(tree: ast.Module) -> set[str]:
 
 def cycles(package: Path, trees: dict[Path, ast.Module]) -> int:
     """Return the number of groups of files that import each other (strongly connected components)."""
-    names = {_module(package, path): path for path in trees}
-    graph = {name: sorted(imports(trees[path]) & names.keys() - {name}) for name, path in names.items()}
-    reached = {name: _reachable(graph, name) for name in graph}
-    groups = {frozenset(m for m in reached[n] if n in reached[m]) for n in graph if n in reached[n]}
-    return len(groups)
+    names = {module(package, path): path for path in trees}
+    graph = {name: imports(trees[path]) & names.keys() - {name} for name, path in names.items()}
+    after = {name: reachable(graph, name) for name in graph}
+    return len({frozenset(m for m in after[n] if n in after[m]) for n in graph if n in after[n]})
+
+
+def module(package: Path, path: Path) -> str:
+    """Return a file's name as an import gives it."""
+    parts = [package.name, *path.relative_to(package).with_suffix("").parts]
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
+    """Return what a node leads to."""
+    found: set[str] = set()
+    waiting = [start]
+    while waiting:
+        new = graph[waiting.pop()] - found
+        found |= new
+        waiting += new
+    return found
 
 
 COUNT_SETTINGS = """
@@ -76,69 +130,67 @@ while waiting:
         waiting += [inner for field in model.model_fields.values() for inner in models(field.annotation)]
 print(sum(len(model.model_fields) for model in seen))
 """
+"""settings of a fit and of an arm, as their classes declare them"""
+COUNT_COMMANDS = """
+import subprocess, sys
+text = subprocess.run([sys.executable, "-m", "hydroid", "--help"], capture_output=True, text=True).stdout
+groups = text[text.index("Show this message"):].splitlines()[1:]
+print(sum(line[:2] == "  " and line[2:3].islower() and "  " in line.strip() for line in groups))
+"""
 
 
-def setting_count(checkout: Path) -> str:
-    """Return how many settings a fit and an arm have, as their classes declare them."""
+def counted(checkout: Path, program: str) -> int:
+    """Return the number that a program prints about a checkout."""
     environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
-    command = [sys.executable, "-c", COUNT_SETTINGS]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=True)
+    return int(done.stdout)
 
 
-def measure(checkout: Path) -> dict[str, str]:
+def lines(folder: Path) -> int:
+    """Return the lines of Python below a folder."""
+    return sum(len(path.read_text().splitlines()) for path in folder.rglob("*.py"))
+
+
+def measure(checkout: Path) -> dict[str, float]:
     """Return the figures of one checkout, by name."""
     package = checkout / "hydroid"
-    trees = python_files(package)
-    lines = [len(path.read_text().splitlines()) for path in trees]
+    texts = {path: path.read_text() for path in sorted(package.rglob("*.py"))}
+    trees = {path: ast.parse(text) for path, text in texts.items()}
+    sizes = [len(text.splitlines()) for text in texts.values()]
     every = [(path, f) for path, tree in trees.items() for f in functions(tree)]
     lengths = [(f.end_lineno or f.lineno) - f.lineno + 1 for _, f in every]
-    wide = ["cli" in path.parts for path, f in every if arguments(f) > MOST_ARGUMENTS]
-    more = f"functions with more than {MOST_ARGUMENTS} arguments"
-    elsewhere = {
-        name: sum(len(p.read_text().splitlines()) for p in (checkout / name).rglob("*.py"))
-        for name in ("tests", "benchmarks")
-    }
-    classes = sum(isinstance(node, ast.ClassDef) for tree in trees.values() for node in ast.walk(tree))
+    wide = [path for path, f in every if arguments(f) > 6 and not COMMANDS & set(path.parts)]
+    targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (checkout / "Makefile").read_text(), re.MULTILINE)
     return {
-        "files": f"{len(trees)}",
-        "lines": f"{sum(lines):,}",
-        "median file": f"{statistics.median(lines):g}",
-        "largest file": f"{max(lines)}",
-        "functions": f"{len(every):,}",
-        "median function": f"{statistics.median(lengths):g}",
-        "largest function": f"{max(lengths)}",
-        f"{more}, outside cli/": f"{wide.count(False)}",
-        f"{more}, in cli/": f"{wide.count(True)}",
-        "classes": f"{classes}",
-        "settings": setting_count(checkout),
-        "import cycles": f"{cycles(package, trees)}",
-        "lines of tests": f"{elsewhere['tests']:,}",
-        "lines of benchmarks": f"{elsewhere['benchmarks']:,}",
+        "files": len(trees),
+        "lines": sum(sizes),
+        "tokens": sum(map(tokens, texts.values())),
+        "statements": sum(map(statements, trees.values())),
+        "constants": sum(map(constants, trees.values())),
+        "settings": counted(checkout, COUNT_SETTINGS),
+        "commands": counted(checkout, COUNT_COMMANDS),
+        "make targets": len(set(targets)),
+        "classes": sum(isinstance(node, ast.ClassDef) for tree in trees.values() for node in ast.walk(tree)),
+        "functions": len(every),
+        "functions with more than 6 arguments": len(wide),
+        "import cycles": cycles(package, trees),
+        "median file": statistics.median(sizes),
+        "largest file": max(sizes),
+        "largest function": max(lengths),
+        "lines of tests": lines(checkout / "tests"),
+        "lines of benchmarks": lines(checkout / "benchmarks"),
     }
 
 
 def main() -> None:
-    """Print one column per checkout."""
+    """Print one column per checkout, and what may be at most."""
     checkouts = [Path(name) for name in sys.argv[1:]] or [Path(__file__).parents[1]]
     columns = [measure(checkout) for checkout in checkouts]
     width = max(map(len, columns[0]))
     for name in columns[0]:
-        print(name.ljust(width), *(column[name].rjust(8) for column in columns))
-
-
-def _module(package: Path, path: Path) -> str:
-    parts = [package.name, *path.relative_to(package).with_suffix("").parts]
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def _reachable(graph: dict[str, list[str]], start: str) -> set[str]:
-    found: set[str] = set()
-    waiting = [start]
-    while waiting:
-        new = set(graph[waiting.pop()]) - found
-        found |= new
-        waiting += new
-    return found
+        most = f"{MOST[name]:,}" if name in MOST else ""
+        print(name.ljust(width), *(f"{column[name]:9,g}" for column in columns), f"   {most}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench`).
+"""What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench B=throughput`).
 
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
 on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the

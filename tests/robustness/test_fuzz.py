@@ -1,6 +1,6 @@
 """Bad input: files that were once misread or crashed hydroid, and some damaged ones of every kind.
 
-`make fuzz` reads thousands.
+`make bench B=fuzz` reads thousands.
 """
 
 import os

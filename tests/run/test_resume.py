@@ -1,4 +1,4 @@
-"""Runs that are killed and resumed end as if nobody had touched them (100 of them: `make kill-resume`)."""
+"""Runs that are killed and resumed end as if nobody had touched them."""
 
 import json
 import os

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 import hydroid
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.refinement import refine
+from hydroid.fitting.search import search
 from hydroid.identified_model import IdentifiedModel
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
+from hydroid.search.least_squares import Descent
 from hydroid.settings.fit import FitSettings
 
 FOLDER = Path(__file__).parents[1] / "examples" / "excavator"
@@ -56,16 +56,18 @@ def errors(model: hydroid.IdentifiedModel, logs: list[hydroid.Log]) -> list[floa
     return [float(mean[joint]) for joint in JOINTS]
 
 
-def fitted(settings: FitSettings, logs: list[hydroid.Log]) -> tuple[IdentifiedModel, Refinement, int]:
+def fitted(settings: FitSettings, logs: list[hydroid.Log]) -> tuple[IdentifiedModel, Descent, int]:
     """Fit as `hydroid.fit` does, without the uncertainty: the model, its refinement, and all simulations."""
     problem = Problem(settings, logs)
-    search = Multistart(problem, settings.search, Memo(problem), lambda simulated, rms: None)
-    state = search.run(None, lambda state, memo: None, lambda row: None)
+    searched = search(problem, lambda row: None, lambda simulated, rms: None, {})
     assert settings.refinement is not None
-    begin = search.theta(state.population)[0]
-    result = refine(problem, begin, settings.refinement, lambda simulated, rms: None)
+    result = refine(problem, searched.theta[0], settings.refinement, lambda simulated, rms: None)
     theta = problem.parameters.from_unit(result.point[None])[0]
-    return IdentifiedModel(settings, theta, "a fit"), result, int(state.history[-1, 2]) + result.evaluations
+    return (
+        IdentifiedModel(settings, theta, "a fit"),
+        result,
+        int(searched.history[-1, 2]) + result.evaluations,
+    )
 
 
 def figure(model: hydroid.IdentifiedModel, log: hydroid.Log, path: Path) -> None:

@@ -26,8 +26,10 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from hydroid.cli.app import main as hydroid
-from hydroid.fitting import search
+from hydroid.fitting import checkpoints
 from hydroid.report import page_file
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
@@ -73,7 +75,7 @@ def start(folder: Path, log: Path, options: list[str]) -> int:
     with (folder.parent / "stderr").open("a") as errors:
         os.dup2(errors.fileno(), 2)
         os.dup2(errors.fileno(), 1)
-    search.SAVE_EVERY = 0.0
+    checkpoints.SAVE_EVERY = 0.0
     page_file.write_page = lambda *_: []
     sys.argv = ["hydroid", "fit-mech", str(log), *options, "--out", str(folder), "--resume", "--quiet"]
     code = 99
@@ -104,12 +106,12 @@ def finish(folder: Path, log: Path, options: list[str]) -> float:
 def moment(folder: Path, duration: float, rng: random.Random) -> Callable[[], bool]:
     """A question that becomes true when it is time to kill."""
     began = time.monotonic()
-    match rng.choice(["time", "time", "time", "checkpoint", "file", "refinement"]):
+    match rng.choice(["time", "time", "time", "checkpoint", "file", "size"]):
         case "checkpoint":
             return seen(lambda: parts(folder, ".checkpoint.npz."), rng.randint(1, 20))
         case "file":
             return seen(lambda: parts(folder, "."), rng.randint(1, 60))
-        case "refinement":
+        case "size":
             return seen(lambda: sizes(folder), rng.randint(1, 60))
         case _:
             after = duration * rng.random() ** 2
@@ -140,7 +142,7 @@ def parts(folder: Path, prefix: str) -> set[object]:
 
 def sizes(folder: Path) -> set[object]:
     found = set[object]()
-    for file in (folder / "refinement.npz", *folder.glob("seed-*/refinement.npz")):
+    for file in (folder / "checkpoint.npz", *folder.glob("seed-*/checkpoint.npz")):
         try:
             found.add((file, file.stat().st_size))
         except OSError:
@@ -177,13 +179,11 @@ def phase(folder: Path) -> str:
         return "between runs, or at the end"
     if (run / "estimate.yaml").exists():
         return "report"
-    if (run / "refinement.npz").exists():
-        return "refinement"
-    return (
-        "search, after a checkpoint"
-        if (run / "checkpoint.npz").exists()
-        else "search, before its first checkpoint"
-    )
+    if not (run / "checkpoint.npz").exists():
+        return "search, before its first checkpoint"
+    with np.load(run / "checkpoint.npz", allow_pickle=False) as stored:
+        refines = any(name.startswith(("refined/", "joint/")) for name in stored.files)
+    return "refinement" if refines else "search, after a checkpoint"
 
 
 def differences(one: Path, other: Path) -> list[str]:

@@ -63,8 +63,7 @@ class Counter:
 
 
 def hydroid(count: Counter, start: np.ndarray) -> str:
-    ending = least_squares(start, count, RefinementSettings()).ending
-    return ending.value if ending is not None else ""
+    return str(least_squares(start, count, RefinementSettings())).partition("; ")[2]
 
 
 def scipy_trf(count: Counter, start: np.ndarray) -> str:
@@ -104,7 +103,7 @@ def searched(config: str, changes: Mapping[str, object]) -> tuple[Problem, np.nd
     """A problem on the rig's log, and the estimate of a short search."""
     settings = load_settings(config, {**changes, "refinement": None})
     problem = Problem(settings, read_logs([LOG], settings))
-    return problem, fit(problem, lambda state, memo: None, Silent()).best.theta
+    return problem, fit(problem).best.theta
 
 
 def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
@@ -121,7 +120,7 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
     def joint() -> tuple[Problem, np.ndarray]:
         problem, theta = stage_2()
         point = refine(problem, theta, RefinementSettings(), lambda n, rms: None).point
-        return problem.freed(), problem.parameters.from_unit(point[None])[0]
+        return problem.varied(problem.settings.freed()), problem.parameters.from_unit(point[None])[0]
 
     def article() -> tuple[Problem, np.ndarray]:
         settings = load_settings("article-mech")
@@ -136,16 +135,6 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
         "joint refinement": joint,
         "article": article,
     }
-
-
-class Silent:
-    """Shows no progress."""
-
-    def generation(self, row: np.ndarray) -> None:
-        """Ignore a generation."""
-
-    def refining(self, simulated: int, rms: float) -> None:
-        """Ignore a simulation."""
 
 
 def main() -> None:

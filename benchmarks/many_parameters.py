@@ -23,7 +23,6 @@ from sysid_peer import Peer
 
 from hydroid import load_settings
 from hydroid.advice.pseudo_random import pseudo_random_log
-from hydroid.api.fit import Silent
 from hydroid.fitting.fit import Fit, fit
 from hydroid.log import Log
 from hydroid.posterior.flags import WEAK_ABOVE
@@ -174,7 +173,7 @@ def main() -> None:
     for seed in range(1, arguments.starts + 1):
         settings, _ = make_settings(seed)
         clock = Clock()
-        result = fit(Problem(settings, [log]), lambda state, memo: None, Silent())
+        result = fit(Problem(settings, [log]))
         clock.stop()
         assert result.refinement is not None
         simulated = int(result.history[-1, 2]) + result.refinement.evaluations

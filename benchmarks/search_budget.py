@@ -15,14 +15,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from least_squares import TRUTH, Silent
+from least_squares import TRUTH
 
 from hydroid import load_settings, read_logs
 from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.estimate import read_values
+from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.fit import Fit, fit
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -43,7 +42,7 @@ EXACT = np.deg2rad(1e-4)
 def stage_1(log: str) -> dict[str, float]:
     """Masses of stage 1's estimate on a log."""
     problem = make(log, {"search.nsga2.generations": 0})
-    result = fit(problem, lambda state, memo: None, Silent())
+    result = fit(problem)
     values = problem.parameters.mapping(result.best.theta)
     return {name: value for name, value in values.items() if name.startswith("M")}
 
@@ -68,15 +67,12 @@ def make(name: str, changes: dict[str, object]) -> Problem:
 def fits(name: str, algorithm: str, several: list[int], seed: int) -> dict[int, Fit]:
     """Fits of one seed by their number of generations; each continues the search of the one before."""
     result: dict[int, Fit] = {}
-    last: list[Checkpoint] = []
-
-    def save(state: SearchState, memo: Memo) -> None:
-        last[:] = [Checkpoint(state, memo.arrays())]
-
+    checkpoints: Checkpoints = {}
     for generations in several:
         search = {"algorithm": algorithm, "seed": seed, f"{algorithm}.generations": generations}
         problem = make(name, {f"search.{key}": value for key, value in search.items()})
-        one = result[generations] = fit(problem, save, Silent(), last[0] if last else None)
+        one = result[generations] = fit(problem, checkpoints=checkpoints)
+        checkpoints = {"search": checkpoints["search"]}
         told = f"{name} {algorithm} {generations} seed {seed}: {np.rad2deg(one.best.rms):.6g} deg"
         print(told, "" if one.converged else "not converged", file=sys.stderr, flush=True)
     return result

@@ -20,8 +20,7 @@ from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.search import Search
+from hydroid.fitting.search import search
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.arm import Arm
@@ -134,9 +133,8 @@ def search_share(algorithm: str) -> float:
         return result
 
     problem.evaluate = timed  # type: ignore[method-assign]
-    search = Search(problem, problem.settings.search, Memo(problem))
     started = time.perf_counter()
-    search.run(None, lambda state, memo: None, lambda row: None)
+    search(problem, lambda row: None, lambda simulated, rms: None, {})
     wall = time.perf_counter() - started
     return 100 * (wall - spent) / wall
 

@@ -199,9 +199,9 @@ class ExtendedModel:
             for part, target in zip(parts[-1], targets, strict=False):
                 if not term.named:
                     added[part] = term.settings.model_copy(update={"quantity": target}), term.value
-        self._problem = with_open_start(problem, theta).extended(
-            {name: settings for name, (settings, _) in added.items()}
-        )
+        settings = problem.settings.with_parameters({name: one for name, (one, _) in added.items()})
+        opened = with_open_start(problem, theta).open_starts
+        self._problem = problem.varied(settings).with_open_starts(opened)
         names = self._problem.parameters.names
         self._base = np.array([*theta, *(value for _, value in added.values())])
         self._columns = [[names.index(name) for name in part] for part in parts]

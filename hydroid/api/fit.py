@@ -109,7 +109,7 @@ def fit(
     problem = Problem(settings, read) if workers is None else Problem(settings, read, workers)
     check_search(problem)
     if folder is None:
-        return FitResult(problem, run_fit(problem, lambda *_: None, progress or Silent()), None)
+        return FitResult(problem, run_fit(problem, progress), None)
     with folder.owned():
         log_start(settings, read, findings)
         began = time.monotonic()
@@ -133,11 +133,11 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
     from hydroid.report.fit_report import fit_page
     from hydroid.report.page_file import write_page
 
-    checkpoint = folder.begin_or_continue(problem.settings, problem.logs)
-    result = run_fit(problem, folder.save, progress, checkpoint, folder.refinements())
+    checkpoints = folder.begin_or_continue(problem.settings, problem.logs)
+    result = run_fit(problem, progress, checkpoints)
     folder.write_estimate(problem, result)
     began = time.monotonic()
-    last = problem.freed() if result.final == "joint" else problem
+    last = problem.varied(problem.settings.freed()) if result.final == "joint" else problem
     suggested = (
         suggestions(last, result.uncertainty, result.quantities, thorough=False)
         if result.best.usable

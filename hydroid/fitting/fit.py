@@ -2,17 +2,16 @@
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import Checkpoints, Refinement, refine
-from hydroid.fitting.search import Checkpoint, Search, SearchState
+from hydroid.fitting.checkpoints import Checkpoints
+from hydroid.fitting.refinement import refine
+from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty, uncertainty
 from hydroid.posterior.directions import Identifiability, identifiability
@@ -21,6 +20,7 @@ from hydroid.posterior.sources import Strain, strains
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search import compromise
+from hydroid.search.least_squares import Descent
 from hydroid.search.pareto import non_dominated
 
 _log = logging.getLogger(__name__)
@@ -51,18 +51,17 @@ class Estimate:
 class Fit:
     """What a fit found.
 
-    estimates: by name; `final` names the one to use. front: the non-dominated sets, shape (n, P), and their
-    objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave. uncertainty,
-    identifiability, quantities: what the logs say about the final estimate. strains: priors far from it.
-    seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was
-    resumed.
+    estimates: by name; `final` names the one to use. front: the non-dominated candidates, shape (n, P), and
+    their objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave.
+    uncertainty, identifiability, quantities: of the final estimate. strains: priors far from it. seconds:
+    wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
     estimates: dict[str, Estimate]
     final: str
     front: tuple[Array, Evaluation]
     history: Array
-    refinements: dict[str, Refinement]
+    refinements: dict[str, Descent]
     uncertainty: Uncertainty
     identifiability: Identifiability
     quantities: Quantities
@@ -70,14 +69,14 @@ class Fit:
     seconds: Mapping[str, float]
 
     @property
-    def refinement(self) -> Refinement | None:
+    def refinement(self) -> Descent | None:
         """The last refinement; None where there was none."""
         return next(reversed(self.refinements.values()), None)
 
     @property
     def converged(self) -> bool:
         """Whether every refinement reached an optimum."""
-        return all(r.ending.converged for r in self.refinements.values())
+        return all(r.converged for r in self.refinements.values())
 
     @property
     def best(self) -> Estimate:
@@ -101,7 +100,7 @@ class Fit:
 
 
 class Watcher(Protocol):
-    """What a fit tells while it runs."""
+    """Takes the progress of a fit."""
 
     def generation(self, row: Array) -> None:
         """Take a row of HISTORY."""
@@ -112,49 +111,39 @@ class Watcher(Protocol):
         ...
 
 
-def fit(
-    problem: Problem,
-    save: Callable[[SearchState, Memo], None],
-    watch: Watcher,
-    checkpoint: Checkpoint | None = None,
-    refinements: Checkpoints | None = None,
-) -> Fit:
-    """Search, take the estimates, refine the best of them.
+class Silent:
+    """Progress that is not shown."""
+
+    def generation(self, row: Array) -> None:
+        """Do nothing."""
+
+    def refining(self, simulated: int, rms: float) -> None:
+        """Do nothing."""
+
+
+def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints | None = None) -> Fit:
+    """Search, take the estimates, refine the best of them, and say what the last one is worth.
 
     Args:
         problem: the estimation problem with its settings.
-        save: keeps the search's state now and then.
-        watch: takes how far the fit is.
-        checkpoint: where an interrupted search was.
-        refinements: how far interrupted refinements were; takes how far these are.
+        watch: takes the progress.
+        checkpoints: what an interrupted fit stored, to continue from; takes the states of this one.
 
     Raises:
         RunError: every simulated candidate diverged.
     """
-    settings, began = problem.settings, time.perf_counter()
-    memo = Memo(problem)
-    if checkpoint is not None:
-        memo.restore(*checkpoint.memo)
-    if settings.search.algorithm == "multistart":
-        search = Multistart(problem, settings.search, memo, watch.refining, refinements)
-    else:
-        search = Search(problem, settings.search, memo)
-    state = search.run(checkpoint.state if checkpoint else None, save, watch.generation)
-    theta = search.theta(state.population)
-    evaluation = memo.evaluate(theta)
-    if search.single:
-        candidates = {"best": compromise.best(theta, state.population.objectives[:, 0])}
-    else:
-        candidates = _from_front(theta, evaluation, memo, settings.search.compromise)
-    estimates = _usable_first(_estimates(problem, candidates))
+    watch, checkpoints = watch or Silent(), {} if checkpoints is None else checkpoints
+    began = time.perf_counter()
+    searched = search(problem, watch.generation, watch.refining, checkpoints)
+    estimates = _usable_first(_estimates(problem, _candidates(problem, searched)))
+    final, last = next(iter(estimates)), problem
     start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
-    searched = time.perf_counter()
-    results, last, final = dict[str, Refinement](), problem, next(iter(estimates))
-    for name in _refined(problem):
-        last = problem.freed() if name == "joint" else problem
-        assert settings.refinement is not None
-        result = refine(last, start.theta, settings.refinement, watch.refining, refinements, name)
-        if not result.ending.converged:
+    search_ended = time.perf_counter()
+    refinements = dict[str, Descent]()
+    for name, last in _refined(problem):
+        assert problem.settings.refinement is not None
+        result = refine(last, start.theta, problem.settings.refinement, watch.refining, checkpoints, name)
+        if not result.converged:
             _log.warning(
                 "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
                 "optimum.",
@@ -162,35 +151,52 @@ def fit(
                 name,
             )
         estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
-        results[name], start, final = result, estimates[name], name
+        refinements[name], start, final = result, estimates[name], name
     refined = time.perf_counter()
-    told = uncertainty(last, estimates[final].theta)
-    directions = identifiability(last, told)
-    determined = quantities(last, told)
-    seconds = {
-        "search": searched - began,
-        "refinement": refined - searched,
-        "uncertainty": time.perf_counter() - refined,
-    }
+    about = uncertainty(last, estimates[final].theta)
+    directions = identifiability(last, about)
+    determined = quantities(last, about)
     return Fit(
         estimates,
         final,
-        _front(theta, evaluation, memo),
-        state.history,
-        results,
-        told,
+        _front(searched),
+        searched.history,
+        refinements,
+        about,
         directions,
         determined,
-        strains(last, told.theta, told.jacobian),
-        seconds,
+        strains(last, about.theta, about.jacobian),
+        {
+            "search": search_ended - began,
+            "refinement": refined - search_ended,
+            "uncertainty": time.perf_counter() - refined,
+        },
     )
 
 
-def _refined(problem: Problem) -> list[str]:
-    """Names of the estimates that refinements give, in order."""
+def _refined(problem: Problem) -> list[tuple[str, Problem]]:
+    """Names of the estimates that refinements give, with what each refines, in order."""
     if problem.settings.refinement is None:
         return []
-    return ["refined", "joint"] if problem.settings.joint_refinement else ["refined"]
+    refined = [("refined", problem)]
+    if problem.settings.joint_refinement:
+        refined.append(("joint", problem.varied(problem.settings.freed())))
+    return refined
+
+
+def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
+    """The estimates that a search gives, by name, the one that the settings ask for first."""
+    theta, memo = searched.theta, searched.memo
+    if searched.single:
+        return {"best": compromise.best(theta, searched.population.objectives[:, 0])}
+    segments = memo.evaluate(theta).segments
+    found = {
+        "average": compromise.average(theta, segments),
+        "utopia": compromise.utopia(theta, segments),
+        "best": memo.best,  # over the whole record it may have left the population
+    }
+    first = problem.settings.search.compromise
+    return {first: found[first]} | found
 
 
 def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Estimate]:
@@ -222,23 +228,9 @@ def _usable_first(estimates: dict[str, Estimate]) -> dict[str, Estimate]:
     return dict(sorted(estimates.items(), key=lambda item: not item[1].usable))
 
 
-def _from_front(theta: Array, evaluation: Evaluation, memo: Memo, first: str) -> dict[str, Array]:
-    """The three ways to one estimate, the one that the settings ask for first.
-
-    The best over the whole record may have left the population: it is taken from all that was simulated.
-    """
-    found = {
-        "average": compromise.average(theta, evaluation.segments),
-        "utopia": compromise.utopia(theta, evaluation.segments),
-        "best": memo.best,
-    }
-    return {first: found[first]} | found
-
-
-def _front(theta: Array, evaluation: Evaluation, memo: Memo) -> tuple[Array, Evaluation]:
-    """The different non-dominated sets of the last population."""
-    _, first = np.unique(theta, axis=0, return_index=True)
-    keep = np.sort(first)
-    theta = theta[keep]
-    theta = theta[non_dominated(evaluation.segments[keep])]
-    return theta, memo.evaluate(theta)
+def _front(searched: Searched) -> tuple[Array, Evaluation]:
+    """The different non-dominated candidates of the last population."""
+    _, first = np.unique(searched.theta, axis=0, return_index=True)
+    theta = searched.theta[np.sort(first)]
+    theta = theta[non_dominated(searched.memo.evaluate(theta).segments)]
+    return theta, searched.memo.evaluate(theta)

@@ -1,25 +1,40 @@
-"""Objectives of all candidates simulated so far, so that none is simulated twice."""
+"""Objectives of all candidates simulated so far: none is simulated twice, also not by a resumed run."""
 
 import numpy as np
 
+from hydroid.errors import RunError
+from hydroid.fitting.checkpoints import Arrays
 from hydroid.parameters import Array
 from hydroid.problem.problem import Evaluation, Problem
 
 
 class Memo:
-    """Evaluates each candidate once: identical chromosomes are not simulated again."""
+    """Evaluates each candidate once: identical chromosomes are not simulated again.
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    A search is deterministic. So its memo is all that a checkpoint needs: a resumed search begins anew, and
+    gets what is stored until it asks for the first candidate that is not.
+
+    Attributes:
+        infeasible: candidates whose simulation diverged.
+        elsewhere: candidates that a local method simulated on its way to those evaluated here.
+    """
+
+    def __init__(self, problem: Problem, stored: Arrays | None = None) -> None:
+        self.problem, self.infeasible, self.elsewhere = problem, 0, 0
         self._values: dict[bytes, Array] = {}
         """objectives of each candidate, overall last, shape (S + 1,)"""
-        self.infeasible = 0
-        """candidates whose simulation diverged"""
+        pairs = zip(stored["theta"], stored["values"], strict=True) if stored else ()
+        self._stored = {theta.tobytes(): values.copy() for theta, values in pairs}
 
     @property
     def simulated(self) -> int:
-        """Candidates simulated so far."""
-        return len(self._values)
+        """Candidates simulated so far, those of a run that this one resumes included."""
+        return len(self._values) + self.elsewhere
+
+    @property
+    def replays(self) -> bool:
+        """Whether candidates of the resumed run have not been asked for yet."""
+        return bool(self._stored)
 
     @property
     def best(self) -> Array:
@@ -27,24 +42,33 @@ class Memo:
         return np.frombuffer(min(self._values, key=lambda key: float(self._values[key][-1])))
 
     def evaluate(self, theta: Array) -> Evaluation:
-        """Evaluate theta, shape (n, P), simulating what is new in it."""
+        """Evaluate theta, shape (n, P), simulating what is new in it.
+
+        Raises:
+            RunError: a resumed search does not repeat itself.
+        """
         new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
-        if new:
-            result = self.problem.evaluate(np.array(list(new.values())))
-            values = np.column_stack([result.segments, result.overall])
+        values = {key: self._stored.pop(key) for key in new if key in self._stored}
+        unknown = [key for key in new if key not in values]
+        if unknown and self._stored:
+            raise RunError(
+                "the search cannot be continued: its library does not repeat what it did before",
+                hint="use the versions that the run began with, or begin another with --out",
+            )
+        if unknown:
+            result = self.problem.evaluate(np.array([new[key] for key in unknown]))
+            rows = np.column_stack([result.segments, result.overall])
             # a candidate with one infinite objective is infeasible: none of its objectives may win
-            failed = ~np.isfinite(values).all(axis=1)
-            values[failed] = np.inf
-            self.infeasible += int(failed.sum())
-            self._values.update(zip(new, values, strict=True))
-        values = np.array([self._values[row.tobytes()] for row in theta])
-        return Evaluation(values[:, :-1].copy(), values[:, -1].copy())
+            rows[~np.isfinite(rows).all(axis=1)] = np.inf
+            values |= zip(unknown, rows, strict=True)
+        self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
+        self._values.update((key, values[key]) for key in new)
+        found = np.array([self._values[row.tobytes()] for row in theta])
+        return Evaluation(found[:, :-1].copy(), found[:, -1].copy())
 
-    def arrays(self) -> tuple[Array, Array]:
+    def arrays(self) -> Arrays:
         """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
-        return np.array([np.frombuffer(key) for key in self._values]), np.array(list(self._values.values()))
-
-    def restore(self, theta: Array, values: Array) -> None:
-        """Restore what `arrays` returned."""
-        self._values = {row.tobytes(): v.copy() for row, v in zip(theta, values, strict=True)}
-        self.infeasible = int(np.sum(~np.isfinite(values[:, -1])))
+        return {
+            "theta": np.array([np.frombuffer(key) for key in self._values]),
+            "values": np.array(list(self._values.values())),
+        }

@@ -16,79 +16,85 @@ together is left to the refinement that follows the search.
 from collections.abc import Callable
 
 import numpy as np
+from numpy.random import Generator
 
+from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.memo import Memo
-from hydroid.fitting.refinement import Checkpoints, Refinement, refine
-from hydroid.fitting.search import HISTORY, SearchState
+from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.algorithm import Population
-from hydroid.settings.search import RefinementSettings, SearchSettings
+from hydroid.search.coding import Genes
+from hydroid.search.least_squares import Descent
+from hydroid.settings.search import RefinementSettings
 
 DRAWS = 16
 """candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
+GAIN_TOLERANCE = 1e-4
+"""coarser than the refinement's, which starts from the best result"""
 
 
 class Multistart:
-    """Least squares from one random start after the other.
+    """Least squares from one random start after the other: an `Algorithm` whose chromosomes are theta.
 
-    The state is that of a search by populations. Its candidates are the points that the starts reached; its
-    objective is their rms residual, priors included. A start depends on the seed and its number alone.
+    Its objective is the rms residual, priors included. A start depends on the seed and its number alone.
 
     Args:
         problem: what is minimised.
-        settings: of the search: the seed, and how each start is fitted.
-        memo: takes the points reached.
-        progress: takes the number of simulations of the start under way, and its rms error [rad].
+        memo: counts the simulations.
+        progress: takes the number of simulations, and the rms error [rad] of the start under way.
         checkpoints: of the refinements.
     """
 
     single = True
 
     def __init__(
-        self,
-        problem: Problem,
-        settings: SearchSettings,
-        memo: Memo,
-        progress: Callable[[int, float], None],
-        checkpoints: Checkpoints | None = None,
+        self, problem: Problem, memo: Memo, progress: Callable[[int, float], None], checkpoints: Checkpoints
     ) -> None:
-        self._problem, self._memo, self._progress = problem, memo, progress
-        self._checkpoints: Checkpoints = {} if checkpoints is None else checkpoints
-        self._seed, self._settings = settings.seed, settings.multistart
-        self._joints = problem.lone_joints
+        self.settings = problem.settings.search.multistart
+        self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
+        self._descent = RefinementSettings(iterations=self.settings.iterations, gain_tolerance=GAIN_TOLERANCE)
+        self._best: dict[int, Descent] = {}
+        """the best fit of each joint alone, over the starts so far"""
+        self._rms = np.inf
 
-    def run(
-        self,
-        state: SearchState | None,
-        save: Callable[[SearchState, Memo], None],
-        watch: Callable[[Array], None],
-    ) -> SearchState:
-        """Run from `state`, or from the first start, to the last.
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """The point that the next start reaches, shape (1, P)."""
+        number = 0 if population is None else len(population)
+        theta = self.start(number)
+        if joints := lone_joints(self._problem):
+            theta = self._joint_by_joint(joints, number, theta)
+            self._memo.elsewhere += 1
+            rows = self._problem.residuals(theta[None])
+            self._rms = float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf
+        else:
+            result = self._grown(self._problem, theta, f"start {number + 1}")
+            theta = _theta(self._problem, result)
+            size = self._problem.measured.size + len(self._problem.priors)
+            self._rms = float(np.sqrt(2 * result.cost / size))
+        return theta[None]
 
-        Args:
-            state: a state to continue from.
-            save: called with the state after every start.
-            watch: called with a row of HISTORY after every start.
-        """
-        while state is None or len(state.history) < self._settings.starts:
-            state = self._next(state)
-            save(state, self._memo)
-            watch(state.history[-1])
-        return state
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """The points reached so far, with their rms residuals."""
+        reached = Population(offspring.chromosomes, np.array([[self._rms]]))
+        return reached if population is None else population.join(reached)
 
-    def theta(self, population: Population) -> Array:
-        """Return the points reached, shape (n, P)."""
-        return self._problem.parameters.from_unit(population.chromosomes)
+    def decode(self, chromosomes: Genes) -> Array:
+        """The points themselves, shape (n, P)."""
+        return chromosomes
+
+    def reached(self, population: Population) -> bool:
+        """Never: it ends after all starts."""
+        return False
 
     def start(self, number: int) -> Array:
         """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all.
 
         The first one is the start that the parameters state, if they do.
         """
-        rng = np.random.default_rng([self._seed, number])
+        rng = np.random.default_rng([self._problem.settings.search.seed, number])
         unit = rng.random((DRAWS, int(self._problem.parameters.free.sum())))
         if number == 0 and self._problem.start is not None:
             unit[0] = self._problem.start
@@ -96,74 +102,33 @@ class Multistart:
         shortest = self._parts(self._problem)[0]
         return drawn[np.argmax(np.isfinite(shortest.residuals(drawn)).all(axis=1))]
 
-    def _next(self, state: SearchState | None) -> SearchState:
-        """The state after one more start."""
-        done = 0 if state is None else len(state.history)
-        theta, simulated = self.start(done), 0 if state is None else int(state.history[-1, 1])
-        if self._joints:
-            theta, simulated = self._each_joint(done, theta, simulated)
-            rows = self._problem.residuals(theta[None])
-            point, rms, simulated = (
-                self._problem.parameters.to_unit(theta[None])[0],
-                _rms(rows),
-                simulated + 1,
-            )
-        else:
-            result, simulated = self._over_parts(self._problem, theta, f"start {done + 1}", simulated)
-            size = self._problem.measured.size + len(self._problem.priors)
-            point, rms = result.point, np.sqrt(2 * result.cost / size)
-        population = Population(point[None], np.array([[rms]]))
-        history = np.empty((0, len(HISTORY)))
-        if state is not None:
-            population, history = state.population.join(population), state.history
-        overall = self._memo.evaluate(self.theta(population)).overall
-        finite = overall[np.isfinite(overall)]
-        infeasible = int(np.sum(~population.feasible))
-        median = np.median(finite) if finite.size else np.inf
-        row = [done + 1, simulated, simulated, infeasible, overall.min(), median]
-        return SearchState(population, {}, np.vstack([history, row]))
+    def _joint_by_joint(self, joints: tuple[int, ...], number: int, theta: Array) -> Array:
+        """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
+        for joint in joints:
+            problem = alone(self._problem, joint, theta)
+            result = self._grown(problem, theta, f"start {number + 1} joint {joint}")
+            best = self._best[joint] = min(self._best.get(joint, result), result, key=lambda r: r.cost)
+            reached = _theta(problem, best if number == self.settings.generations else result)
+            theta = np.where(problem.parameters.free, reached, theta)
+        return theta
 
-    def _each_joint(self, number: int, theta: Array, simulated: int) -> tuple[Array, int]:
-        """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint.
-
-        Returns the point reached, shape (P,), and the number of simulations so far.
-        """
-        for joint in self._joints:
-            problem = self._problem.alone(joint, theta)
-            result, simulated = self._over_parts(
-                problem, theta, f"start {number + 1} joint {joint}", simulated
-            )
-            own = problem.parameters.free
-            if number + 1 == self._settings.starts:
-                for other in range(number):  # refinements that ended are read, not repeated
-                    name = f"start {other + 1} joint {joint}"
-                    rival, _ = self._over_parts(problem, theta, name, simulated)
-                    result = min(result, rival, key=lambda r: r.cost)
-            theta = theta.copy()
-            theta[own] = problem.parameters.from_unit(result.point[None])[0, own]
-        return theta, simulated
-
-    def _over_parts(
-        self, problem: Problem, theta: Array, name: str, simulated: int
-    ) -> tuple[Refinement, int]:
-        """Fit theta, shape (P,), to growing parts of the records; also returns the simulations so far."""
-        settings = RefinementSettings(
-            iterations=self._settings.iterations, gain_tolerance=self._settings.gain_tolerance
-        )
-        results = list[Refinement]()
+    def _grown(self, problem: Problem, theta: Array, name: str) -> Descent:
+        """Fit theta, shape (P,), to growing parts of the records; the last part is all of them."""
+        result = None
         for number, part in enumerate(self._parts(problem), 1):
+            before = self._memo.simulated
             result = refine(
                 part,
                 theta,
-                settings,
-                lambda n, rms, before=simulated: self._progress(before + n, rms),
+                self._descent,
+                lambda n, rms, before=before: self._progress(before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
             )
-            theta = part.parameters.from_unit(result.point[None])[0]
-            simulated += result.evaluations
-            results.append(result)
-        return results[-1], simulated
+            theta = _theta(part, result)
+            self._memo.elsewhere += result.evaluations
+        assert result is not None
+        return result
 
     def _parts(self, problem: Problem) -> list[Problem]:
         """The problem's first seconds, more and more of them, and at last all of it.
@@ -171,16 +136,41 @@ class Multistart:
         A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
         """
         longest = max(log.duration for log in problem.logs)
-        parts = [problem.first(h) for h in self._settings.horizons if h < longest]
+        settings = problem.settings.in_one_segment()
+        parts = [
+            problem.varied(settings, [log.first(seconds) for log in problem.logs])
+            for seconds in self.settings.horizons
+            if seconds < longest
+        ]
         return [*(part for part in parts if _moves(part, problem)), problem]
+
+
+def lone_joints(problem: Problem) -> tuple[int, ...]:
+    """Return the joints that can be fitted alone, numbered from 1: hydraulic ones with their own parameters.
+
+    There are none if there are fewer than two, or if a log does not measure how a driven joint moves.
+    """
+    measured = all(log.measured[log.driven].all() for log in problem.logs)
+    driven = np.any([log.driven for log in problem.logs], axis=0)
+    settings = problem.settings
+    joints = tuple(j for j in settings.outputs if driven[j - 1] and settings.acting_on(j))
+    return joints if settings.stage == "hyd" and measured and len(joints) > 1 else ()
+
+
+def alone(problem: Problem, joint: int, theta: Array) -> Problem:
+    """Return the problem of one joint's own parameters; all other joints follow their logged motion.
+
+    All other parameters are held at theta, shape (P,). Logs that do not drive the joint are left out.
+    """
+    settings = problem.settings.alone(joint, problem.parameters.mapping(theta))
+    return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
+
+
+def _theta(problem: Problem, result: Descent) -> Array:
+    return problem.parameters.from_unit(result.point[None])[0]
 
 
 def _moves(part: Problem, whole: Problem) -> bool:
     """Whether any signal moves in the first part of the records."""
     both = zip(part.channels, whole.channels, strict=True)
     return any(np.ptp(first.measured) > MOVES * np.ptp(all_.measured) for first, all_ in both)
-
-
-def _rms(rows: Array) -> float:
-    """Root of the mean square of residuals; inf if they are not finite."""
-    return float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf

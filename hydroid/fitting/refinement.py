@@ -1,94 +1,46 @@
 """Refinement of an estimate: least squares over all channels, with the priors as further measurements."""
 
 import logging
-import time
-from collections.abc import Callable, MutableMapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hydroid.fitting import search
+from hydroid.fitting.checkpoints import Arrays, Checkpoints, saving
 from hydroid.parameters import Array
 from hydroid.posterior.noise import prior_weight
 from hydroid.posterior.open_start import with_open_start
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import start, step
-from hydroid.search.least_squares_state import Ending, State
+from hydroid.search.least_squares import Descent, start, step
 from hydroid.settings.search import RefinementSettings
 
-ROUNDS = 4
-"""times at most that the noise is estimated, to weigh the logs against the priors"""
-COARSE = 1e-2
-"""`gain_tolerance` of the first of several rounds: the noise at the start weighs priors too heavily"""
-SETTLED = 0.02
-"""relative change of the noise below which another round would change nothing"""
-
-Arrays = dict[str, NDArray[Any]]
-Checkpoints = MutableMapping[str, Arrays]
-"""how far refinements are, by name"""
+SETTLED = 1e-3
+"""relative change of the noise below which the priors keep their weight"""
+MAX_NOISES = 8
+"""times at most that the noise is estimated: its model may jump to and fro between two orders"""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Refinement:
-    """Result of a refinement.
+class _Refinement:
+    """A refinement under way.
 
     Attributes:
-        point: best point of the unit box of the free parameters, shape (p,).
-        cost_before: half the sum of the squared residuals at the start; inf if it failed.
-        cost: the same at `point`, never more than before.
-        evaluations: candidates simulated.
-        iterations: steps that lowered the cost.
-        ending: why it ended.
+        descent: over the residuals, then the priors' scores times `weight`.
+        weight: residual that a prior's standard deviation counts [rad].
+        anchor: where the noise, and the effect of open start angles, were estimated: shape (p,).
+        noises: how often they were.
     """
 
-    point: Array
-    cost_before: float
-    cost: float
-    evaluations: int
-    iterations: int
-    ending: Ending
-
-    def __str__(self) -> str:
-        cost = f"half the sum of squares {self.cost_before:.6g} to {self.cost:.6g}"
-        return f"{cost} in {self.evaluations} simulations; {self.ending.value}"
-
-
-@dataclass(frozen=True, eq=False)
-class _Descent:
-    """A refinement under way: least squares with the priors weighed by one estimate of the noise.
-
-    weight: residual that a prior's standard deviation counts [rad]. anchor: point of the unit box at which
-    the effect of open start angles was taken, shape (p,). rounds: estimates of both so far.
-    evaluations, iterations, cost_before: of the rounds before this one, and of the first start.
-    """
-
-    state: State
+    descent: Descent
     weight: float
     anchor: Array
-    rounds: int
-    evaluations: int
-    iterations: int
-    cost_before: float
+    noises: int = 1
 
     def arrays(self) -> Arrays:
-        own = {n: np.asarray(v) for n, v in vars(self).items() if n != "state"}
-        return {f"descent.{n}": v for n, v in own.items()} | self.state.arrays()
-
-    @staticmethod
-    def from_arrays(arrays: Arrays) -> "_Descent":
-        kept = {n.removeprefix("descent."): v for n, v in arrays.items() if n.startswith("descent.")}
-        own: dict[str, Any] = {n: v if v.ndim else v.item() for n, v in kept.items()}
-        return _Descent(State.from_arrays(arrays), **own)
-
-    def result(self) -> Refinement:
-        s = self.state
-        evaluations, iterations = self.evaluations + s.evaluations, self.iterations + s.iterations
-        assert s.ending is not None
-        return Refinement(s.point, self.cost_before, s.cost, evaluations, iterations, s.ending)
+        own = {"weight": self.weight, "anchor": self.anchor, "noises": self.noises}
+        return self.descent.arrays() | {name: np.asarray(value) for name, value in own.items()}
 
 
 def refine(
@@ -98,12 +50,13 @@ def refine(
     progress: Callable[[int, float], None],
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
-) -> Refinement:
+) -> Descent:
     """Improve an estimate by bounded least squares.
 
     Priors join as residuals of (value - prior) / sd times what one standard deviation counts beside the logs'
-    noise (`prior_weight`). The noise, and the effect of open start angles, are taken at the start and again
-    at the result, until the noise settles.
+    noise (`prior_weight`). The noise, and the effect of open start angles, are estimated at the start, and
+    again where a Jacobian is taken, until they settle. Between two Jacobians nothing is stored: a resumed
+    refinement repeats the steps since the last one.
 
     Args:
         problem: the problem.
@@ -118,88 +71,64 @@ def refine(
     """
     checkpoints = {} if checkpoints is None else checkpoints
     stored = checkpoints.get(name)
-    if stored is not None and "descent.weight" not in stored:
-        values: dict[str, Any] = {n: v if v.ndim else v.item() for n, v in stored.items()}
-        values["ending"] = Ending[values["ending"]]
-        return Refinement(**values)
-    descent = _begin(problem, theta) if stored is None else _Descent.from_arrays(stored)
-    opened = _opened(problem, descent)
-    saved, last = time.monotonic(), descent
-    try:
-        while (after := _next(opened, descent, settings)) is not None:
-            opened = opened if after.rounds == descent.rounds else _opened(problem, after)
-            descent = after
-            error = problem.rms(descent.state.residual[None, : problem.measured.size])[0]
-            progress(descent.evaluations + descent.state.evaluations, float(error))
-            if time.monotonic() - saved > search.SAVE_EVERY:
-                checkpoints[name] = descent.arrays()
-                saved, last = time.monotonic(), descent
-    except BaseException:
-        if descent is not last:
-            checkpoints[name] = descent.arrays()
-        raise
-    result = descent.result()
-    _log.info("refinement of %d parameters: %s", result.point.size, result)
-    values = asdict(result) | {"ending": result.ending.name}
-    checkpoints[name] = {n: np.asarray(v) for n, v in values.items()}
-    return result
+    if stored is None:
+        now = _estimated(problem, problem.parameters.to_unit(theta[None])[0])
+    else:
+        own = float(stored["weight"]), stored["anchor"], int(stored["noises"])
+        now = _Refinement(Descent.from_arrays(stored), *own)
+    if stored is not None and now.descent.ended:
+        return now.descent
+    residuals = _residuals(problem, now)
+    with saving(checkpoints, name) as keep:
+        while not now.descent.ended:
+            if not len(now.descent.jacobian):
+                after = _following(problem, now)
+                residuals = residuals if after is now else _residuals(problem, after)
+                now = after
+                keep(now.arrays)
+            now = replace(now, descent=step(now.descent, residuals, settings))
+            error = problem.rms(now.descent.residual[None, : problem.measured.size])[0]
+            progress(now.descent.evaluations, float(error))
+        keep(now.arrays)
+    _log.info("refinement of %d parameters: %s", now.descent.point.size, now.descent)
+    return now.descent
 
 
-def _begin(problem: Problem, theta: Array) -> _Descent:
-    unit = problem.parameters.to_unit(theta[None])[0]
-    row = with_open_start(problem, theta).residuals(theta[None])[0]
-    weight = _weight(problem, row)
-    state = start(unit, _with_priors(problem, row[None], unit[None], weight)[0])
-    return _Descent(state, weight, unit, 1, 0, 0, state.cost)
+def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
+    """Begin at a point of the unit box, (p,), with the noise there; `row`, (R,): its residuals, if known."""
+    theta, weight = problem.parameters.from_unit(unit[None]), 0.0
+    rows = with_open_start(problem, theta[0]).residuals(theta) if row is None else row[None]
+    if len(problem.priors) or problem.leaves_start_open:
+        weight = prior_weight(problem.channels, rows[0], problem.settings.objective)
+    return _Refinement(start(unit, _with_priors(problem, rows, unit[None], weight)[0]), weight, unit)
 
 
-def _opened(problem: Problem, descent: _Descent) -> Problem:
-    return with_open_start(problem, problem.parameters.from_unit(descent.anchor[None])[0])
+def _following(problem: Problem, now: _Refinement) -> _Refinement:
+    """Return the refinement with the noise estimated at its point, if it has changed."""
+    if not now.weight or now.noises == MAX_NOISES:
+        return now
+    row, point = now.descent.residual[: problem.measured.size], now.descent.point
+    weight = prior_weight(problem.channels, row, problem.settings.objective)
+    if abs(weight - now.weight) <= SETTLED * now.weight:
+        return now
+    here = _estimated(problem, point, None if problem.leaves_start_open else row)
+    descent = replace(now.descent, residual=here.descent.residual, cost=here.descent.cost)
+    return replace(here, descent=descent, noises=now.noises + 1)
 
 
-def _next(problem: Problem, descent: _Descent, settings: RefinementSettings) -> _Descent | None:
-    """The refinement one step on; None where it has ended."""
-    state, weight = descent.state, descent.weight
-    first = descent.rounds == 1 and (len(problem.priors) > 0 or problem.leaves_start_open)
-    if state.ending is None:
+def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:
+    """What least squares minimises: points of the unit box, (n, p), to residuals and weighed scores."""
+    opened = with_open_start(problem, problem.parameters.from_unit(now.anchor[None])[0])
 
-        def residuals(unit: Array) -> Array:
-            rows = problem.residuals(problem.parameters.from_unit(unit))
-            return _with_priors(problem, rows, unit, weight)
+    def residuals(unit: Array) -> Array:
+        rows = opened.residuals(problem.parameters.from_unit(unit))
+        return _with_priors(problem, rows, unit, now.weight)
 
-        if first and settings.gain_tolerance < COARSE:
-            settings = settings.model_copy(update={"gain_tolerance": COARSE})
-        return replace(descent, state=step(state, residuals, settings))
-    row = state.residual[: problem.measured.size]
-    again = _weight(problem, row)
-    if descent.rounds == ROUNDS or not (first or abs(again - weight) > SETTLED * weight):
-        return None
-    # the next round starts from a row that is known, at no simulation, unless a start angle is open
-    if problem.leaves_start_open:
-        theta = problem.parameters.from_unit(state.point[None])
-        row = with_open_start(problem, theta[0]).residuals(theta)[0]
-    state = start(state.point, _with_priors(problem, row[None], state.point[None], again)[0])
-    return replace(
-        descent,
-        state=replace(state, evaluations=0, cycle_evaluations=0),
-        weight=again,
-        anchor=state.point,
-        rounds=descent.rounds + 1,
-        evaluations=descent.evaluations + descent.state.evaluations,
-        iterations=descent.iterations + descent.state.iterations,
-    )
+    return residuals
 
 
 def _with_priors(problem: Problem, rows: Array, unit: Array, weight: float) -> Array:
     """Rows of residuals, (n, R), with the scores of the priors at points of the unit box, (n, p)."""
     if not len(problem.priors):
         return rows
-    scores = problem.priors.scores(problem.parameters.from_unit(unit))
-    return np.column_stack([rows, weight * scores])
-
-
-def _weight(problem: Problem, row: Array) -> float:
-    """What a prior's standard deviation counts beside the noise of a residual, shape (R,) [rad]."""
-    if not (len(problem.priors) or problem.leaves_start_open):
-        return 0.0
-    return prior_weight(problem.channels, row, problem.settings.objective)
+    return np.column_stack([rows, weight * problem.priors.scores(problem.parameters.from_unit(unit))])

@@ -4,7 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,7 +25,6 @@ from hydroid.problem.objectives import overall_objective, segment_bounds, segmen
 from hydroid.problem.priors import Priors
 from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.problem import ParameterSettings, SegmentSettings
 from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
 from hydroid.simulation.scenario import Scenario
 
@@ -95,18 +94,9 @@ class Problem:
         driven = np.any([log.driven for log in self.logs], axis=0)
         return tuple(sorted({*(np.flatnonzero(driven) + 1).tolist(), *self.settings.outputs}))
 
-    def freed(self) -> "Problem":
-        """Return the same problem with every parameter free that can be, those held fixed included."""
-        return Problem(self.settings.freed(), self.logs, self._spread)
-
-    def extended(self, parameters: Mapping[str, ParameterSettings]) -> "Problem":
-        """Return the same problem with further parameters behind its own."""
-        settings = self.settings.model_copy(
-            update={"parameters": self.settings.parameters | dict(parameters)}
-        )
-        extended = Problem(settings, self.logs, self._spread)
-        extended.open_starts = self.open_starts
-        return extended
+    def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
+        """Return the problem with other settings, and other logs or the same, simulated in the same place."""
+        return Problem(settings, self.logs if logs is None else logs, self._spread)
 
     @property
     def leaves_start_open(self) -> bool:
@@ -153,43 +143,6 @@ class Problem:
         follows = self.settings.simulation.other_joints == "measured"
         compared = np.isin(np.arange(log.joints), self.outputs)
         return (np.flatnonzero(log.measured & (log.driven | compared | (not follows))) + 1).tolist()
-
-    def first(self, seconds: float) -> "Problem":
-        """Return the problem of the first seconds after each log's first command, one segment per channel."""
-        objective = self.settings.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
-        settings = self.settings.model_copy(update={"objective": objective})
-        return Problem(settings, [log.first(seconds) for log in self.logs], self._spread)
-
-    @property
-    def lone_joints(self) -> tuple[int, ...]:
-        """Joints that can be fitted alone, numbered from 1: hydraulic ones with parameters of their own.
-
-        None if there are fewer than two, or if a log does not measure how a driven joint moves.
-        """
-        measured = all(log.measured[log.driven].all() for log in self.logs)
-        joints = tuple(j for j in self.settings.outputs if self._own(j))
-        return joints if self.settings.stage == "hyd" and measured and len(joints) > 1 else ()
-
-    def alone(self, joint: int, theta: Array) -> "Problem":
-        """Return the problem of one joint's own parameters; all other joints follow their logged motion.
-
-        All other parameters are held at theta, shape (P,). Logs that do not drive the joint are left out.
-        """
-        own, values = self._own(joint), self.parameters.mapping(theta)
-        parameters = {
-            n: p if n in own else p.model_copy(update={"fixed": values[n]})
-            for n, p in self.settings.parameters.items()
-        }
-        simulation = self.settings.simulation.model_copy(update={"other_joints": "measured"})
-        changes = {"parameters": parameters, "outputs": (joint,), "simulation": simulation}
-        logs = [log.driving(joint) for log in self.logs if log.driven[joint - 1]]
-        return Problem(self.settings.model_copy(update=changes), logs, self._spread)
-
-    def _own(self, joint: int) -> set[str]:
-        """Names of the free parameters that act on this joint only."""
-        driven = any(log.driven[joint - 1] for log in self.logs)
-        parameters = self.settings.parameters.items()
-        return {n for n, p in parameters if driven and p.fixed is None and p.joints == (joint,)}
 
     def theta(self, unit: Array) -> Array:
         """Return candidates, (n, P), from points of the search's unit box, moved to where the priors hold."""
@@ -253,8 +206,8 @@ class Problem:
     @cached_property
     def _on_worker(self) -> "Problem":
         """The same problem as a worker has it."""
-        threads = self.settings.simulation.threads or 1
-        simulation = self.settings.simulation.model_copy(update={"threads": threads})
+        simulation = self.settings.simulation
+        simulation = simulation.model_copy(update={"threads": simulation.threads or 1})
         return Problem(self.settings.model_copy(update={"simulation": simulation}), self.logs)
 
     def _segments(self, channel: Channel) -> NDArray[np.int64]:

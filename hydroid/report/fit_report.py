@@ -87,7 +87,7 @@ def fit_page(
         for i, r in enumerate(found)
     ]
     responses = dict(zip(names, found, strict=True))
-    last = problem.freed() if fit.final == "joint" else problem
+    last = problem.varied(problem.settings.freed()) if fit.final == "joint" else problem
     sections = (
         fit_steps(problem, fit, suggested, run),
         Section(

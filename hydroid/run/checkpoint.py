@@ -1,156 +1,83 @@
-"""A search's state as a file: whole, checked before it is believed, and the one before it kept."""
+"""A run's checkpoints as a file: whole, checked before it is believed, and the one before it kept."""
 
 import hashlib
 import io
-import json
 import logging
 from collections import UserDict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.errors import RunError
 from hydroid.files import undisturbed, write_atomic
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.search import Checkpoint, SearchState
-from hydroid.search.algorithm import Population
-
-PREVIOUS, DAMAGED = "checkpoint.previous.npz", "checkpoint.damaged.npz"
-"""names of the checkpoint before the newest, and of a newest one that turned out to be damaged"""
-
-ANOTHER = "is another run's"
-
-Arrays = dict[str, NDArray[Any]]
+from hydroid.fitting.checkpoints import Arrays
 
 _log = logging.getLogger(__name__)
 
 
-def write_checkpoint(file: Path, state: SearchState, memo: Memo, run: str) -> None:
-    """Write the checkpoint of a run, by its id, as npz without pickle; the one before it becomes PREVIOUS.
+class CheckpointFile(UserDict[str, Arrays]):
+    """Checkpoints by name; every change is written to one file, as npz without pickle.
 
-    Raises:
-        RunError: it cannot be written. Both that were there before are as they were.
-    """
-    theta, values = memo.arrays()
-    arrays = {
-        "chromosomes": state.population.chromosomes,
-        "objectives": state.population.objectives,
-        "history": state.history,
-        "memo_theta": theta,
-        "memo_values": values,
-        "rng": np.frombuffer(json.dumps(state.rng).encode(), dtype=np.uint8),
-    }
-    with undisturbed():
-        write_atomic(file, _content(arrays, run), keep=file.with_name(PREVIOUS))
-
-
-def read_checkpoint(file: Path, run: str) -> Checkpoint | None:
-    """Read a run's newest checkpoint that is whole; None where it was stopped before its first.
-
-    A damaged one is put aside as DAMAGED with a warning, and the one before it is taken: what the search did
-    since is done again, to the same bits.
-
-    Raises:
-        RunError: none is whole, or it is that of another run.
-    """
-    previous = file.with_name(PREVIOUS)
-    if not file.exists():
-        return _search(previous, run) if previous.exists() else None
-    try:
-        return _search(file, run)
-    except RunError as error:
-        if not previous.exists():
-            raise
-        earlier = _search(previous, run)
-        _log.warning("%s: %s; going on from the checkpoint before it", error.where, error.what)
-        file.replace(file.with_name(DAMAGED))
-        return earlier
-
-
-class RefinementCheckpoints(UserDict[str, Arrays]):
-    """How far the refinements of a run are, by name; every change is written to one file.
-
-    A damaged file is put aside with a warning. The refinements are then done again, to the same bits.
+    The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is put aside
+    as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the run did since is done
+    again, to the same bits.
 
     Args:
         file: is made with the first checkpoint.
         run: id of the run.
 
     Raises:
-        RunError: the file is another run's; on a change, it cannot be written.
+        RunError: none is whole, or it is that of another run; on a change, it cannot be written, and both
+            files are as they were.
     """
 
     def __init__(self, file: Path, run: str) -> None:
         super().__init__()
         self._file, self._run = file, run
-        if not file.exists():
-            return
-        try:
-            arrays = _read(file, run)
-        except RunError as error:
-            if error.what == ANOTHER:
-                raise
-            _log.warning("%s: %s; its refinements are done again", error.where, error.what)
-            file.replace(file.with_suffix(".damaged.npz"))
-            return
-        for key, array in arrays.items():
-            name, _, part = key.partition("/")
-            self.data.setdefault(name, {})[part] = array
+        self._previous = file.with_suffix(f".previous{file.suffix}")
+        present = [path for path in (file, self._previous) if path.exists()]
+        if present:
+            self.data = self._read(*present)
 
     def __setitem__(self, name: str, arrays: Arrays) -> None:
         self.data[name] = arrays
-        content = {f"{n}/{part}": a for n, several in self.data.items() for part, a in several.items()}
+        flat = {f"{n}/{part}": array for n, several in self.data.items() for part, array in several.items()}
+        flat["run"] = np.array(self._run)
+        buffer = io.BytesIO()
         with undisturbed():
-            write_atomic(self._file, _content(content, self._run))
+            # sorted: what a run ends with does not depend on where it was interrupted
+            np.savez(buffer, checksum=_checksum(flat), **dict(sorted(flat.items())))  # pyright: ignore
+            write_atomic(self._file, buffer.getvalue(), keep=self._previous)
+
+    def _read(self, file: Path, *before: Path) -> dict[str, Arrays]:
+        """Read a file; where it is damaged, the one before it."""
+        try:
+            with np.load(file, allow_pickle=False) as data:
+                flat: Arrays = {name: data[name] for name in data.files}
+            if flat.pop("checksum") != _checksum(flat):
+                raise ValueError("checksum")
+        except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
+            damage = f"is damaged ({type(error).__name__})"
+            if not before:
+                hint = "remove the run's checkpoints to begin again from the seed"
+                raise RunError(damage, where=str(file), hint=hint) from None
+            earlier = self._read(*before)
+            _log.warning("%s: %s; going on from the checkpoint before it", file, damage)
+            file.replace(file.with_suffix(f".damaged{file.suffix}"))
+            return earlier
+        if str(flat.pop("run")) != self._run:
+            raise RunError("is another run's", where=str(file), hint="put the run's own checkpoint back")
+        result: dict[str, Arrays] = {}
+        for key, array in flat.items():
+            name, _, part = key.partition("/")
+            result.setdefault(name, {})[part] = array
+        return result
 
 
-def _search(file: Path, run: str) -> Checkpoint:
-    arrays = _read(file, run)
-    try:
-        population = Population(arrays["chromosomes"], arrays["objectives"])
-        state = SearchState(population, json.loads(arrays["rng"].tobytes()), arrays["history"])
-        return Checkpoint(state, (arrays["memo_theta"], arrays["memo_values"]))
-    except (KeyError, ValueError) as error:
-        raise _damaged(file, error) from None
-
-
-def _content(arrays: Arrays, run: str) -> bytes:
-    arrays = arrays | {"run": np.frombuffer(run.encode(), dtype=np.uint8)}
-    buffer = io.BytesIO()
-    np.savez(buffer, checksum=np.frombuffer(_checksum(arrays), dtype=np.uint8), **arrays)  # pyright: ignore
-    return buffer.getvalue()
-
-
-def _read(file: Path, run: str) -> Arrays:
-    """Read arrays that `_content` made.
-
-    Raises:
-        RunError: the file is damaged, or another run's.
-    """
-    try:
-        with np.load(file, allow_pickle=False) as data:
-            arrays: Arrays = {name: data[name] for name in data.files}
-        if arrays.pop("checksum").tobytes() != _checksum(arrays):
-            raise ValueError("checksum")
-        owner = arrays.pop("run").tobytes().decode()
-    except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
-        raise _damaged(file, error) from None
-    if owner != run:
-        raise RunError(ANOTHER, where=str(file), hint="put the run's own checkpoint back")
-    return arrays
-
-
-def _damaged(file: Path, error: Exception) -> RunError:
-    hint = "remove the run's checkpoints to begin again from the seed"
-    return RunError(f"is damaged ({type(error).__name__})", where=str(file), hint=hint)
-
-
-def _checksum(arrays: Arrays) -> bytes:
+def _checksum(arrays: Arrays) -> str:
     """Of names, types, shapes and contents: the zip's own CRC is not looked at where a header lies."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.digest()
+    return digest.hexdigest()

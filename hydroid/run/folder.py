@@ -17,13 +17,11 @@ from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.search import Checkpoint, SearchState
 from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.problem.problem import Problem
-from hydroid.run.checkpoint import RefinementCheckpoints, read_checkpoint, write_checkpoint
+from hydroid.run.checkpoint import CheckpointFile
 from hydroid.run.identity import DESCRIPTION, identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
@@ -60,21 +58,21 @@ class RunFolder:
             remove_parts(self.path)
             yield
 
-    def begin_or_continue(self, settings: FitSettings, logs: Sequence[Log]) -> Checkpoint | None:
-        """Describe a new run, or return the checkpoint that the run here continues from, if it has one.
+    def begin_or_continue(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
+        """Describe a new run, or check that the run here is the same; return its checkpoints.
 
         Raises:
             RunError: the run here is another one, no checkpoint is whole, or the folder cannot be written.
         """
         if not self.exists:
             self.begin(settings, logs)
-            return None
+            return self.checkpoints()
         self.check(settings, logs)
-        checkpoint = self.checkpoint()
+        checkpoints = self.checkpoints()
         self.status("running")
-        done = 0 if checkpoint is None else len(checkpoint.state.history)
-        _log.info("resumed after generation %d", done)
-        return checkpoint
+        stored = ", ".join(checkpoints) or "no checkpoint"
+        _log.info("resumed from %s", stored)
+        return checkpoints
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> None:
         """Write the settings, the arm, versions, seed, and hashes of the logs.
@@ -145,30 +143,17 @@ class RunFolder:
         if not self.exists:
             return ""
         self.status("interrupted")
-        checkpoint = self.checkpoint()
-        if checkpoint is not None:
-            after = f"{len(checkpoint.state.history)} generations"
-        elif started := len(self.refinements()):
-            after = f"{started} started refinement{'s' if started > 1 else ''}"
-        else:
+        if not self.checkpoints():
             return f"{self.path} holds no checkpoint yet, and resuming begins again"
-        return f"{self.path} holds a checkpoint after {after} to resume from"
+        return f"{self.path} holds a checkpoint to resume from"
 
-    def save(self, state: SearchState, memo: Memo) -> None:
-        """Write the checkpoint; the one before it is kept (see `checkpoint`)."""
-        write_checkpoint(self.path / "checkpoint.npz", state, memo, self._id())
-
-    def checkpoint(self) -> Checkpoint | None:
-        """Read the newest checkpoint that is whole; None where the run was stopped before its first.
+    def checkpoints(self) -> CheckpointFile:
+        """Return what the run's search and refinements have stored, by name.
 
         Raises:
-            RunError: none is whole.
+            RunError: no checkpoint is whole.
         """
-        return read_checkpoint(self.path / "checkpoint.npz", self._id())
-
-    def refinements(self) -> RefinementCheckpoints:
-        """Return how far the run's refinements are, by name."""
-        return RefinementCheckpoints(self.path / "refinement.npz", self._id())
+        return CheckpointFile(self.path / "checkpoint.npz", self._id())
 
     def _describe(self, content: dict[str, Any]) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")

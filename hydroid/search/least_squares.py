@@ -1,11 +1,11 @@
 """Bounded least squares on the unit box: Levenberg-Marquardt with an explicit state.
 
-    state = start(point, row)
-    while state.ending is None:
-        state = step(state, residuals, settings)
+    descent = start(point, row)
+    while not descent.ended:
+        descent = step(descent, residuals, settings)
 
-A state is a frozen record of numbers and arrays; `step` is a pure function of it. So a state is also the
-checkpoint: a run that continues from a stored state ends with the same bits.
+A `Descent` is a frozen record of numbers and arrays, and `step` is a pure function of it: a stored one
+continues to the same bits.
 
 One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
 ends where the linear model promises no gain. *With one* it tries a step s that minimises
@@ -23,13 +23,14 @@ What differs from a textbook:
 - A candidate whose simulation fails is a step that does not help.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.search.derivatives import Residuals, derivatives
-from hydroid.search.least_squares_state import Ending, State
 from hydroid.search.linear_model import LinearModel
 from hydroid.settings.search import RefinementSettings
 
@@ -52,154 +53,210 @@ SHORTEST = 1e-14
 EXACT = 1e-24
 """part of the first cost at which nothing is left to explain"""
 SLOW_STEPS = 2
-"""steps in a row from new Jacobians that may gain less than the tolerance"""
+"""steps in a row that may gain less than the tolerance"""
 
 
-def least_squares(start_at: Float, residuals: Residuals, settings: RefinementSettings) -> State:
+class Ending(Enum):
+    """Why least squares ended, if it has."""
+
+    UNDER_WAY = "under way"
+    GAIN = "no step promises a gain above the tolerance"
+    SLOW = "the last steps gained less than the tolerance"
+    EXACT = "the residual is zero up to rounding"
+    NO_IMPROVEMENT = "no step improves the fit any further"
+    ITERATIONS = "it reached the iteration limit"
+    START_FAILED = "the start could not be simulated"
+    JACOBIAN_FAILED = "simulations failed on both sides of the best point"
+
+    @property
+    def converged(self) -> bool:
+        """Whether a local optimum was reached, as far as tolerance and rounding show it."""
+        return self in (Ending.GAIN, Ending.SLOW, Ending.EXACT, Ending.NO_IMPROVEMENT)
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Least squares under way, or ended.
+
+    Attributes:
+        point: best point so far, shape (p,), within [0, 1].
+        residual: there, shape (R,).
+        cost: half the sum of its squares. cost_before: that of the start.
+        jacobian: shape (R, p), or (0, p) where it is to be taken.
+        fresh: whether the Jacobian is one of finite differences, not an updated one.
+        cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
+        damping: λ. growth: factor of λ after the next step that fails.
+        width: index into WIDTHS.
+        slow: steps in a row with gains below the tolerance.
+        evaluations: candidates simulated. iterations: steps that helped.
+        ending: why it ended, or UNDER_WAY.
+    """
+
+    point: Float
+    residual: Float
+    cost: float
+    cost_before: float
+    jacobian: Float
+    fresh: bool = False
+    cycle: Float | tuple[float, int] = (np.inf, 0)
+    damping: float = DAMPING
+    growth: float = 2.0
+    width: int = 0
+    slow: int = 0
+    evaluations: int = 1
+    iterations: int = 0
+    ending: Ending = Ending.UNDER_WAY
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is no further step."""
+        return self.ending is not Ending.UNDER_WAY
+
+    @property
+    def converged(self) -> bool:
+        """Whether it has ended at an optimum."""
+        return self.ending.converged
+
+    def __str__(self) -> str:
+        cost = f"half the sum of squares {self.cost_before:.6g} to {self.cost:.6g}"
+        return f"{cost} in {self.evaluations} simulations; {self.ending.value}"
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return arrays by name, to be stored; without the residual once it has ended."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values["ending"] = self.ending.name
+        if self.ended:
+            values |= {"residual": [], "jacobian": []}
+        return {name: np.asarray(value) for name, value in values.items()}
+
+    @staticmethod
+    def from_arrays(arrays: dict[str, NDArray[Any]]) -> "Descent":
+        """Return the descent that `arrays` stored."""
+        stored = {f.name: arrays[f.name] for f in fields(Descent)}
+        values: dict[str, Any] = {n: a if a.ndim else a.item() for n, a in stored.items()}
+        values["ending"] = Ending[values["ending"]]
+        return Descent(**values)
+
+
+def least_squares(start_at: Float, residuals: Residuals, settings: RefinementSettings) -> Descent:
     """Minimise the sum of squared residuals from a point of the unit box, shape (p,).
 
     Returns:
         The last state. Its point is the best one evaluated, and its ending says whether that is an optimum.
     """
-    state = start(start_at, residuals(start_at[None])[0])
-    while state.ending is None:
-        state = step(state, residuals, settings)
-    return state
+    descent = start(start_at, residuals(start_at[None])[0])
+    while not descent.ended:
+        descent = step(descent, residuals, settings)
+    return descent
 
 
-def start(point: Float, residual: Float) -> State:
-    """Return the state at a point, shape (p,), whose residual was simulated, shape (R,)."""
-    cost = _costs(residual[None])[0]
-    return State(
-        point=point,
-        residual=residual,
-        jacobian=np.empty((0, point.size)),
-        fresh=False,
-        damping=DAMPING,
-        growth=2.0,
-        width=0,
-        slow=0,
-        cycle_cost=cost,
-        cycle_evaluations=1,
-        cost_before=cost,
-        cost=cost,
-        evaluations=1,
-        iterations=0,
-        ending=None if np.isfinite(cost) else Ending.START_FAILED,
-    )
+def start(point: Float, residual: Float) -> Descent:
+    """Return the descent from a point, shape (p,), whose residual was simulated, shape (R,)."""
+    cost = float(_costs(residual[None])[0])
+    ending = Ending.UNDER_WAY if np.isfinite(cost) else Ending.START_FAILED
+    return Descent(point, residual, cost, cost, _no_jacobian(point), ending=ending)
 
 
-def step(state: State, residuals: Residuals, settings: RefinementSettings) -> State:
-    """Return the state after taking a Jacobian, or after trying a step. A state that has ended stays."""
-    if state.ending is not None:
-        return state
+def step(now: Descent, residuals: Residuals, settings: RefinementSettings) -> Descent:
+    """Return the descent after taking a Jacobian, or after trying a step. One that has ended stays."""
+    if now.ended:
+        return now
     count = _Counter(residuals)
-    after = (
-        _differentiate(state, count, settings)
-        if not len(state.jacobian)
-        else _advance(state, count, settings)
-    )
-    return replace(after, evaluations=state.evaluations + count.evaluations)
+    after = (_advance if len(now.jacobian) else _differentiate)(now, count, settings)
+    return replace(after, evaluations=now.evaluations + count.evaluations)
 
 
-def _differentiate(state: State, residuals: Residuals, settings: RefinementSettings) -> State:
+def _differentiate(now: Descent, residuals: Residuals, settings: RefinementSettings) -> Descent:
     """Take the Jacobian; end where it promises no gain."""
-    columns = derivatives(residuals, state.point, state.residual, WIDTHS[state.width])
+    columns = derivatives(residuals, now.point, now.residual, WIDTHS[now.width])
     if not np.isfinite(columns).all():
-        return replace(state, ending=Ending.JACOBIAN_FAILED)
-    after = replace(
-        state,
-        jacobian=columns.T,
-        fresh=True,
-        cycle_cost=state.cost,
-        cycle_evaluations=state.evaluations,
-    )
+        return replace(now, ending=Ending.JACOBIAN_FAILED)
+    after = replace(now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations))
     model = _model(after)
-    if model.gain(model.step(UNDAMPED)) <= settings.gain_tolerance * state.cost:
-        return replace(after, ending=Ending.GAIN)
-    return after
+    promises = model.gain(model.step(UNDAMPED)) > settings.gain_tolerance * now.cost
+    return after if promises else replace(after, ending=Ending.GAIN)
 
 
-def _advance(state: State, residuals: "_Counter", settings: RefinementSettings) -> State:
+def _advance(now: Descent, residuals: "_Counter", settings: RefinementSettings) -> Descent:
     """Try a step, or two; take the better one if it helps."""
-    model = _model(state)
-    steps = [model.step(state.damping)]
+    model = _model(now)
+    steps = [model.step(now.damping)]
     promised = model.gain(steps[0])
-    if state.fresh and np.linalg.norm(steps[0]) > SHORTEST:
-        steps += _corrected(model, steps[0], state.damping, residuals)
+    if now.fresh and np.linalg.norm(steps[0]) > SHORTEST:
+        steps += _corrected(model, steps[0], now.damping, residuals)
     points = np.array([model.reach(s) for s in steps])
-    if np.linalg.norm(points[0] - state.point) <= SHORTEST * np.linalg.norm(state.point):
-        return _no_step(state)
+    if np.linalg.norm(points[0] - now.point) <= SHORTEST * np.linalg.norm(now.point):
+        return _no_step(now)
     rows = residuals(points)
     costs = _costs(rows)
     best = int(np.argmin(costs))
-    if not costs[best] < state.cost:
-        return _damped(state, model, settings)
-    return _accepted(state, points[best], rows[best], promised, residuals.evaluations, settings)
-
-
-def _accepted(
-    state: State, point: Float, row: Float, promised: float, simulated: int, settings: RefinementSettings
-) -> State:
-    """Move to a better point; update the Jacobian if that is cheaper than a new one."""
-    cost = _costs(row[None])[0]
-    gain = state.cost - cost
-    ratio = gain / promised if promised > 0 else 0.0
-    after = replace(
-        state,
-        point=point,
-        residual=row,
-        jacobian=np.empty((0, point.size)),
-        fresh=False,
-        damping=max(state.damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), UNDAMPED),
-        growth=2.0,
-        slow=state.slow + 1 if gain < settings.gain_tolerance * state.cost else 0,
-        cost=cost,
-        iterations=state.iterations + 1,
-    )
-    if cost <= EXACT * state.cost_before:
-        return replace(after, ending=Ending.EXACT)
-    if after.slow >= SLOW_STEPS:
-        return replace(after, ending=Ending.SLOW)
-    if after.iterations >= settings.iterations:
-        return replace(after, ending=Ending.ITERATIONS)
-    if state.fresh:
-        pays = ratio > TRUSTED
-    else:
-        spent = state.evaluations + simulated - state.cycle_evaluations
-        pays = np.log(state.cost / cost) / simulated >= np.log(state.cycle_cost / cost) / spent
-    return replace(after, jacobian=_updated(state, point, row)) if pays else after
-
-
-def _updated(state: State, point: Float, row: Float) -> Float:
-    """Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step."""
-    move = point - state.point
-    scaled = np.sum(state.jacobian**2, axis=0) * move
-    return state.jacobian + np.outer((row - state.residual - state.jacobian @ move) / (scaled @ move), scaled)
-
-
-def _damped(state: State, model: LinearModel, settings: RefinementSettings) -> State:
-    """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
-    if not state.fresh:
-        return replace(state, jacobian=np.empty((0, state.point.size)))
-    after = replace(state, damping=state.damping * 2 * state.growth, growth=2 * state.growth)
-    if model.gain(model.step(after.damping)) < settings.gain_tolerance * state.cost:
-        return _no_step(state)
+    if not costs[best] < now.cost:
+        return _damped(now, model, settings)
+    ratio = (now.cost - costs[best]) / promised if promised > 0 else 0.0
+    after = _moved(now, points[best], rows[best], ratio, settings)
+    if not after.ended and _update_pays(now, after, ratio, residuals.evaluations):
+        return replace(after, jacobian=_updated(now, after))
     return after
 
 
-def _no_step(state: State) -> State:
+def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: RefinementSettings) -> Descent:
+    """Move to a better point, whose gain is `ratio` times the promised one; the Jacobian is to be taken."""
+    cost = float(_costs(row[None])[0])
+    slow = now.slow + 1 if now.cost - cost < settings.gain_tolerance * now.cost else 0
+    ending = Ending.UNDER_WAY
+    if cost <= EXACT * now.cost_before:
+        ending = Ending.EXACT
+    elif slow >= SLOW_STEPS:
+        ending = Ending.SLOW
+    elif now.iterations + 1 >= settings.iterations:
+        ending = Ending.ITERATIONS
+    return replace(
+        now,
+        point=point,
+        residual=row,
+        cost=cost,
+        jacobian=_no_jacobian(point),
+        fresh=False,
+        damping=max(now.damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), UNDAMPED),
+        growth=2.0,
+        slow=slow,
+        iterations=now.iterations + 1,
+        ending=ending,
+    )
+
+
+def _update_pays(now: Descent, after: Descent, ratio: float, simulated: int) -> bool:
+    """Whether to update the Jacobian of a step that took so many simulations, not to take a new one."""
+    if now.fresh:
+        return ratio > TRUSTED
+    cost, evaluations = now.cycle
+    spent = now.evaluations + simulated - evaluations
+    return bool(np.log(now.cost / after.cost) / simulated >= np.log(cost / after.cost) / spent)
+
+
+def _updated(now: Descent, after: Descent) -> Float:
+    """Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step."""
+    move = after.point - now.point
+    scaled = np.sum(now.jacobian**2, axis=0) * move
+    unexplained = after.residual - now.residual - now.jacobian @ move
+    return now.jacobian + np.outer(unexplained / (scaled @ move), scaled)
+
+
+def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> Descent:
+    """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
+    if not now.fresh:
+        return replace(now, jacobian=_no_jacobian(now.point))
+    after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
+    promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
+    return after if promises else _no_step(now)
+
+
+def _no_step(now: Descent) -> Descent:
     """Where no step is left: take the Jacobian anew, over wider differences if it is new; or end."""
-    again = replace(state, jacobian=np.empty((0, state.point.size)), damping=DAMPING, growth=2.0)
-    if not state.fresh:
-        return again
-    if state.width + 1 < len(WIDTHS):
-        return replace(again, width=state.width + 1)
-    return replace(state, ending=Ending.NO_IMPROVEMENT)
-
-
-def _model(state: State) -> LinearModel:
-    return LinearModel(state.point, state.residual, state.jacobian)
+    if now.fresh and now.width + 1 == len(WIDTHS):
+        return replace(now, ending=Ending.NO_IMPROVEMENT)
+    width = now.width + now.fresh
+    return replace(now, jacobian=_no_jacobian(now.point), damping=DAMPING, growth=2.0, width=width)
 
 
 def _corrected(model: LinearModel, s: Float, damping: float, residuals: Residuals) -> list[Float]:
@@ -211,6 +268,14 @@ def _corrected(model: LinearModel, s: Float, damping: float, residuals: Residual
         return []
     corrected = model.step(damping, model.residual + 0.5 * curvature)
     return [corrected] if model.length(corrected - s) < CURVED * model.length(s) else []
+
+
+def _model(now: Descent) -> LinearModel:
+    return LinearModel(now.point, now.residual, now.jacobian)
+
+
+def _no_jacobian(point: Float) -> Float:
+    return np.empty((0, point.size))
 
 
 class _Counter:

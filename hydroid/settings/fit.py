@@ -1,5 +1,6 @@
 """A fit's settings: one YAML file per job, from the log's columns to the search."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
@@ -11,7 +12,7 @@ from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, parameter, prior
-from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
+from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SegmentSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
 from hydroid.settings.simulation import ClusterSettings, SimulationSettings
 
@@ -97,10 +98,32 @@ class FitSettings(Settings):
         log = self.scale == "log"
         return ParameterSet(tuple(parameter(self, n, p, log, starts) for n, p in self.parameters.items()))
 
+    def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
+        """Return the settings with parameters changed, or further ones behind their own."""
+        return self.model_copy(update={"parameters": self.parameters | dict(changed)})
+
     def freed(self) -> "FitSettings":
         """Return the settings with every parameter free that can be, as a joint refinement has them."""
-        free = {
-            name: p.model_copy(update={"fixed": None}) if p.can_be_free else p
-            for name, p in self.parameters.items()
-        }
-        return self.model_copy(update={"parameters": free})
+        free = {n: p.model_copy(update={"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
+        return self.with_parameters(free)
+
+    def acting_on(self, joint: int) -> set[str]:
+        """Return the names of the free parameters that act on this joint only."""
+        return {n for n, p in self.parameters.items() if p.fixed is None and p.joints == (joint,)}
+
+    def alone(self, joint: int, values: Mapping[str, float]) -> "FitSettings":
+        """Return the settings of one joint's own parameters, the others held at values by name.
+
+        Joints that are not compared then follow their logged motion.
+        """
+        own = self.acting_on(joint)
+        held = {n: p.model_copy(update={"fixed": values[n]}) for n, p in self.parameters.items()}
+        simulation = self.simulation.model_copy(update={"other_joints": "measured"})
+        changes = {"outputs": (joint,), "simulation": simulation}
+        settings = self.with_parameters({n: p for n, p in held.items() if n not in own})
+        return settings.model_copy(update=changes)
+
+    def in_one_segment(self) -> "FitSettings":
+        """Return the settings with one segment per channel."""
+        objective = self.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
+        return self.model_copy(update={"objective": objective})

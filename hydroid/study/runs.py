@@ -80,7 +80,7 @@ def perform(task: Task) -> Result:
         RunError: every candidate diverged.
     """
     problem = Problem(task.settings, task.logs)
-    result = fit(problem, lambda *_: None, _Silent())
+    result = fit(problem)
     if not result.best.usable:
         raise RunError("the estimate diverged when it was simulated")
     error = problem.residuals(result.best.theta[None])[0]
@@ -104,14 +104,6 @@ def perform(task: Task) -> Result:
         "checks": {name: _check_error(s, log, result.best.theta) for name, s, log in task.checks},
         "seconds": round(sum(result.seconds.values()), 3),
     }
-
-
-class _Silent:
-    def generation(self, row: Any) -> None:
-        pass
-
-    def refining(self, simulated: int, rms: float) -> None:
-        pass
 
 
 def _check_error(settings: FitSettings, log: Log, theta: np.ndarray) -> float | None:

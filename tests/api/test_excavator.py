@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import hydroid
 from hydroid.cli.app import app
+from hydroid.fitting.multistart import lone_joints
 
 FOLDER = Path(__file__).parents[2] / "examples" / "excavator"
 LOGS = sorted(FOLDER.glob("*_*.csv"))
@@ -49,7 +50,7 @@ def test_a_short_fit_of_two_logs_needs_no_stage_1(tmp_path: Path):
     }
     runs = hydroid.fit_hyd(LOGS[6:8], tmp_path / "run", config=FOLDER / "fit.yaml", overrides=quick)
     (result,) = runs.results
-    assert result.problem.lone_joints == (1, 2, 3, 4)
+    assert lone_joints(result.problem) == (1, 2, 3, 4)
     theta = np.array([result.problem.parameters.start, result.fit.best.theta])
     begun, ended = result.problem.rms(result.problem.residuals(theta))
     assert ended < begun / 2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import step_log
-from small_fits import TRUTH, Watcher
+from small_fits import TRUTH
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
@@ -54,9 +54,9 @@ def make(kind=Fragile, **changes) -> Problem:
 @pytest.mark.parametrize("refinement", [None, {"iterations": 3}])
 def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refinement):
     problem = make(**{"search.algorithm": algorithm, "refinement": refinement})
-    kept = []
-    result = fit(problem, lambda state, memo: kept.append(memo), Watcher())
-    theta, values = kept[-1].arrays()
+    stored = {}
+    result = fit(problem, checkpoints=stored)
+    theta, values = stored["search"].values()
     diverged = int(problem.bad(theta).sum())
     assert 0 < diverged < len(theta)
     assert result.history[-1, 3] == diverged == np.sum(~np.isfinite(values[:, -1]))
@@ -67,7 +67,7 @@ def test_what_diverged_is_counted_and_told_and_never_an_estimate(algorithm, refi
     front, evaluation = result.front
     assert not problem.bad(front).any()
     assert np.isfinite(evaluation.segments).all()
-    np.testing.assert_array_equal(kept[-1].best, theta[np.argmin(values[:, -1])])
+    np.testing.assert_array_equal(Memo(problem, stored["search"]).evaluate(theta).overall, values[:, -1])
     assert np.isfinite(result.history[:, 4:]).all()
 
 
@@ -75,7 +75,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     """The mean of the best sets is none of the sets, and need not be one that can be simulated."""
     problem = make(**{"search.algorithm": "nsga2", "refinement": None})
     problem.grid = True
-    result = fit(problem, lambda state, memo: None, Watcher())
+    result = fit(problem)
     assert not result.estimates["average"].usable
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
@@ -92,7 +92,7 @@ def test_where_everything_diverges_the_run_says_so():
 
     for algorithm in ("ga", "nsga2"):
         with pytest.raises(HydroidError, match="no candidate of the population could be simulated"):
-            fit(make(Hopeless, **{"search.algorithm": algorithm}), lambda state, memo: None, Watcher())
+            fit(make(Hopeless, **{"search.algorithm": algorithm}))
 
 
 def test_a_member_that_is_infinite_somewhere_is_infeasible_throughout_the_memo():
@@ -111,7 +111,7 @@ def test_a_member_that_is_infinite_somewhere_is_infeasible_throughout_the_memo()
     memo.evaluate(theta)
     assert memo.infeasible == 3
     np.testing.assert_array_equal(memo.best, theta[1])
-    again = Memo(memo.problem)
-    again.restore(*memo.arrays())
+    again = Memo(memo.problem, memo.arrays())
+    again.evaluate(theta)
     assert again.infeasible == 3
     np.testing.assert_array_equal(again.best, theta[1])

@@ -56,8 +56,7 @@ def test_identical_sets_are_simulated_once(tmp_path):
     result = memo.evaluate(theta)
     assert memo.simulated == 2
     np.testing.assert_array_equal(result.overall[:3], result.overall[0])
-    again = Memo(memo.problem)
-    again.restore(*memo.arrays())
+    again = Memo(memo.problem, memo.arrays())
     np.testing.assert_array_equal(again.evaluate(theta).segments, result.segments)
     assert again.simulated == 2
 
@@ -83,7 +82,7 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(tmp_path, 
 @pytest.mark.parametrize("algorithm", ["ga", "nsga2", "cmaes", "NSGA3", "MOEAD", "DE"])
 @pytest.mark.parametrize("stop", [1, 7])
 def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path, algorithm, stop):
-    """Our searches continue from their state; those of other libraries are replayed."""
+    """A search is repeated, and what it had simulated is not simulated again."""
     study = Study(tmp_path, **SEARCHES[algorithm], refinement={"iterations": 2})
     whole = study.fit_in(RunFolder(tmp_path / "whole"), Watcher())
     folder, rest = RunFolder(tmp_path / "parts"), Watcher()
@@ -103,13 +102,12 @@ def test_a_library_that_does_not_repeat_itself_is_found_out(tmp_path):
     folder = RunFolder(tmp_path / "run")
     with pytest.raises(KeyboardInterrupt):
         study.fit_in(folder, Watcher(stop_at=4))
-    checkpoint = folder.checkpoint()
-    assert checkpoint is not None
-    # another version would ask for sets that the memo has not: here, because it has lost one
-    theta, values = (np.delete(array, 20, axis=0) for array in checkpoint.memo)
+    checkpoints = folder.checkpoints()
+    # another version would ask for candidates that are not stored: here, because one is lost
+    checkpoints["search"] = {n: np.delete(a, 20, axis=0) for n, a in checkpoints["search"].items()}
     before = (folder.path / "checkpoint.npz").read_bytes()
-    with pytest.raises(RunError, match="does not do again"):
-        fit(study.problem, folder.save, Watcher(), replace(checkpoint, memo=(theta, values)))
+    with pytest.raises(RunError, match="does not repeat"):
+        fit(study.problem, checkpoints=checkpoints)
     assert (folder.path / "checkpoint.npz").read_bytes() == before
 
 

@@ -7,6 +7,7 @@ from small_fits import Watcher
 
 from hydroid import load_settings
 from hydroid.fitting.fit import fit
+from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -50,14 +51,14 @@ def make(noise_deg: float = 0.0, **changes):
 def test_a_lone_joint_feels_no_valve_but_its_own():
     settings, log = make()
     problem = Problem(settings, [log])
-    assert problem.lone_joints == (2, 3)
+    assert lone_joints(problem) == (2, 3)
     values = problem.parameters.mapping(problem.parameters.start)
-    one = problem.alone(2, problem.parameters.vector(values, ""))
+    one = alone(problem, 2, problem.parameters.vector(values, ""))
     assert [n for n, free in zip(one.parameters.names, one.parameters.free, strict=True) if free] == [
         "open_2",
         "overlap_2",
     ]
-    other = problem.alone(2, problem.parameters.vector(values | {"open_3": 0.9, "overlap_3": 0.7}, ""))
+    other = alone(problem, 2, problem.parameters.vector(values | {"open_3": 0.9, "overlap_3": 0.7}, ""))
     unit = np.full((1, 2), 0.3)
     angles = [p.residuals(p.parameters.from_unit(unit)) for p in (one, other)]
     np.testing.assert_array_equal(*angles)
@@ -67,8 +68,8 @@ def test_a_lone_joint_moves_as_with_all_others():
     settings, log = make()
     problem = Problem(settings, [log])
     truth = problem.parameters.vector(TRUTH | {"D": 100.0}, "truth")
-    for joint in problem.lone_joints:
-        error = problem.alone(joint, truth).residuals(truth[None])
+    for joint in lone_joints(problem):
+        error = alone(problem, joint, truth).residuals(truth[None])
         assert np.rad2deg(np.sqrt(np.mean(error**2))) < 0.1  # the logged motion passes a low-pass
 
 
@@ -81,8 +82,8 @@ def test_joints_that_follow_the_log_take_their_part_of_the_pump():
     _, own_pumps = make()
     problem = Problem(settings, [log])
     truth = problem.parameters.vector(TRUTH | {"D": 100.0}, "truth")
-    for joint in problem.lone_joints:
-        error = problem.alone(joint, truth).residuals(truth[None])
+    for joint in lone_joints(problem):
+        error = alone(problem, joint, truth).residuals(truth[None])
         effect = (own_pumps.angle - log.angle)[:, joint - 1]
         assert np.rad2deg(np.sqrt(np.mean(effect**2))) > 1
         assert np.mean(error**2) < 0.25 * np.mean(effect**2)
@@ -100,7 +101,7 @@ def test_joint_by_joint_then_together_finds_the_truth():
     settings, log = make()
     problem = Problem(settings, [log])
     watcher = Watcher()
-    result = fit(problem, lambda state, memo: None, watcher)
+    result = fit(problem, watcher)
     assert [row[0] for row in watcher.rows] == [1, 2]
     truth = problem.parameters.vector(TRUTH | {"D": 100.0}, "truth")
     own = [n in ("open_2", "open_3", "overlap_2", "overlap_3") for n in problem.parameters.names]
@@ -112,4 +113,4 @@ def test_joint_by_joint_then_together_finds_the_truth():
 
 def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say():
     settings, log = make()
-    assert Problem(settings.model_copy(update={"outputs": (2,)}), [log]).lone_joints == ()
+    assert lone_joints(Problem(settings.model_copy(update={"outputs": (2,)}), [log])) == ()

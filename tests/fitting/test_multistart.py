@@ -7,8 +7,7 @@ from small_fits import Watcher
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import fit
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.multistart import Multistart
+from hydroid.fitting.search import search
 from hydroid.log import Log, write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -65,27 +64,19 @@ def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time():
     settings, log = make()
     problem = Problem(settings, [log])
     theta = problem.theta(np.random.default_rng(0).random((1, len(problem.parameters.names))))
-    part = problem.first(1.0)
+    part = problem.varied(settings.in_one_segment(), [log.first(1.0)])
     whole = problem.residuals(theta).reshape(2, -1)
     np.testing.assert_array_equal(part.residuals(theta).reshape(2, -1), whole[:, :151])
 
 
 def test_a_horizon_in_which_nothing_moves_is_left_out():
     """A joint leaves its stop 0.6 s after the command: its first quarter of a second teaches nothing."""
-    settings, log = make()
+    few = {"starts": 1, "iterations": 1, "horizons": [0.25, 2.0]}
+    settings, log = make(**{"search.multistart": few})
     late = replace(log, command=np.roll(log.command, -60, axis=0) * (np.arange(850) < 790)[:, None])
-    names: dict[str, dict] = {}
-    problem = Problem(settings, [late])
-    search = settings.search.model_copy(
-        update={
-            "multistart": settings.search.multistart.model_copy(
-                update={"starts": 1, "iterations": 1, "horizons": (0.25, 2.0)}
-            )
-        }
-    )
-    memo = Memo(problem)
-    Multistart(problem, search, memo, lambda n, rms: None, names).run(None, lambda *_: None, lambda _: None)
-    assert len(names) == 2  # two seconds, and all
+    stored: dict[str, dict] = {}
+    search(Problem(settings, [late]), lambda row: None, lambda n, rms: None, stored)
+    assert set(stored) == {"search", "start 1 part 1", "start 1 part 2"}  # two seconds, and all
 
 
 def test_starts_fill_positive_bounds_evenly_by_decades():
@@ -110,22 +101,19 @@ def test_starts_hold_what_is_known():
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise():
-    settings, log = make(**{"search.multistart.gain_tolerance": 1e-9})
+    settings, log = make()
     problem = Problem(settings, [log])
-    watcher = Watcher()
-    search = Multistart(problem, settings.search, Memo(problem), watcher.refining)
-    state = search.run(None, lambda state, memo: None, watcher.generation)
-    found = search.theta(state.population)
+    found = search(problem, lambda row: None, lambda n, rms: None, {})
     truth = problem.parameters.vector(TRUTH, "truth")
-    np.testing.assert_allclose(found, np.tile(truth, (3, 1)), rtol=1e-3)
-    assert state.population.objectives.max() < np.deg2rad(1e-5)
+    np.testing.assert_allclose(found.theta, np.tile(truth, (3, 1)), rtol=1e-3)
+    assert found.population.objectives.max() < np.deg2rad(1e-5)
 
 
 def test_a_fit_to_noise_gains_no_more_than_its_parameters_can():
     settings, log = make(noise_deg=0.02, **{"search.multistart.starts": 2})
     problem = Problem(settings, [log])
     watcher = Watcher()
-    result = fit(problem, lambda state, memo: None, watcher)
+    result = fit(problem, watcher)
     assert [row[0] for row in watcher.rows] == [1, 2]
     truth = problem.parameters.vector(TRUTH, "truth")
     # least squares: the estimate fits better than the truth, and by no more than seven parameters can
@@ -140,19 +128,14 @@ def test_a_resumed_run_ends_bit_for_bit_where_it_would_have(tmp_path: Path, simu
     few = {"starts": 3, "iterations": 4, "horizons": [0.25, 2.0]}
     settings, log = make(noise_deg=0.05, refinement=None, **{"search.multistart": few})
     problem = Problem(settings, [log])
-    whole = fit(problem, lambda state, memo: None, Watcher())
+    whole = fit(problem)
     folder = RunFolder(tmp_path / "run")
     write_log(tmp_path / "log.csv", log, settings.log)
     folder.begin(settings, read_logs([tmp_path / "log.csv"], settings))
     with pytest.raises(KeyboardInterrupt):
-        fit(
-            problem,
-            folder.save,
-            Watcher(stop_at=1, simulations=simulations),
-            refinements=folder.refinements(),
-        )
+        fit(problem, Watcher(stop_at=1, simulations=simulations), folder.checkpoints())
     watcher = Watcher()
-    again = fit(problem, folder.save, watcher, folder.checkpoint(), folder.refinements())
+    again = fit(problem, watcher, folder.checkpoints())
     assert [row[0] for row in watcher.rows] == [2, 3]  # the first start is not repeated
     np.testing.assert_array_equal(again.history, whole.history)
     np.testing.assert_array_equal(again.best.theta, whole.best.theta)

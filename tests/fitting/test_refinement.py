@@ -8,13 +8,12 @@ from conftest import step_log
 from small_fits import TRUTH
 
 from hydroid import load_settings
-from hydroid.errors import RunError
-from hydroid.fitting.memo import Memo
-from hydroid.fitting.multistart import Multistart
-from hydroid.fitting.refinement import Refinement, refine
+from hydroid.fitting.refinement import refine
+from hydroid.fitting.search import search
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.run.checkpoint import RefinementCheckpoints
+from hydroid.run.checkpoint import CheckpointFile
+from hydroid.search.least_squares import Descent
 from hydroid.settings.search import RefinementSettings
 
 SHORT = RefinementSettings(iterations=6)
@@ -43,7 +42,7 @@ def begin(problem) -> np.ndarray:
     return 0.8 * problem.parameters.vector(TRUTH, "truth")
 
 
-def equal(one: Refinement, other: Refinement) -> bool:
+def equal(one: Descent, other: Descent) -> bool:
     return np.array_equal(one.point, other.point) and str(one) == str(other)
 
 
@@ -63,52 +62,34 @@ def test_an_interrupted_refinement_goes_on_without_loss(problem, tmp_path, limit
     assert whole.evaluations == problem.simulated
     problem.simulated = 0
     with pytest.raises(KeyboardInterrupt):
-        refine(problem, begin(problem), SHORT, stop_after(limit), RefinementCheckpoints(file, "a"))
-    parts = refine(problem, begin(problem), SHORT, lambda n, rms: None, RefinementCheckpoints(file, "a"))
+        refine(problem, begin(problem), SHORT, stop_after(limit), CheckpointFile(file, "a"))
+    parts = refine(problem, begin(problem), SHORT, lambda n, rms: None, CheckpointFile(file, "a"))
     assert equal(parts, whole)
-    assert problem.simulated == whole.evaluations
-    again = refine(problem, begin(problem), SHORT, lambda n, rms: None, RefinementCheckpoints(file, "a"))
+    simulated = problem.simulated
+    assert simulated < whole.evaluations + limit + 12  # the steps since the last Jacobian are repeated
+    again = refine(problem, begin(problem), SHORT, lambda n, rms: None, CheckpointFile(file, "a"))
     assert equal(again, whole)
-    assert problem.simulated == whole.evaluations  # the result itself is kept
+    assert problem.simulated == simulated  # the result itself is kept
 
 
 def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
-    checkpoints = RefinementCheckpoints(tmp_path / "refinement.npz", "a")
+    checkpoints = CheckpointFile(tmp_path / "refinement.npz", "a")
     refine(problem, begin(problem), SHORT, lambda n, rms: None, checkpoints, "one")
     other = refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None, checkpoints, "another")
     assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None))
 
 
-@pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
-def test_a_damaged_checkpoint_is_put_aside_and_the_refinement_done_again(tmp_path, keep, caplog):
-    file = tmp_path / "refinement.npz"
-    RefinementCheckpoints(file, "a")["x"] = {"point": np.arange(100.0)}
-    assert "x" in RefinementCheckpoints(file, "a")
-    content = file.read_bytes()
-    file.write_bytes(content[: int(keep * len(content))])
-    assert "x" not in RefinementCheckpoints(file, "a")
-    assert "is damaged" in caplog.text
-    assert not file.exists()
-
-
-def test_the_checkpoint_of_another_run_is_refused(tmp_path):
-    RefinementCheckpoints(tmp_path / "r.npz", "a")["x"] = {"point": np.arange(3.0)}
-    with pytest.raises(RunError, match="another run"):
-        RefinementCheckpoints(tmp_path / "r.npz", "b")
-
-
 def test_a_start_that_was_interrupted_goes_on_within_it(problem, tmp_path):
-    changes = {"starts": 1, "iterations": 3, "horizons": [0.25]}
-    settings = problem.settings.search.model_copy(update={"algorithm": "multistart"})
-    settings = settings.model_copy(update={"multistart": settings.multistart.model_copy(update=changes)})
-
-    def search(progress, checkpoints):
-        made = Multistart(problem, settings, Memo(problem), progress, checkpoints)
-        return made.run(None, lambda state, memo: None, lambda row: None)
-
-    whole = search(lambda n, rms: None, RefinementCheckpoints(tmp_path / "whole.npz", "a"))
+    changes = {"starts": 1, "iterations": 3, "horizons": (0.25,)}
+    settings = problem.settings.search
+    multistart = settings.multistart.model_copy(update=changes)
+    settings = settings.model_copy(update={"algorithm": "multistart", "multistart": multistart})
+    problem = Counted(problem.settings.model_copy(update={"search": settings}), problem.logs)
+    whole = search(problem, lambda row: None, lambda n, rms: None, {})
+    stored = CheckpointFile(tmp_path / "parts.npz", "a")
     with pytest.raises(KeyboardInterrupt):
-        search(stop_after(30), RefinementCheckpoints(tmp_path / "parts.npz", "a"))
-    parts = search(lambda n, rms: None, RefinementCheckpoints(tmp_path / "parts.npz", "a"))
-    np.testing.assert_array_equal(parts.population.chromosomes, whole.population.chromosomes)
+        search(problem, lambda row: None, stop_after(30), stored)
+    stored = CheckpointFile(tmp_path / "parts.npz", "a")
+    parts = search(problem, lambda row: None, lambda n, rms: None, stored)
+    np.testing.assert_array_equal(parts.theta, whole.theta)
     np.testing.assert_array_equal(parts.history, whole.history)

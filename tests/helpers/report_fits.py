@@ -6,7 +6,6 @@ import numpy as np
 
 from hydroid.estimate import CurveEstimate, QuantityEstimate
 from hydroid.fitting.fit import Estimate, Fit
-from hydroid.fitting.refinement import Refinement
 from hydroid.log import Log
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.posterior.covariance import Uncertainty, uncertainty_from
@@ -19,7 +18,7 @@ from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.search.least_squares_state import Ending
+from hydroid.search.least_squares import Descent, Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 
@@ -107,7 +106,16 @@ def make_fit(
     evaluations = np.arange(1, 8) * 20.0
     best = np.minimum.accumulate(rng.uniform(0.02, 0.3, 7))
     history = np.column_stack([np.arange(1, 8), evaluations, evaluations - 3, [2.0] * 7, best, best * 1.5])
-    refined = Refinement(np.full(free, 0.5), 1.0, 0.1, 40, 5, Ending.GAIN)
+    refined = Descent(
+        np.full(free, 0.5),
+        np.empty(0),
+        0.1,
+        1.0,
+        np.empty((0, free)),
+        evaluations=40,
+        iterations=5,
+        ending=Ending.GAIN,
+    )
     return Fit(
         estimates,
         final,

@@ -45,11 +45,11 @@ class Study:
 
     def fit(self) -> Fit:
         """A fit that stores nothing."""
-        return fit(self.problem, lambda state, memo: None, Watcher())
+        return fit(self.problem)
 
     def fit_in(self, folder: RunFolder, watcher: Watcher) -> Fit:
         """A fit in a folder, continued where the folder has a checkpoint."""
-        checkpoint = folder.begin_or_continue(self.settings, read_logs([self.path], self.settings))
-        result = fit(self.problem, folder.save, watcher, checkpoint, folder.refinements())
+        checkpoints = folder.begin_or_continue(self.settings, read_logs([self.path], self.settings))
+        result = fit(self.problem, watcher, checkpoints)
         folder.write_estimate(self.problem, result)
         return result

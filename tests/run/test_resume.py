@@ -21,7 +21,7 @@ def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
     log = cwd / "log.csv"
     if not log.exists():
         log.write_text("\n".join(LOG.read_text().splitlines()[:601]) + "\n")
-    code = "import hydroid.cli.app as a, hydroid.fitting.search as s; s.SAVE_EVERY = 0; a.main()"
+    code = "import hydroid.cli.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
     command = [
         sys.executable,
         "-c",
@@ -62,7 +62,7 @@ def test_killed_runs_end_the_same(tmp_path: Path):
     whole.mkdir()
     killed.mkdir()
     finish(start(whole, *options, out="run"))
-    for met in ("run.json", "checkpoint.npz", "refinement.npz"):
+    for met in ("run.json", "checkpoint.npz", "checkpoint.previous.npz"):
         process = start(killed, *options, out="run")
         wait_for(process, killed / "run" / met)
         time.sleep(0.02)

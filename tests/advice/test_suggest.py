@@ -96,7 +96,11 @@ def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
     names = {term.name for term in terms(problem, theta)}
     assert {"delay", "delay_a", "delay_b", "overlap", "leakage", "dry_friction", "stiffness"} <= names
     assert not {"damping", "area_a", "area", "pump_flow"} & names
-    freed = problem.extended({"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))})
+    freed = problem.varied(
+        problem.settings.with_parameters(
+            {"late": ParameterSettings(quantity="delay_a", joints=(2,), bounds=(0, 1))}
+        )
+    )
     assert not {"delay", "delay_a"} & {term.name for term in terms(freed, theta)}
     assert "delay_b" in {term.name for term in terms(freed, theta)}
     (log,) = problem.logs

@@ -32,8 +32,6 @@ DRAWS = 16
 """candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
-GAIN_TOLERANCE = 1e-4
-"""coarser than the refinement's, which starts from the best result"""
 
 
 class Multistart:
@@ -55,7 +53,9 @@ class Multistart:
     ) -> None:
         self.settings = problem.settings.search.multistart
         self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
-        self._descent = RefinementSettings(iterations=self.settings.iterations, gain_tolerance=GAIN_TOLERANCE)
+        self._descent = RefinementSettings(
+            iterations=self.settings.iterations, gain_tolerance=self.settings.gain_tolerance
+        )
         self._best: dict[int, Descent] = {}
         """the best fit of each joint alone, over the starts so far"""
         self._rms = np.inf

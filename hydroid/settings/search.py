@@ -92,6 +92,8 @@ class MultistartSettings(Settings):
     command on [s]; those in which nothing moves yet are left out"""
     iterations: Count = 100
     """largest number of steps of each of these fits"""
+    gain_tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
+    """as the refinement's; coarser, since the refinement starts from the best result"""
 
     @property
     def generations(self) -> int:

@@ -2,158 +2,145 @@
 
     python benchmarks/many_parameters.py [--starts 10] [--peer-starts 3]
 
-The log: 60 s simulated at the article's true parameters in the study pose, every joint driven by
-pseudo-random commands that keep it off its stops (so that the problem is well posed), 0.1 deg of white noise
-on every angle but the first sample: the pose in which the arm stands before it moves counts as known. The
-total mass is known to 0.5 kg. Starts: each parameter a factor of 0.1 to 10 off its true value, uniform in the
-logarithm, which are the bounds too; then moved to where the total mass holds.
+The log: 60 s simulated at the article's true parameters, every joint driven by pseudo-random commands that
+keep it off its stops, 0.1 deg of white noise on every angle but the first sample, which is known. The total
+mass is known to 0.5 kg. Each start is a factor of 0.1 to 10 off each true value, uniform in the logarithm;
+these are the bounds too.
 
-Printed for every start, hydroid's and then mujoco.sysid's: rms error, simulations, wall time, and CPU time of
-all threads, which a busy machine changes less. Hydroid's is a complete fit of one start: search, refinement,
-intervals. Then how many starts reached the optimum, and the intervals of the best. mujoco.sysid needs its
-extra: pip install 'mujoco[sysid]'.
+hydroid's row is a complete fit of one start: search, refinement, intervals. mujoco.sysid gets the same arm,
+log, bounds, start and prior, and its own defaults: pip install 'mujoco[sysid]'.
 """
 
 import argparse
-import time
+import copy
+import io
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from typing import Any
 
+import mujoco
 import numpy as np
-from scipy.stats import norm
-from sysid_peer import Peer
+from common import Clock, row, table, true_log
 
-from hydroid import load_settings
-from hydroid.advice.pseudo_random import pseudo_random_log
+import hydroid
+from hydroid.arm.model import load_model
 from hydroid.fitting.fit import Fit, fit
 from hydroid.log import Log
-from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 
 JOINTS = range(1, 8)
 MASSES = {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
-TRUTH = {
-    f"{name}{j}": value for name, value in (("K", 0.2), ("D", 231.8), ("S", 53.4)) for j in JOINTS
-} | MASSES
+SHARED = {"K": 0.2, "D": 231.8, "S": 53.4}
+TRUTH = {f"{name}{j}": value for name, value in SHARED.items() for j in JOINTS} | MASSES
 QUANTITIES = {"K": "gain", "D": "damping", "S": "stiffness"}
 FACTOR = 10.0
 NOISE = np.deg2rad(0.1)
-MARGIN = np.deg2rad(5.0)
 REACHED = 0.01
 """of the lowest cost: what is no further above it has reached the optimum"""
 
 
-def make_settings(seed: int) -> tuple[FitSettings, Arm]:
+def make_settings(seed: int) -> FitSettings:
     """Settings of one start."""
-    bounds = {name: [value / FACTOR, value * FACTOR] for name, value in TRUTH.items()}
-    parameters = {
-        name: {"quantity": "mass", "link": f"link{name[1:]}", "bounds": limits}
-        if name in MASSES
-        else {"quantity": QUANTITIES[name[0]], "joints": [int(name[1:])], "bounds": limits}
-        for name, limits in bounds.items()
-    }
-    known = {"total mass": {"of": list(MASSES), "value": sum(MASSES.values()), "sd": 0.5}}
+    parameters: dict[str, Any] = {}
+    for name, value in TRUTH.items():
+        what = {"quantity": "mass", "link": f"link{name[1:]}"}
+        if name not in MASSES:
+            what = {"quantity": QUANTITIES[name[0]], "joints": [int(name[1:])]}
+        parameters[name] = what | {"bounds": [value / FACTOR, value * FACTOR]}
     changes = {
         "outputs": list(JOINTS),
         "parameters": parameters,
-        "priors": known,
+        "priors": {"total mass": {"of": list(MASSES), "value": sum(MASSES.values()), "sd": 0.5}},
         "objective": {"norm": 2, "segments": {"equal": 1}},
         "search": {"algorithm": "multistart", "seed": seed, "multistart": {"starts": 1}},
     }
-    settings = load_settings("article-mech", changes)
-    return settings, settings.arm
+    return hydroid.load_settings("article-mech", changes)
 
 
-def make_log(duration: float) -> Log:
-    """A log of all joints, as the docstring of this file has it."""
-    settings, arm = make_settings(1)
-
-    def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, log, TRUTH, "truth").angle
-        return bool(np.all((angle > arm.lower + MARGIN) & (angle < arm.upper - MARGIN)))
-
-    commands = pseudo_random_log(arm.pose("study"), list(JOINTS), duration, allowed=off_the_stops)
-    log = simulate_log(settings, commands, TRUTH, "truth")
-    log.angle[1:] += np.random.default_rng(1).normal(0.0, NOISE, log.angle[1:].shape)
-    return log
+def cost_of(problem: Problem, theta: np.ndarray) -> tuple[float, float]:
+    """Return the cost with the true noise, and the rms error [deg]."""
+    rows = problem.residuals(theta[None])
+    scores = problem.priors.scores(theta[None])[0]
+    cost = float(np.sum((rows / NOISE) ** 2) + np.sum(scores**2))
+    return cost, float(np.rad2deg(problem.rms(rows)[0]))
 
 
-class Clock:
-    """Wall and CPU time from here to `stop` [s]."""
+class Peer:
+    """The arm as mujoco.sysid's user would set it up.
 
-    def __init__(self) -> None:
-        self._begun = time.perf_counter(), time.process_time()
+    Every candidate is a copy of one compiled model without shapes: compiling it anew, as its examples do,
+    would cost more time.
+    """
 
-    def stop(self) -> "Clock":
-        """Keep the times that have passed."""
-        self.wall, self.cpu = time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
-        return self
+    def __init__(self, problem: Problem, log: Log) -> None:
+        from mujoco import sysid
 
-    def __str__(self) -> str:
-        return f"{self.wall:.0f} | {self.cpu:.0f}"
-
-
-class Table:
-    """Rows of starts: rms error [deg], simulations, seconds; what they found."""
-
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self.found: list[np.ndarray] = []
-        self.cost: list[float] = []
-        self.seconds: list[float] = []
-
-    def add(self, who: str, seed: int, theta: np.ndarray, simulated: int, clock: "Clock") -> None:
-        """Print a row."""
-        rows = self._problem.residuals(theta[None])
-        scores = self._problem.priors.scores(theta[None])[0]
-        cost = float(np.sum((rows / NOISE) ** 2) + np.sum(scores**2))
-        self.found.append(theta)
-        self.cost.append(cost)
-        self.seconds.append(clock.wall)
-        rms = np.rad2deg(float(self._problem.rms(rows)[0]))
-        print(f"| {who} | {seed} | {rms:.5g} | {simulated} | {clock} |", flush=True)
-
-
-def show(who: str, table: Table, best: Fit, lowest: float) -> None:
-    """Print how many starts reached the optimum, how near, and the median time."""
-    free, scale = best.uncertainty.free, best.uncertainty.jacobian.scale
-    moved = [(best.uncertainty.root @ ((t - best.best.theta) / scale)[free]) for t in table.found]
-    away = [float(np.linalg.norm(m)) for m in moved]
-    reached = [c <= (1 + REACHED) * lowest for c in table.cost]
-    farthest = max((a for a, r in zip(away, reached, strict=True) if r), default=np.nan)
-    print(
-        f"{who}: {sum(reached)} of {len(reached)} reached the optimum (cost within {REACHED:.0%} of the "
-        f"lowest), these at most {farthest:.2g} standard deviations from the best; "
-        f"median wall time {np.median(table.seconds):.0f} s"
-    )
-
-
-def show_intervals(problem: Problem, best: Fit) -> None:
-    """Print each parameter's interval, and how many hold the truth."""
-    told, truth = best.uncertainty, problem.parameters.vector(TRUTH, "truth")
-    print("\n| parameter | truth | estimate | 95 % interval | inside | flags |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    inside = (told.interval[:, 0] <= truth) & (truth <= told.interval[:, 1])
-    for i, name in enumerate(problem.parameters.names):
-        low, high = told.interval[i]
-        print(
-            f"| {name} | {truth[i]:g} | {told.theta[i]:.4g} | {low:.4g} to {high:.4g} | "
-            f"{'yes' if inside[i] else 'NO'} | {told.status[i].flag.value} |"
+        arm, self._problem, self._pose = problem.settings.arm, problem, log.angle[0]
+        self.rollouts = 0
+        spec = load_model(arm.model, arm)
+        for geom in list(spec.geoms):
+            spec.delete(geom)
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        spec.option.timestep = log.period
+        self._model = spec.compile()
+        self._model.qpos_spring[:] = self._pose
+        self._model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
+        self._links = [self._model.body(name).id for name in arm.link_names]
+        # the state, not a sensor: MuJoCo evaluates a sensor at the beginning of a step
+        angles = [(f"{name}_qpos", sysid.SignalType.MjStateQPos) for name in arm.joint_names]
+        sequence = sysid.ModelSequences(
+            arm.name,
+            spec,
+            "log",
+            sysid.create_initial_state(self._model, self._pose),
+            sysid.TimeSeries(log.time, log.command),
+            sysid.TimeSeries.from_names(log.time, log.angle, self._model, angles),
+            allow_missing_sensors=True,
         )
-    for what, chosen in (
-        (f"determined to {WEAK_ABOVE:.0%}", told.relative <= WEAK_ABOVE),
-        ("with an interval", np.isfinite(told.interval).all(axis=1)),
-    ):
-        count = int(chosen.sum())
-        away = np.abs(told.theta - truth)[chosen] / told.standard_deviation[chosen]
-        # a 95 % interval misses one in twenty: all at once they hold with the intervals of Bonferroni
-        together = int(np.sum(away <= norm.ppf(1 - 0.025 / count)))
-        print(
-            f"{count} {what}: {int(inside[chosen].sum())} within the 95 % interval (expected "
-            f"{0.95 * count:.1f}), "
-            f"{together} within the interval that holds all {count} at once with 95 %"
-        )
+        self._residual = sysid.build_residual_fn(models_sequences=[sequence], build_model=self._build)
+        # sysid divides the error of a joint by the norm of its angle; the prior gets the middle weight
+        self._weight = NOISE / np.exp(np.mean(np.log(np.linalg.norm(log.angle, axis=0) / np.sqrt(2))))
+
+    def fit(self, start: np.ndarray) -> np.ndarray:
+        """Run `mujoco.sysid.optimize` from start, shape (P,), and return what it finds."""
+        from mujoco import sysid
+
+        parameters, known = sysid.ParameterDict(), self._problem.parameters
+        for name, value, low, high in zip(known.names, start, known.lower, known.upper, strict=True):
+            parameters.add(sysid.Parameter(name, value, low, high))
+        with redirect_stdout(io.StringIO()):  # it prints every iteration
+            found, _ = sysid.optimize(parameters, self.residual, verbose=False)
+        return found.as_vector()
+
+    def residual(self, x: np.ndarray, parameters: Any) -> tuple[Sequence[np.ndarray], ...]:
+        """Return sysid's residuals and those of the prior; x has shape (P,) or (P, n)."""
+        self.rollouts += 1 if x.ndim == 1 else x.shape[1]
+        rows, predicted, measured = self._residual(x, parameters)
+        scores = self._weight * self._problem.priors.scores(np.atleast_2d(x.T)).T
+        return [*rows, scores[:, 0] if x.ndim == 1 else scores], predicted, measured
+
+    def _build(self, parameters: Any, _: mujoco.MjSpec) -> mujoco.MjModel:
+        model = copy.copy(self._model)
+        for name, value in zip(self._problem.parameters.names, parameters.as_vector(), strict=True):
+            place = int(name[1:]) - 1
+            match name[0]:
+                case "K":
+                    model.actuator_gainprm[place, 0] = value
+                case "D":
+                    model.dof_damping[place] = value
+                case "S":
+                    model.jnt_stiffness[place] = value
+                case _:
+                    body = self._links[place]
+                    model.body_inertia[body] *= value / model.body_mass[body]
+                    model.body_mass[body] = value
+        data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, data)
+        data.qpos[:] = self._pose
+        mujoco.mj_forward(model, data)
+        model.actuator_biasprm[:, 0] = data.qfrc_bias  # the oil that holds the arm at the start
+        return model
 
 
 def main() -> None:
@@ -161,42 +148,44 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=10)
     parser.add_argument("--peer-starts", type=int, default=3)
     parser.add_argument("--duration", type=float, default=60.0)
-    arguments = parser.parse_args()
-    settings, arm = make_settings(1)
-    log = make_log(arguments.duration)
-    problem = Problem(settings, [log])
-    at_truth = problem.rms(problem.residuals(problem.parameters.vector(TRUTH, "truth")[None]))[0]
-    print(f"rms error at the true parameters: {np.rad2deg(at_truth):.5g} deg")
-    print("| program | start | rms [deg] | simulations | wall [s] | CPU [s] |")
-    print("| --- | --- | --- | --- | --- | --- |", flush=True)
-    ours, theirs, fits = Table(problem), Table(problem), list[Fit]()
-    for seed in range(1, arguments.starts + 1):
-        settings, _ = make_settings(seed)
+    given = parser.parse_args()
+    log = true_log(make_settings(1), TRUTH, list(JOINTS), given.duration, seed=0)
+    log.angle[1:] += np.random.default_rng(1).normal(0.0, NOISE, log.angle[1:].shape)
+    problem = Problem(make_settings(1), [log])
+    truth = problem.parameters.vector(TRUTH, "truth")
+    print(f"rms error at the true parameters: {cost_of(problem, truth)[1]:.5g} deg")
+    table(("program", "start", "rms [deg]", "simulations", "time"))
+    costs: dict[str, list[float]] = {"hydroid": [], "mujoco.sysid": []}
+    best: Fit | None = None
+    for seed in range(1, given.starts + 1):
         clock = Clock()
-        result = fit(Problem(settings, [log]))
-        clock.stop()
+        result = fit(Problem(make_settings(seed), [log]))
         assert result.refinement is not None
+        cost, rms = cost_of(problem, result.best.theta)
         simulated = int(result.history[-1, 2]) + result.refinement.evaluations
-        ours.add("hydroid", seed, result.best.theta, simulated, clock)
-        fits.append(result)
-    for seed in range(1, arguments.peer_starts + 1):
-        peer = Peer(arm, problem, log, NOISE)
-        unit = np.random.default_rng([seed, 0]).random((1, len(problem.parameters.names)))
-        start = problem.theta(unit)[0]
-        clock = Clock()
+        row(("hydroid", seed, f"{rms:.5g}", simulated, clock))
+        best = result if cost < min(costs["hydroid"], default=np.inf) else best
+        costs["hydroid"].append(cost)
+    for seed in range(1, given.peer_starts + 1):
+        peer, clock = Peer(problem, log), Clock()
+        start = problem.theta(np.random.default_rng([seed, 0]).random((1, len(TRUTH))))[0]
         try:
-            found = peer.fit(start)
+            cost, rms = cost_of(problem, peer.fit(start))
         except Exception as error:  # what its user would see
-            fault = f"{type(error).__name__}: {error}"
-            print(f"| mujoco.sysid | {seed} | {fault} | {peer.rollouts} | {clock.stop()} |", flush=True)
-            continue
-        theirs.add("mujoco.sysid", seed, found, peer.rollouts, clock.stop())
-    best = fits[int(np.argmin(ours.cost))]
-    lowest = min(ours.cost + theirs.cost)
-    show("hydroid", ours, best, lowest)
-    if theirs.cost:
-        show("mujoco.sysid", theirs, best, lowest)
-    show_intervals(problem, best)
+            cost, rms = np.inf, f"{type(error).__name__}: {error}"
+        row(("mujoco.sysid", seed, rms if isinstance(rms, str) else f"{rms:.5g}", peer.rollouts, clock))
+        costs["mujoco.sysid"].append(cost)
+    lowest = min(min(each, default=np.inf) for each in costs.values())
+    for who, each in costs.items():
+        reached = sum(cost <= (1 + REACHED) * lowest for cost in each)
+        print(
+            f"{who}: {reached} of {len(each)} reached the optimum (cost within {REACHED:.0%} of the lowest)"
+        )
+    if best is not None:
+        known = best.uncertainty
+        inside = (known.interval[:, 0] <= truth) & (truth <= known.interval[:, 1])
+        stated = np.isfinite(known.interval).all(axis=1)
+        print(f"{int(inside[stated].sum())} of {int(stated.sum())} 95 % intervals hold the truth")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from hydroid.fitting.search import search
 from hydroid.identified_model import IdentifiedModel
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import Descent
+from hydroid.search.descent import Descent
 from hydroid.settings.fit import FitSettings
 
 FOLDER = Path(__file__).parents[1] / "examples" / "excavator"

@@ -20,7 +20,7 @@ from hydroid.posterior.sources import Strain, strains
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search import compromise
-from hydroid.search.least_squares import Descent
+from hydroid.search.descent import Descent
 from hydroid.search.pareto import non_dominated
 
 _log = logging.getLogger(__name__)

@@ -25,7 +25,7 @@ from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.algorithm import Population
 from hydroid.search.coding import Genes
-from hydroid.search.least_squares import Descent
+from hydroid.search.descent import Descent
 from hydroid.settings.search import RefinementSettings
 
 DRAWS = 16

@@ -11,7 +11,8 @@ from hydroid.parameters import Array
 from hydroid.posterior.noise import prior_weight
 from hydroid.posterior.open_start import with_open_start
 from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import Descent, start, step
+from hydroid.search.descent import Descent, start
+from hydroid.search.least_squares import step
 from hydroid.settings.search import RefinementSettings
 
 SETTLED = 1e-3

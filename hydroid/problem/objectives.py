@@ -21,6 +21,8 @@ from hydroid.settings.problem import ObjectiveSettings, SegmentSettings
 
 Int = NDArray[np.int64]
 
+SWING = 0.05
+"""smallest prominence of a turning point, as a part of the output's range"""
 _WHERE = "objective.segments"
 
 
@@ -95,7 +97,7 @@ def segment_bounds(measured: Array, period: float, settings: SegmentSettings) ->
     if settings.equal is not None:
         cuts = np.arange(1, settings.equal) * samples // settings.equal
     elif settings.turning_points is not None:
-        cuts = _turning_cuts(measured, settings.turning_points, settings.swing)
+        cuts = _turning_cuts(measured, settings.turning_points)
     else:
         cuts = np.rint(np.minimum(np.array(settings.times) / period, samples))
     edges = np.concatenate(([0], cuts, [samples]))
@@ -108,17 +110,17 @@ def segment_bounds(measured: Array, period: float, settings: SegmentSettings) ->
     return np.stack((edges[:-1], edges[1:]), axis=1).astype(np.int64)
 
 
-def _turning_cuts(measured: Array, segments: int, swing: float) -> Int:
+def _turning_cuts(measured: Array, segments: int) -> Int:
     """Samples of the `segments` - 1 most prominent turning points, in order of time."""
-    least = swing * float(np.ptp(measured))
+    least = SWING * float(np.ptp(measured))
     extremes = _extremes(measured, least)
     count = len(extremes) - 2
     if count < segments - 1:
         raise SettingsError(
             f"{segments} segments need {segments - 1} turning points, the measured output has {count} "
-            f"whose swing exceeds {swing:g} of its range",
+            f"whose swing exceeds {SWING:g} of its range",
             where=f"{_WHERE}.turning_points",
-            hint=f"at most {count + 1} segments, or a smaller swing",
+            hint=f"at most {count + 1} segments",
         )
     while (surplus := len(extremes) - 2 - (segments - 1)) > 0:
         smallest = int(np.argmin(np.abs(np.diff(measured[extremes]))))

@@ -11,6 +11,9 @@ from hydroid.search.coding import Genes
 from hydroid.search.operators import GeneticAlgorithm, roulette
 from hydroid.settings.search import GaSettings
 
+ELITE = 1
+"""best candidates that survive unchanged (ours; the article gives none)"""
+
 
 @dataclass(frozen=True)
 class SimpleGa(GeneticAlgorithm):
@@ -23,18 +26,18 @@ class SimpleGa(GeneticAlgorithm):
     single = True
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
-        """Offspring, shape (population - elitism, length): the elite is not simulated again."""
+        """Offspring, shape (population - ELITE, length): the elite is not simulated again."""
         if population is None:
             return self.first(rng)
-        count = self.settings.population - self.settings.elitism
+        count = self.settings.population - ELITE
         parents = roulette(_objective(population), count + count % 2, rng)
         return self.breed(population.chromosomes[parents], count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """The best `elitism` candidates of the present population, then all offspring."""
+        """The best ELITE candidates of the present population, then all offspring."""
         if population is None:
             return offspring
-        best = np.argsort(_objective(population), kind="stable")[: self.settings.elitism]
+        best = np.argsort(_objective(population), kind="stable")[:ELITE]
         return population.take(best).join(offspring)
 
     def reached(self, population: Population) -> bool:

@@ -4,8 +4,7 @@
     while not descent.ended:
         descent = step(descent, residuals, settings)
 
-A `Descent` is a frozen record of numbers and arrays, and `step` is a pure function of it: a stored one
-continues to the same bits.
+`step` is a pure function of a `Descent`: a stored one continues to the same bits.
 
 One step is one of two things. *Without a Jacobian* it takes one, by finite differences in one batch, and
 ends where the linear model promises no gain. *With one* it tries a step s that minimises
@@ -23,14 +22,14 @@ What differs from a textbook:
 - A candidate whose simulation fails is a step that does not help.
 """
 
-from dataclasses import dataclass, fields, replace
-from enum import Enum
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.search.derivatives import Residuals, derivatives
+from hydroid.search.axes import Function
+from hydroid.search.derivatives import derivatives
+from hydroid.search.descent import DAMPING, Descent, Ending, costs, no_jacobian, start
 from hydroid.search.linear_model import LinearModel
 from hydroid.settings.search import RefinementSettings
 
@@ -38,8 +37,6 @@ Float = NDArray[np.float64]
 
 WIDTHS = (2.0**-26, 2.0**-20, 2.0**-14)
 """finite differences in the unit box: the root of the rounding unit, and wider where that leads nowhere"""
-DAMPING = 1e-3
-"""λ at the start, and after the differences became wider"""
 UNDAMPED = 1e-14
 """λ of the step that tells what a Jacobian promises at most"""
 PROBE = 0.1
@@ -56,89 +53,7 @@ SLOW_STEPS = 2
 """steps in a row that may gain less than the tolerance"""
 
 
-class Ending(Enum):
-    """Why least squares ended, if it has."""
-
-    UNDER_WAY = "under way"
-    GAIN = "no step promises a gain above the tolerance"
-    SLOW = "the last steps gained less than the tolerance"
-    EXACT = "the residual is zero up to rounding"
-    NO_IMPROVEMENT = "no step improves the fit any further"
-    ITERATIONS = "it reached the iteration limit"
-    START_FAILED = "the start could not be simulated"
-    JACOBIAN_FAILED = "simulations failed on both sides of the best point"
-
-    @property
-    def converged(self) -> bool:
-        """Whether a local optimum was reached, as far as tolerance and rounding show it."""
-        return self in (Ending.GAIN, Ending.SLOW, Ending.EXACT, Ending.NO_IMPROVEMENT)
-
-
-@dataclass(frozen=True, eq=False)
-class Descent:
-    """Least squares under way, or ended.
-
-    Attributes:
-        point: best point so far, shape (p,), within [0, 1].
-        residual: there, shape (R,).
-        cost: half the sum of its squares. cost_before: that of the start.
-        jacobian: shape (R, p), or (0, p) where it is to be taken.
-        fresh: whether the Jacobian is one of finite differences, not an updated one.
-        cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
-        damping: λ. growth: factor of λ after the next step that fails.
-        width: index into WIDTHS.
-        slow: steps in a row with gains below the tolerance.
-        evaluations: candidates simulated. iterations: steps that helped.
-        ending: why it ended, or UNDER_WAY.
-    """
-
-    point: Float
-    residual: Float
-    cost: float
-    cost_before: float
-    jacobian: Float
-    fresh: bool = False
-    cycle: Float | tuple[float, int] = (np.inf, 0)
-    damping: float = DAMPING
-    growth: float = 2.0
-    width: int = 0
-    slow: int = 0
-    evaluations: int = 1
-    iterations: int = 0
-    ending: Ending = Ending.UNDER_WAY
-
-    @property
-    def ended(self) -> bool:
-        """Whether there is no further step."""
-        return self.ending is not Ending.UNDER_WAY
-
-    @property
-    def converged(self) -> bool:
-        """Whether it has ended at an optimum."""
-        return self.ending.converged
-
-    def __str__(self) -> str:
-        cost = f"half the sum of squares {self.cost_before:.6g} to {self.cost:.6g}"
-        return f"{cost} in {self.evaluations} simulations; {self.ending.value}"
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return arrays by name, to be stored; without the residual once it has ended."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        values["ending"] = self.ending.name
-        if self.ended:
-            values |= {"residual": [], "jacobian": []}
-        return {name: np.asarray(value) for name, value in values.items()}
-
-    @staticmethod
-    def from_arrays(arrays: dict[str, NDArray[Any]]) -> "Descent":
-        """Return the descent that `arrays` stored."""
-        stored = {f.name: arrays[f.name] for f in fields(Descent)}
-        values: dict[str, Any] = {n: a if a.ndim else a.item() for n, a in stored.items()}
-        values["ending"] = Ending[values["ending"]]
-        return Descent(**values)
-
-
-def least_squares(start_at: Float, residuals: Residuals, settings: RefinementSettings) -> Descent:
+def least_squares(start_at: Float, residuals: Function, settings: RefinementSettings) -> Descent:
     """Minimise the sum of squared residuals from a point of the unit box, shape (p,).
 
     Returns:
@@ -150,14 +65,7 @@ def least_squares(start_at: Float, residuals: Residuals, settings: RefinementSet
     return descent
 
 
-def start(point: Float, residual: Float) -> Descent:
-    """Return the descent from a point, shape (p,), whose residual was simulated, shape (R,)."""
-    cost = float(_costs(residual[None])[0])
-    ending = Ending.UNDER_WAY if np.isfinite(cost) else Ending.START_FAILED
-    return Descent(point, residual, cost, cost, _no_jacobian(point), ending=ending)
-
-
-def step(now: Descent, residuals: Residuals, settings: RefinementSettings) -> Descent:
+def step(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
     """Return the descent after taking a Jacobian, or after trying a step. One that has ended stays."""
     if now.ended:
         return now
@@ -166,7 +74,7 @@ def step(now: Descent, residuals: Residuals, settings: RefinementSettings) -> De
     return replace(after, evaluations=now.evaluations + count.evaluations)
 
 
-def _differentiate(now: Descent, residuals: Residuals, settings: RefinementSettings) -> Descent:
+def _differentiate(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
     """Take the Jacobian; end where it promises no gain."""
     columns = derivatives(residuals, now.point, now.residual, WIDTHS[now.width])
     if not np.isfinite(columns).all():
@@ -188,11 +96,11 @@ def _advance(now: Descent, residuals: "_Counter", settings: RefinementSettings) 
     if np.linalg.norm(points[0] - now.point) <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
     rows = residuals(points)
-    costs = _costs(rows)
-    best = int(np.argmin(costs))
-    if not costs[best] < now.cost:
+    cost = costs(rows)
+    best = int(np.argmin(cost))
+    if not cost[best] < now.cost:
         return _damped(now, model, settings)
-    ratio = (now.cost - costs[best]) / promised if promised > 0 else 0.0
+    ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
     if not after.ended and _update_pays(now, after, ratio, residuals.evaluations):
         return replace(after, jacobian=_updated(now, after))
@@ -201,7 +109,7 @@ def _advance(now: Descent, residuals: "_Counter", settings: RefinementSettings) 
 
 def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: RefinementSettings) -> Descent:
     """Move to a better point, whose gain is `ratio` times the promised one; the Jacobian is to be taken."""
-    cost = float(_costs(row[None])[0])
+    cost = float(costs(row[None])[0])
     slow = now.slow + 1 if now.cost - cost < settings.gain_tolerance * now.cost else 0
     ending = Ending.UNDER_WAY
     if cost <= EXACT * now.cost_before:
@@ -215,7 +123,7 @@ def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: Refin
         point=point,
         residual=row,
         cost=cost,
-        jacobian=_no_jacobian(point),
+        jacobian=no_jacobian(point),
         fresh=False,
         damping=max(now.damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), UNDAMPED),
         growth=2.0,
@@ -245,7 +153,7 @@ def _updated(now: Descent, after: Descent) -> Float:
 def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> Descent:
     """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
     if not now.fresh:
-        return replace(now, jacobian=_no_jacobian(now.point))
+        return replace(now, jacobian=no_jacobian(now.point))
     after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
     promises = model.gain(model.step(after.damping)) >= settings.gain_tolerance * now.cost
     return after if promises else _no_step(now)
@@ -256,10 +164,10 @@ def _no_step(now: Descent) -> Descent:
     if now.fresh and now.width + 1 == len(WIDTHS):
         return replace(now, ending=Ending.NO_IMPROVEMENT)
     width = now.width + now.fresh
-    return replace(now, jacobian=_no_jacobian(now.point), damping=DAMPING, growth=2.0, width=width)
+    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0, width=width)
 
 
-def _corrected(model: LinearModel, s: Float, damping: float, residuals: Residuals) -> list[Float]:
+def _corrected(model: LinearModel, s: Float, damping: float, residuals: Function) -> list[Float]:
     """The same step corrected for the curvature along it; none where that cannot be measured."""
     origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
     slope = (residuals(probe[None])[0] - model.residual) / PROBE
@@ -274,23 +182,12 @@ def _model(now: Descent) -> LinearModel:
     return LinearModel(now.point, now.residual, now.jacobian)
 
 
-def _no_jacobian(point: Float) -> Float:
-    return np.empty((0, point.size))
-
-
 class _Counter:
-    """Residuals whose candidates are counted."""
+    """Function whose candidates are counted."""
 
-    def __init__(self, residuals: Residuals) -> None:
+    def __init__(self, residuals: Function) -> None:
         self._residuals, self.evaluations = residuals, 0
 
     def __call__(self, points: Float) -> Float:
         self.evaluations += len(points)
         return self._residuals(points)
-
-
-def _costs(rows: Float) -> Float:
-    """Half the sum of squares of each row; inf where it is not finite."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        costs = 0.5 * np.sum(rows**2, axis=1)
-    return np.where(np.isfinite(costs), costs, np.inf)

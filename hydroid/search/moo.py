@@ -1,6 +1,8 @@
 """Algorithms of the library pymoo (Blank and Deb 2020): those of this table, each of which is tested."""
 
 import warnings
+from collections.abc import Generator as Context
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,22 +15,16 @@ from hydroid.settings.search import PymooSettings
 
 Float = NDArray[np.float64]
 
-SINGLE = {
-    "DE": ("pymoo.algorithms.soo.nonconvex.de", "DE"),
-    "PSO": ("pymoo.algorithms.soo.nonconvex.pso", "PSO"),
+ALGORITHMS = {
+    "DE": "soo.nonconvex.de.DE",
+    "PSO": "soo.nonconvex.pso.PSO",
+    "NSGA3": "moo.nsga3.NSGA3",
+    "MOEAD": "moo.moead.ParallelMOEAD",  # asks for whole populations, MOEAD for one point
+    "RVEA": "moo.rvea.RVEA",
+    "AGEMOEA": "moo.age.AGEMOEA",
+    "SMSEMOA": "moo.sms.SMSEMOA",
 }
-"""Module and class of the algorithms for one objective, by the name in the settings."""
-SEVERAL = {
-    "NSGA3": ("pymoo.algorithms.moo.nsga3", "NSGA3"),
-    "MOEAD": (
-        "pymoo.algorithms.moo.moead",
-        "ParallelMOEAD",
-    ),  # asks for whole populations, MOEAD for one point
-    "RVEA": ("pymoo.algorithms.moo.rvea", "RVEA"),
-    "AGEMOEA": ("pymoo.algorithms.moo.age", "AGEMOEA"),
-    "SMSEMOA": ("pymoo.algorithms.moo.sms", "SMSEMOA"),
-}
-"""The same for several objectives."""
+"""Module and class below `pymoo.algorithms`, by the name in the settings; `soo`: for one objective."""
 DIRECTED = ("NSGA3", "MOEAD", "RVEA")
 """These take reference directions, one per candidate."""
 
@@ -48,18 +44,34 @@ def pymoo(
         SettingsError: pymoo is not installed, or the algorithm needs more objectives.
     """
     name = settings.algorithm
-    single = name in SINGLE
+    single = ALGORITHMS[name].startswith("soo")
     if not single and objectives < 2:
         raise SettingsError(
             f"{name} minimises several objectives, and there is one segment",
             where="search.pymoo.algorithm",
             hint="ask for more with objective.segments, or choose DE, PSO or cmaes",
         )
-    need("pymoo", "moo")
-    count = 1 if single else objectives
-    return LibraryAlgorithm(
-        settings, lambda rng: _Pymoo(settings, parameters, count, start, rng), single=single
-    )
+    need("pymoo.config", "moo").Config.warnings["not_compiled"] = False  # else it prints a hint
+    several = 1 if single else objectives
+
+    def begin(rng: Generator) -> _Pymoo:
+        options: dict[str, Any] = {"seed": int(rng.integers(2**32))}
+        if name in DIRECTED:
+            options["ref_dirs"] = directions(settings.population, several)
+        else:
+            options["pop_size"] = settings.population
+        if start is not None:
+            others = rng.random((settings.population - 1, parameters))
+            options["sampling"] = np.vstack([start, others])
+        module, _, kind = ALGORITHMS[name].rpartition(".")
+        algorithm = getattr(need(f"pymoo.algorithms.{module}", "moo"), kind)(**options)
+        problem = need("pymoo.core.problem", "moo").Problem(
+            n_var=parameters, n_obj=several, n_ieq_constr=0, xl=0.0, xu=1.0
+        )
+        algorithm.setup(problem, termination=("n_gen", 1 + settings.generations), verbose=False)
+        return _Pymoo(algorithm)
+
+    return LibraryAlgorithm(settings, begin, single=single)
 
 
 def directions(count: int, objectives: int) -> Float:
@@ -83,42 +95,25 @@ def directions(count: int, objectives: int) -> Float:
 
 
 class _Pymoo:
-    def __init__(
-        self,
-        settings: PymooSettings,
-        parameters: int,
-        objectives: int,
-        start: Float | None,
-        rng: Generator,
-    ) -> None:
-        need("pymoo.config", "moo").Config.warnings["not_compiled"] = False  # else it prints a hint
-        problem = need("pymoo.core.problem", "moo").Problem(
-            n_var=parameters, n_obj=objectives, n_ieq_constr=0, xl=0.0, xu=1.0
-        )
-        options: dict[str, Any] = {"seed": int(rng.integers(2**32))}
-        if settings.algorithm in DIRECTED:
-            options["ref_dirs"] = directions(settings.population, objectives)
-        else:
-            options["pop_size"] = settings.population
-        if start is not None:
-            others = rng.random((settings.population - 1, parameters))
-            options["sampling"] = np.vstack([start, others])
-        module, name = (SINGLE | SEVERAL)[settings.algorithm]
-        self._algorithm = getattr(need(module, "moo"), name)(**options)
-        self._algorithm.setup(problem, termination=("n_gen", 1 + settings.generations), verbose=False)
-        self._asked: Any = None
+    def __init__(self, algorithm: Any) -> None:
+        self._algorithm, self._asked = algorithm, None
 
     def ask(self) -> Float:
         """Return the next population; none once no new points can be bred."""
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with _silent():
             self._asked = self._algorithm.ask()
         return np.empty((0, 0)) if self._asked is None else self._asked.get("X").astype(float)
 
     def tell(self, objectives: Float) -> None:
         """Take all objectives, shape (n, m)."""
         static = need("pymoo.problems.static", "moo").StaticProblem(self._algorithm.problem, F=objectives)
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with _silent():
             self._algorithm.evaluator.eval(static, self._asked)
             self._algorithm.tell(infills=self._asked)
+
+
+@contextmanager
+def _silent() -> Context[None]:
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield

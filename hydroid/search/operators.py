@@ -16,6 +16,9 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
+CUTS = 2
+"""of the pointwise crossover (ours; the article gives none)"""
+
 
 def roulette(objective: Float, count: int, rng: Generator) -> Int:
     """Parents from the weighted roulette wheel, with replacement.
@@ -70,7 +73,7 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
 
     Args:
         parents: shape (n, length), n even.
-        settings: crossover type, its number of cuts, and the chance P_c that a pair crosses at all.
+        settings: crossover type, and the chance P_c that a pair crosses at all.
         rng: source of randomness.
 
     Returns:
@@ -79,7 +82,7 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
     first, second = parents[0::2], parents[1::2]
     pairs, length = first.shape
     if settings.crossover == "pointwise":
-        swaps = pointwise_swaps(pairs, length, settings.points, rng)
+        swaps = pointwise_swaps(pairs, length, CUTS, rng)
     else:
         swaps = uniform_swaps(pairs, length, rng)
     swaps &= rng.random((pairs, 1)) < settings.crossover_rate

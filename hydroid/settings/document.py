@@ -20,6 +20,13 @@ MAX_NODES = 20_000
 """aliases count as often as they are used, so that a few lines cannot expand to billions of values"""
 MAX_DEPTH = 40
 _TAG = "tag:yaml.org,2002:"
+_PLAIN = {
+    "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
+    "\\t": "a line is indented by a tab; use spaces",
+    "expected ',' or ']'": "a list [a, b] is not closed with ']'",
+    "expected ',' or '}'": "a mapping {a: 1} is not closed with '}'",
+}
+"""what the YAML reader stumbled over, by a part of its message"""
 _TYPES = {_TAG + name for name in ("map", "seq", "str", "int", "float", "bool", "null")}
 
 
@@ -75,33 +82,21 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
             return None, lines
         _collect_lines(node, (), lines, source)
         return loader.construct_document(node), lines
-    except (yaml.YAMLError, ValueError, KeyError, RecursionError) as error:
+    except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
-        problem = getattr(error, "problem", None) or getattr(error, "reason", None)
-        if not isinstance(error, yaml.YAMLError):
-            deep = isinstance(error, RecursionError)
-            problem = "it is nested too deeply" if deep else "a value does not fit its type"
-        raise SettingsError(f"is not YAML: {_plainly(str(problem))}", where=where) from None
-
-
-def _plainly(problem: str) -> str:
-    """Say in plain words what the YAML reader stumbled over."""
-    if problem.startswith("mapping values are not allowed"):
-        return "there is a second ': ' in this line, or the line is indented too far"
-    if "\\t" in problem:
-        return "a line is indented by a tab; use spaces"
-    if problem.startswith("expected ',' or ']'"):
-        return "a list [a, b] is not closed with ']'"
-    if problem.startswith("expected ',' or '}'"):
-        return "a mapping {a: 1} is not closed with '}'"
-    return problem
+        problem = str(getattr(error, "problem", None) or getattr(error, "reason", None))
+        plain = next((words for part, words in _PLAIN.items() if part in problem), problem)
+        raise SettingsError(f"is not YAML: {plain}", where=where) from None
+    except RecursionError:
+        raise SettingsError("is not YAML: it is nested too deeply", where=source) from None
+    except (ValueError, KeyError):
+        raise SettingsError("is not YAML: a value does not fit its type", where=source) from None
 
 
 def _collect_lines(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> None:
     """Check a node and what is in it, and note their lines."""
-    line = node.start_mark.line + 1
-    where = f"{source}, line {line}"
+    where = f"{source}, line {node.start_mark.line + 1}"
     if len(lines) >= MAX_NODES:
         raise SettingsError(f"holds more than {MAX_NODES} values", where=source)
     if len(path) > MAX_DEPTH:
@@ -110,18 +105,19 @@ def _collect_lines(node: yaml.Node, path: tuple[str, ...], lines: Lines, source:
         raise SettingsError(f"a value of type {node.tag.removeprefix(_TAG)!r} is not allowed", where=where)
     if isinstance(node, yaml.ScalarNode) and not all(c.isprintable() or c in "\t\n" for c in node.value):
         raise SettingsError("a text contains characters that cannot be printed", where=where)
-    lines.setdefault(path, line)
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise SettingsError("a key must be plain text or a number", where=where)
-            # 02 and 2 are the same joint
-            here = (*path, str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value))
-            place = key.start_mark.line + 1
-            if here in lines:
-                raise SettingsError(f"{'.'.join(here)} occurs twice", where=f"{source}, line {place}")
-            lines[here] = place
-            _collect_lines(value, here, lines, source)
-    elif isinstance(node, yaml.SequenceNode):
-        for index, value in enumerate(node.value):
-            _collect_lines(value, (*path, str(index)), lines, source)
+    lines.setdefault(path, node.start_mark.line + 1)
+    items: list[tuple[str, yaml.Node]] = []
+    if isinstance(node, yaml.SequenceNode):
+        items = [(str(index), value) for index, value in enumerate(node.value)]
+    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+        if not isinstance(key, yaml.ScalarNode):
+            raise SettingsError("a key must be plain text or a number", where=where)
+        # 02 and 2 are the same joint
+        name = str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value)
+        line = key.start_mark.line + 1
+        if (*path, name) in lines:
+            raise SettingsError(f"{'.'.join((*path, name))} occurs twice", where=f"{source}, line {line}")
+        lines[*path, name] = line
+        items.append((name, value))
+    for name, value in items:
+        _collect_lines(value, (*path, name), lines, source)

@@ -83,9 +83,9 @@ class FitSettings(Settings):
         for name, own in self.parameters.items():
             hydraulic = own.quantity in TARGETS
             if self.stage == "mech" and hydraulic:
-                raise ValueError(f"{name}: stage mech has no {own.quantity}; set stage: hyd")
+                raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
-                raise ValueError(f"{name}: stage hyd has no gain; the hydraulics take its place")
+                raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
             try:
                 prior(self, own)
             except ValueError as error:

@@ -21,16 +21,6 @@ from hydroid.settings.document import Lines, read_document, read_yaml
 LONGEST = 60
 """characters of a value in a message"""
 
-FORMER = {
-    "polish": "is now called 'refinement'",
-    "refine": "is now called 'joint_refinement'",
-    "known": "is now called 'priors'",
-    "step_tolerance": "is now called 'gain_tolerance'",
-    "parameter": "was removed: the `parameters` of a fit name the links",
-    "target": "was removed: a search ends after its generations",
-}
-"""settings of earlier versions, and what became of them"""
-
 _PLAIN = {
     "bool": "must be true or false",
     "dict": "must be a mapping of settings",
@@ -122,19 +112,20 @@ def validate(
     except ValidationError as error:
         # a setting that does not exist may be why another is missing
         first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-        loc = tuple(str(part) for part in first["loc"])
-        key = ".".join(loc)
-        what = _explain(key, first, kind)
         hint = f"and {len(others)} more fault{'s' if len(others) > 1 else ''} in this file" if others else ""
-        # the fault may lie in an override, below it, or in what it is a part of
-        place = key.removesuffix(".[key]") or what.partition(": ")[0]
-        at = next(
-            (o for o in overridden or () if f"{place}.".startswith(f"{o}.") or o.startswith(f"{place}.")), ""
+    key, problem = _explained(first, kind)
+    # the fault may lie in an override, below it, or in what it is a part of
+    at = next((o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), None)
+    if at is not None:
+        below = key[len(at) + 1 :]
+        what, where = f"{below}: {problem}" if below else problem, f"--set {at}"
+    else:
+        named = first["type"] in ("extra_forbidden", "missing") or not key  # the problem names the setting
+        what, where = (
+            problem if named else f"{_shown(key)[1:-1]}: {problem}",
+            source + _line(key, lines or {}),
         )
-        where = f"--set {at}" if at else source + _line(loc or tuple(place.split(".")), lines or {})
-        for name in (at, place, key) if at.startswith(f"{place}.") else (at,):
-            what = what.removeprefix(f"{name}: ")
-        raise SettingsError(what, where=where, hint=hint) from None
+    raise SettingsError(what, where=where, hint=hint)
 
 
 def parse_override(text: str) -> tuple[str, Any]:
@@ -164,30 +155,31 @@ def replace_setting(values: dict[str, Any], key: str, value: Any) -> None:
     values[last] = value
 
 
-def _line(loc: tuple[str, ...], lines: Lines) -> str:
-    """The line of the deepest part of `loc` that the file contains."""
-    place = next((lines[loc[:end]] for end in range(len(loc), 0, -1) if loc[:end] in lines), None)
+def _line(key: str, lines: Lines) -> str:
+    """The line of the deepest part of a dotted key that the file contains."""
+    parts = tuple(key.split("."))
+    place = next((lines[parts[:end]] for end in range(len(parts), 0, -1) if parts[:end] in lines), None)
     return f", line {place}" if place else ""
 
 
-def _explain(key: str, fault: Any, kind: type[BaseModel]) -> str:
-    """What is wrong with the setting `key` (dotted, or empty), from one of pydantic's faults."""
-    if fault["type"] == "extra_forbidden":
-        name = str(fault["loc"][-1])
-        allowed = _allowed(kind, fault["loc"][:-1])
-        near = difflib.get_close_matches(name, allowed, n=1)
-        choice = f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(allowed)}"
-        choice = choice if allowed else ""
-        if name in FORMER and not (near and FORMER[name].startswith("was removed")):
-            choice = f"it {FORMER[name]}"
-        return f"unknown setting {_shown(key)}" + (f"; {choice}" if choice else "")
+def _explained(fault: Any, kind: type[BaseModel]) -> tuple[str, str]:
+    """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
+    key = ".".join(str(part) for part in fault["loc"]).removesuffix(".[key]")
     if fault["type"] == "missing":
-        return f"setting {key!r} is missing"
+        return key, f"setting {key!r} is missing"
+    if fault["type"] == "extra_forbidden":
+        allowed = _allowed(kind, fault["loc"][:-1])
+        near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
+        choice = f"; did you mean {near[0]!r}?" if near else f"; allowed here: {', '.join(allowed)}"
+        return key, f"unknown setting {_shown(key)}{choice if allowed else ''}"
     words = next((words for start, words in _PLAIN.items() if fault["type"].startswith(start)), None)
     message = str(fault["msg"]).removeprefix("Value error, ")
     problem = words.format(**fault.get("ctx", {})) if words else message[:1].lower() + message[1:]
-    problem = f"{_shown(key)[1:-1]}: {problem}" if key else problem
-    return problem if isinstance(fault["input"], dict) else f"{problem} (given: {_shown(fault['input'])})"
+    if isinstance(fault["input"], dict):  # a check of several settings names the one that is wrong
+        name, colon, rest = problem.partition(": ")
+        inner = name if colon and name.replace(".", "").isidentifier() else ""
+        return (f"{key}.{inner}".strip("."), rest) if inner else (key, problem)
+    return key, f"{problem} (given: {_shown(fault['input'])})"
 
 
 def _shown(value: object) -> str:

@@ -163,7 +163,7 @@ Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
 
 
 class SegmentSettings(Settings):
-    """How a log is cut into segments, one objective per segment: give exactly one of the first three."""
+    """How a log is cut into segments, one objective per segment: give exactly one of these."""
 
     equal: Annotated[int, Field(ge=1, le=10_000)] | None = None
     """number of segments of equal length"""
@@ -171,8 +171,6 @@ class SegmentSettings(Settings):
     """number of segments, cut at the most prominent peaks and troughs of the measured output"""
     times: tuple[Annotated[float, Field(gt=0)], ...] | None = None
     """inner cuts, increasing, from the start of the log [s]"""
-    swing: Annotated[float, Field(gt=0, lt=1)] = 0.05
-    """smallest prominence of a turning point, as a fraction of the output's range"""
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "SegmentSettings":

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hydroid.settings.load import Settings
 
@@ -30,9 +30,7 @@ class GeneticSettings(PopulationSettings):
     coding: Literal["binary", "integer"] = "binary"
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
-    """pointwise: cut parents at `points`; uniform: choose each element from either parent"""
-    points: Count = 2
-    """number of cuts of the pointwise crossover (ours; the article gives none)"""
+    """pointwise: cut parents at two places; uniform: choose each element from either parent"""
 
 
 class GaSettings(GeneticSettings):
@@ -42,14 +40,6 @@ class GaSettings(GeneticSettings):
     generations: Generations = 40
     crossover_rate: Rate = 0.8
     mutation_rate: Rate = 0.05
-    elitism: Annotated[int, Field(ge=0)] = 1
-    """number of best candidates that survive unchanged (ours; the article gives none)"""
-
-    @model_validator(mode="after")
-    def _someone_new(self) -> "GaSettings":
-        if self.elitism >= self.population:
-            raise ValueError("elitism must leave room for children: below population")
-        return self
 
 
 class Nsga2Settings(GeneticSettings):

@@ -52,7 +52,6 @@ def test_an_unknown_pose_is_answered_with_the_known_ones():
     [
         (lambda v: v["joints"].pop(), "7 links need as many joints, not 6"),
         (lambda v: v["joints"][1].update(name="elbow"), "two joints are named elbow"),
-        (lambda v: v["links"][1].update(parameter="M1"), "the `parameters` of a fit name the links"),
         (lambda v: v["links"][1].update(name="base"), "two links are named base"),
         (lambda v: v["links"][2].update(mass=0), r"links\.2\.mass"),
         (lambda v: v["joints"][1].update(range=[90, -30]), "lower < upper"),

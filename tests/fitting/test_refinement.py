@@ -13,7 +13,7 @@ from hydroid.fitting.search import search
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import CheckpointFile
-from hydroid.search.least_squares import Descent
+from hydroid.search.descent import Descent
 from hydroid.settings.search import RefinementSettings
 
 SHORT = RefinementSettings(iterations=6)

@@ -18,7 +18,7 @@ from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.search.least_squares import Descent, Ending
+from hydroid.search.descent import Descent, Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 

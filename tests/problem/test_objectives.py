@@ -157,10 +157,9 @@ def test_cuts_do_not_depend_on_unit_sign_or_zero(sign, scale, shift, n):
 @given(
     values=st.lists(st.integers(-5, 5), min_size=1, max_size=60),
     n=st.integers(1, 12),
-    swing=st.floats(0.01, 0.9),
 )
-def test_any_record_is_covered_or_refused(values, n, swing):
-    how = SegmentSettings(turning_points=n, swing=swing)
+def test_any_record_is_covered_or_refused(values, n):
+    how = SegmentSettings(turning_points=n)
     try:
         bounds = segment_bounds(np.array(values, dtype=float), 0.01, how)
     except SettingsError:

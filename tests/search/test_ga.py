@@ -31,7 +31,7 @@ def test_finds_the_bottom_of_a_sphere(coding, cross, seed):
 
 
 def test_solves_one_max():
-    ga = SimpleGa(GaSettings(mutation_rate=0.03, elitism=2), 9)
+    ga = SimpleGa(GaSettings(mutation_rate=0.03), 9)
 
     def count(points):
         return -ga.coding.encode(points).sum(axis=1, dtype=float)[:, None]
@@ -44,18 +44,17 @@ def test_solves_one_max():
     assert population.objectives.min() == -144
 
 
-@pytest.mark.parametrize("elitism", [1, 3])
-def test_the_elite_is_kept_and_not_evaluated_again(elitism):
-    ga = SimpleGa(GaSettings(population=11, elitism=elitism), 3)
+def test_the_best_one_is_kept_and_not_evaluated_again():
+    ga = SimpleGa(GaSettings(population=11), 3)
     rng = np.random.default_rng(0)
     population = advance(ga, with_failures, None, rng, 0)
     for _ in range(30):
         chromosomes = ga.ask(population, rng)
-        assert len(chromosomes) == 11 - elitism
+        assert len(chromosomes) == 10
         successor = ga.tell(population, evaluate(ga, chromosomes, with_failures))
         assert len(successor) == 11
-        best = np.sort(population.objectives[:, 0])[:elitism]  # numpy sorts nan last
-        assert np.array_equal(successor.objectives[:elitism, 0], best, equal_nan=True)
+        best = np.sort(population.objectives[:, 0])[:1]  # numpy sorts nan last
+        assert np.array_equal(successor.objectives[:1, 0], best, equal_nan=True)
         population = successor
 
 
@@ -93,7 +92,7 @@ def test_objectives_that_do_not_belong_to_the_chromosomes_are_a_mistake():
 
 @pytest.mark.parametrize(
     "values",
-    [{"population": 1}, {"crossover_rate": 1.1}, {"mutation_rate": -0.1}, {"points": 0}, {"elitism": 70}],
+    [{"population": 1}, {"crossover_rate": 1.1}, {"mutation_rate": -0.1}],
 )
 def test_settings_out_of_range_are_refused(values):
     with pytest.raises(SettingsError, match=next(iter(values))):

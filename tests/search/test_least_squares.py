@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hydroid.search.least_squares import Descent, Ending, least_squares, start, step
+from hydroid.search.descent import Descent, Ending, start
+from hydroid.search.least_squares import least_squares, step
 from hydroid.settings.search import RefinementSettings
 
 SETTINGS = RefinementSettings()

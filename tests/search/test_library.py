@@ -12,13 +12,17 @@ from hydroid.errors import SettingsError
 from hydroid.search.algorithm import Population
 from hydroid.search.cmaes import cmaes
 from hydroid.search.library import UNSCALED, LibraryAlgorithm
-from hydroid.search.moo import SEVERAL, SINGLE, directions, pymoo
+from hydroid.search.moo import ALGORITHMS, directions, pymoo
 from hydroid.search.nsga2 import crowded_order
 from hydroid.settings.load import validate
 from hydroid.settings.search import CmaesSettings, PymooSettings
 
 ENDS = np.array([[0.2, 0.5, 0.3], [0.7, 0.4, 0.6]])
 """Two points: least distances to both lie on the straight line between them."""
+
+
+SINGLE = [name for name, place in ALGORITHMS.items() if place.startswith("soo")]
+SEVERAL = [name for name in ALGORITHMS if name not in SINGLE]
 
 
 def build(name: str, population: int = 20, generations: int = 30, parameters: int = 3) -> LibraryAlgorithm:
@@ -92,7 +96,7 @@ def test_multi_objective_algorithms_come_nearer_to_the_front_than_as_many_random
     assert detour(population.objectives) < detour(random[crowded_order(random)[:20]])
 
 
-@pytest.mark.parametrize("name", ["cmaes", *SINGLE, *SEVERAL])
+@pytest.mark.parametrize("name", ["cmaes", *ALGORITHMS])
 def test_what_diverged_never_reaches_a_library_nor_the_result(name: str):
     algorithm = build(name, generations=15)
     begin, told = algorithm.begin, []
@@ -140,7 +144,7 @@ def scored(values):
     return Population(np.zeros((len(values), 3)), np.array(values, dtype=float))
 
 
-@pytest.mark.parametrize("name", ["cmaes", *SINGLE, *SEVERAL])
+@pytest.mark.parametrize("name", ["cmaes", *ALGORITHMS])
 def test_the_seed_alone_decides_every_bit(name: str, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     runs = []
@@ -173,7 +177,7 @@ def test_directions_cover_the_simplex():
 
 def test_other_algorithms_are_refused_with_the_list():
     named = PymooSettings.model_fields["algorithm"].annotation
-    assert set(get_args(named)) == SINGLE.keys() | SEVERAL.keys()
+    assert set(get_args(named)) == ALGORITHMS.keys()
     for name in ("nsga3", "CMOPSO"):
         with pytest.raises(SettingsError, match=r"'NSGA3', 'MOEAD'.*'PSO'"):
             validate({"algorithm": name}, PymooSettings, "fit.yaml")

@@ -122,14 +122,6 @@ def test_numbers_may_be_written_in_any_way_yaml_knows(tmp_path: Path):
     assert settings.objective.norm == "inf"
 
 
-@pytest.mark.parametrize(
-    ("old", "new"), [("polish", "refinement"), ("refine", "joint_refinement"), ("known", "priors")]
-)
-def test_a_setting_that_was_renamed_is_refused_with_its_new_name(tmp_path: Path, old: str, new: str):
-    with pytest.raises(SettingsError, match=f"line 7: unknown setting '{old}'; it is now called '{new}'"):
-        load(written(tmp_path, MINIMAL + f"{old}: {{}}\n"), FitSettings)
-
-
 def test_a_misspelt_setting_is_named_before_the_one_that_is_missing_for_it(tmp_path: Path):
     with pytest.raises(SettingsError, match="unknown setting 'paramters'"):
         load(written(tmp_path, MINIMAL.replace("parameters", "paramters")), FitSettings)
@@ -203,9 +195,6 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, mes
         Stage(hydroid.load_settings(path))
 
 
-def test_a_removed_setting_near_another_is_a_misspelling_and_a_column_is_named_once(tmp_path: Path):
-    path = written(tmp_path, MINIMAL + "parameter: {}\n")
-    with pytest.raises(SettingsError, match=r"unknown setting 'parameter'; did you mean 'parameters'\?"):
-        load(path, FitSettings)
+def test_a_column_is_named_once(tmp_path: Path):
     with pytest.raises(SettingsError, match=r"^--set log\.angle\.column: column 'foo' is meant"):
         load(written(tmp_path, MINIMAL), FitSettings, {"log.angle.column": "foo"})

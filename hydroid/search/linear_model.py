@@ -43,7 +43,8 @@ class LinearModel:
         matrix = np.vstack([triangle / self._scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
         limits = -there * unit, (1 - there) * unit
-        return lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE).x / unit
+        most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
+        return lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most).x / unit
 
     def gain(self, s: Float) -> float:
         """Part of the cost that the linear model promises to save by a step."""

@@ -1,8 +1,7 @@
 """What every search shares: a population, and `ask` and `tell`.
 
-Our algorithms hold settings only. The whole state of a run is its population, the state of its random
-generator and the number of the generation: store these three, and the run continues bit for bit. Algorithms
-of other libraries (`library`) hold more, and are replayed.
+An algorithm is deterministic: it draws from the generator passed in alone. So a run is continued by running
+it again from its seed, with the objectives that are known (`fitting.memo`).
 
     population = None
     for _ in range(1 + generations):

@@ -1,9 +1,4 @@
-"""Algorithms of other libraries behind our `ask` and `tell`.
-
-A library keeps a run's state in its own objects, which cannot be stored without pickle. It is deterministic,
-however: a run is continued by replaying it from its start, on a fresh `LibraryAlgorithm`, with the same
-random numbers and the same objectives.
-"""
+"""Algorithms of other libraries behind our `ask` and `tell`."""
 
 from collections.abc import Callable
 from importlib import import_module

@@ -14,8 +14,6 @@ from hydroid.report.chart import Chart
 from hydroid.report.moving_arm import MovingArm
 from hydroid.report.table import Table
 
-PAGE, FILE = frozenset({"page"}), frozenset({"file"})
-"""where a figure is shown"""
 Drawing = Figure | Chart | MovingArm
 _LONGEST_NAME = 40
 
@@ -24,15 +22,14 @@ _LONGEST_NAME = 40
 class Plot:
     """A figure: the name of its files, what it shows in words, and the function that draws it.
 
-    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`. A `MovingArm` is drawn there only. A
-    matplotlib figure is an image there. `where` says where it is shown: in the page, as a file, or both.
+    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`; `write_figures` makes files of it. A
+    `MovingArm` is drawn by the page only. A matplotlib figure is an image there.
     """
 
     name: str
     caption: str
     draw: Callable[[], Drawing]
     zoom: bool = False
-    where: frozenset[str] = PAGE | FILE
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def validate(
 def _show_in_report(model: IdentifiedModel, page: "Page") -> None:
     """Add a validation to the report of the run that a model is from, if its settings are the run's."""
     from hydroid.estimate import NAME
-    from hydroid.report.page_file import content_html, drawings, page_content, read_page
+    from hydroid.report.page_file import content_html, page_content, read_page
     from hydroid.report.validated import with_validation
 
     source = Path(model.source)
@@ -103,7 +103,7 @@ def _show_in_report(model: IdentifiedModel, page: "Page") -> None:
     if source.name != NAME or not is_file(file) or load_identified(source).settings != model.settings:
         return
     try:
-        content = with_validation(read_page(file), page_content(page, drawings(page)))
+        content = with_validation(read_page(file), page_content(page))
         for name, text in {**page.data, file.name: content_html(content)}.items():
             write_atomic(source.parent / name, text)
     except RunError as error:
@@ -233,12 +233,12 @@ def sensitivity(
     """
     from hydroid.posterior.sweep import sweep
     from hydroid.problem.problem import Problem
-    from hydroid.report.sensitivity_report import sensitivity_page
+    from hydroid.report.analysis_report import analysis_page
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))
     result = sweep(problem, model.theta, progress)
-    return Study(result, sensitivity_page(problem, model.theta, result)).write(out)
+    return Study(result, analysis_page(problem, model.theta, sweep=result)).write(out)
 
 
 def surface(
@@ -272,9 +272,9 @@ def surface(
             raise SettingsError("names no pair of parameters", where=",".join(pair), hint="such as K,D")
     from hydroid.posterior import sweep as sweeps
     from hydroid.problem.problem import Problem
-    from hydroid.report.objectives import surface_page
+    from hydroid.report.analysis_report import analysis_page
 
     model = open_model(model)
     problem = Problem(model.settings, read_logs(logs, model.settings))
     results = [sweeps.surface(problem, model.theta, pair, *grid, progress) for pair in over]
-    return Study(results, surface_page(results, model.settings.objective)).write(out)
+    return Study(results, analysis_page(problem, model.theta, surfaces=results)).write(out)

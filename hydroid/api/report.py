@@ -6,7 +6,7 @@ from pathlib import Path
 from hydroid.errors import RunError
 
 
-def report(folders: Sequence[str | Path], out: str | Path = "runs/report") -> Path:
+def report(folders: Sequence[str | Path], out: str | Path = "runs/report", *, figures: bool = False) -> Path:
     """Draw the report of a folder anew, in its place; or several folders' reports side by side on one page.
 
         hydroid.report(["runs/hyd"])
@@ -17,6 +17,7 @@ def report(folders: Sequence[str | Path], out: str | Path = "runs/report") -> Pa
     Args:
         folders: of runs and studies; or their HTML files.
         out: folder for the page of several.
+        figures: write every chart of the page as PNG and SVG, too, to the folder figures/ beside it.
 
     Returns:
         The page.
@@ -26,16 +27,18 @@ def report(folders: Sequence[str | Path], out: str | Path = "runs/report") -> Pa
     """
     from hydroid.files import write_atomic
     from hydroid.report.comparison import comparison, names_of
-    from hydroid.report.page_file import content_html, read_page
+    from hydroid.report.page_file import content_html, read_page, write_figures
 
     files = [_page(Path(folder)) for folder in folders]
     contents = [read_page(file) for file in files]
-    if len(files) == 1:
-        write_atomic(files[0], content_html(contents[0]))
-        return files[0]
-    file = Path(out) / "comparison.html"
-    write_atomic(file, content_html(comparison(dict(zip(names_of(files), contents, strict=True)))))
-    return file
+    page, content = files[0], contents[0]
+    if len(files) > 1:
+        page = Path(out) / "comparison.html"
+        content = comparison(dict(zip(names_of(files), contents, strict=True)))
+    write_atomic(page, content_html(content))
+    if figures:
+        write_figures(content, page.parent / "figures")
+    return page
 
 
 def _page(folder: Path) -> Path:

@@ -15,6 +15,9 @@ def report(
     ],
     output: Output,
     out: Folder = Path("runs/report"),
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Also write every chart as PNG and SVG, to figures/.")
+    ] = False,
 ) -> None:
     """Draw the report of a finished run or study anew, or several side by side on one page.
 
@@ -23,5 +26,5 @@ def report(
     """
     from hydroid.api.report import report
 
-    page = report(folders, out)
+    page = report(folders, out, figures=figures)
     show(output, lambda: {"out": str(page)}, [str(page)])

@@ -5,7 +5,7 @@ own shade of them.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from hydroid.parameters import Array
 
-Color = Literal["ink", "grey", "pale", "blue", "orange", "green", "pink", "yellow", "sky"]
+Color = str
+"""ink, grey, pale or one of SERIES"""
 SERIES: tuple[Color, ...] = ("orange", "blue", "green", "pink", "yellow", "sky")
 """colours of several models, the first of the most important"""
 _NONE = np.empty(0)
@@ -61,7 +62,7 @@ class Mark:
             return self
         last = len(self.y) - 1
         keep = [np.array([0, last])]
-        for values in (self.y, -(self.end if len(self.end) else self.y)):
+        for values in (self.y, -self.y, *((self.end, -self.end) if len(self.end) else ())):
             parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
             lowest = np.argmin(np.where(np.isfinite(parts), parts, np.inf), axis=1)
             keep.append(lowest + size * np.arange(len(parts)))
@@ -113,11 +114,20 @@ class Chart:
     linked: bool = False
     bins: int = 1000
 
+    @classmethod
+    def of(cls, plain: Mapping[str, Any]) -> "Chart":
+        """Return the chart that `plain` gave."""
+        panels = [
+            Panel(**panel | {"marks": tuple(Mark(**_arrays(mark)) for mark in panel["marks"])})
+            for panel in plain["panels"]
+        ]
+        return cls(**{key: plain[key] for key in ("columns", "linked", "bins")}, panels=tuple(panels))
+
     @property
     def apart(self) -> bool:
-        """Whether each panel needs a legend of its own, because their labels differ."""
+        """Whether each panel needs a legend of its own, because two have different labels."""
         labels = [{m.label for m in p.marks if m.label} for p in self.panels]
-        return not self.linked and any(a and b and a != b for a in labels for b in labels)
+        return not self.linked and any(a - b and b - a for a in labels for b in labels)
 
     def plain(self) -> dict[str, Any]:
         """Return the chart as JSON has it."""
@@ -143,6 +153,10 @@ def value_axis(values: Array) -> tuple[tuple[float, float] | None, bool]:
         return None, bool(known.size)
     top = 1.05 * float(known.max()) if known.max() > 0 else 1.0
     return (min(0.0, 1.05 * float(known.min())), top), False
+
+
+def _arrays(mark: Mapping[str, Any]) -> dict[str, Any]:
+    return {**mark, **{name: np.array(mark[name], dtype=float) for name in ("x", "y", "end")}}
 
 
 def _plain(one: Any, bins: int) -> Any:

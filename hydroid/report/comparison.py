@@ -36,11 +36,11 @@ def comparison(contents: Mapping[str, Content]) -> dict[str, Any]:
         "name": "comparison",
         "title": f"{len(contents)} reports side by side",
         "lead": best,
-        "verdict": {"prediction": best, "parameters": "", "lights": [], "picture": _picture(contents)},
+        "verdict": {"prediction": best, "parameters": "", "lights": []},
         "warnings": [],
         "sections": sections,
         "charts": charts,
-        "images": {},
+        "moving": [],
         "versions": next(iter(contents.values()))["versions"],
         "numbers": {"kind": "comparison"},
     }
@@ -123,11 +123,6 @@ def _best(contents: Mapping[str, Content]) -> str:
             f"{name} reproduces its own logs best, with an error of {value:.2g}° rms. No log here is unseen."
         )
     return "; ".join(f"{name}: {content['title']}" for name, content in contents.items())
-
-
-def _picture(contents: Mapping[str, Content]) -> str:
-    pictures = (content["verdict"]["picture"] for content in contents.values() if content["verdict"])
-    return next(filter(None, pictures), "")
 
 
 def _parameters(contents: Mapping[str, Content]) -> list[dict[str, Any]]:

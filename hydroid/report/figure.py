@@ -1,6 +1,6 @@
 """A chart as a file: drawn with matplotlib, the same bytes every time.
 
-Nothing else draws with matplotlib but the panel of a film, whose style this is.
+The panel of a film is such a chart too.
 """
 
 import io
@@ -83,8 +83,8 @@ def figure(chart: Chart, title: str = "") -> Figure:
     width = WIDTH if chart.columns == 1 else COLUMN * chart.columns
     drawing = Figure((width, sum(heights) + 0.6 * rows + 0.5), layout="constrained")
     drawing.suptitle(title, x=0.02, ha="left", fontsize=11, fontweight="bold")
-    shared = {"sharex": "col" if chart.linked else False, "height_ratios": heights, "squeeze": False}
-    axes = drawing.subplots(rows, chart.columns, **shared).ravel()
+    shared = "col" if chart.linked else "none"
+    axes = drawing.subplots(rows, chart.columns, squeeze=False, sharex=shared, height_ratios=heights).ravel()
     for one, panel in zip_longest(axes, chart.panels):
         if panel is None:
             one.set_axis_off()
@@ -112,7 +112,11 @@ def _panel(axes: Axes, panel: Panel, bins: int) -> None:
             axis.set_major_formatter(FuncFormatter(lambda value, _: plain(float(f"{value:.4g}"))))
     if panel.names:
         axes.set_yticks(range(len(panel.names)), panel.names)
-    axes.set(xlim=panel.x_limits, ylim=(len(panel.names) - 0.4, -0.6) if panel.names else panel.y_limits)
+        axes.set_ylim(len(panel.names) - 0.4, -0.6)
+    if panel.x_limits:
+        axes.set_xlim(*panel.x_limits)
+    if panel.y_limits:
+        axes.set_ylim(*panel.y_limits)
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
 
@@ -144,7 +148,8 @@ def _draw(axes: Axes, mark: Mark) -> None:
             _each(axes.fill, [tuple(part[~np.isnan(part[:, 0])].T) for part in parts], look)
         case "text":
             for text, *at in zip(mark.texts, x, y, strict=True):
-                axes.annotate(text, at, (4, 4), textcoords="offset points", fontsize=8, color=look["color"])
+                drawn = axes.annotate(text, at, (3, 3), textcoords="offset points", rotation=30, fontsize=7)
+                drawn.set_in_layout(False)
 
 
 def _each(draw: Any, places: Sequence[tuple[Any, ...]], look: dict[str, Any]) -> None:

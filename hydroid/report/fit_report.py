@@ -18,14 +18,12 @@ from hydroid.fitting.search import HISTORY
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
-from hydroid.report.estimates import estimates as draw_estimates
 from hydroid.report.fit_tables import objective_table, parameter_table
-from hydroid.report.motion_report import motion_section
-from hydroid.report.moving_arm import Movement
+from hydroid.report.moving_arm import Movement, motion_section
 from hydroid.report.names import plain_name
 from hydroid.report.next_steps import fit_steps
 from hydroid.report.objectives import learning, pareto
-from hydroid.report.page import FILE, PAGE, Page, Plot, Section, Step, Tab, log_names
+from hydroid.report.page import Page, Plot, Section, Step, Tab, log_names
 from hydroid.report.parameter_bars import fit_bars
 from hydroid.report.phrases import (
     ALGORITHMS,
@@ -49,7 +47,7 @@ FITTED = "Prediction of the fitted logs"
 """title of a section"""
 _FILES = (
     "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
-    "figures/, responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
+    "responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
 )
 _SAME = {
     "mech": "with the same versions. This config.yaml holds all settings, and the seed.",
@@ -62,7 +60,6 @@ _CITATION = (
     "CITATION.cff."
 )
 _MOST_DIRECTIONS = 6
-_ESTIMATES = "Every estimate within its bounds; grey where the parameter is fixed or has no effect."
 _LEARNING = "Best candidate so far, and the median of each population."
 _PARETO = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
 _SINGLE = (
@@ -143,14 +140,12 @@ def _known(problem: Problem, fit: Fit) -> tuple[Section, ...]:
         "the interval of its prior. Blue dots: other estimates of the search. The intervals are only right "
         "if the model is right."
     )
-    drawn = Plot("estimates", _ESTIMATES, partial(draw_estimates, problem, fit), where=FILE)
     return (
         quantity_section(problem, fit.quantities),
         Section(
             "Parameters",
             " ".join(filter(None, (rank_phrase(fit.identifiability), _given_supply(problem), words))),
             bars=fit_bars(problem, fit),
-            plots=(drawn,),
             more={"parameters": parameter_table(problem, fit)},
         ),
     )
@@ -205,9 +200,7 @@ def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:
             continue  # no force-stroke curve runs through its two points: it diverged
         records = partial(_records, problem, joint)
         known = KnownActuator(fit.quantities.precision, records)
-        plot = replace(
-            actuator_plot(replace(actuator, known=known)), name=f"actuator_joint_{joint}", where=PAGE
-        )
+        plot = replace(actuator_plot(replace(actuator, known=known)), name=f"actuator_joint_{joint}")
         tabs.append(Tab(actuator.title, (plot,)))
     text = "What its parameters mean in steady state, from the command to the torque at the joint."
     return (Section("The actuator", text, tabs=tuple(tabs)),) if tabs else ()
@@ -237,15 +230,14 @@ def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None, run: str)
         Section(
             "How the search went",
             facts=_effort(problem, fit),
-            plots=(Plot("learning", _LEARNING, partial(learning, fit, objective), where=PAGE),),
+            plots=(Plot("learning", _LEARNING, partial(learning, fit, objective)),),
         ),
         Section("Pareto set", text, plots=(Plot("pareto", _PARETO, partial(pareto, fit, objective)),)),
     )
     folded = tuple(replace(section, folded=True) for section in hidden if section is not None)
     if residual is None:
         return folded
-    tabs = tuple(replace(t, plots=tuple(replace(p, where=PAGE) for p in t.plots)) for t in residual.tabs)
-    return (replace(residual, tabs=tabs), *folded)
+    return (residual, *folded)
 
 
 def _facts(identity: Mapping[str, Any], problem: Problem, run: str) -> tuple[tuple[str, str], ...]:

@@ -151,7 +151,7 @@ def side_view() -> Array:
 def _fitted(
     outlines: Sequence[tuple[int, Array]], seen: Mapping[str, Array]
 ) -> tuple[tuple[int, int], dict[str, tuple[Array, ...]]]:
-    """Return the picture's size, and poses (F, parts, 2, 4) in its units: the arm is inside at all moments."""
+    """Return the picture's size, and poses (F, parts, 2, 4) in its units, with the arm always inside."""
     places = np.concatenate(
         [
             (pose[:, part, :, :3] @ corners.T + pose[:, part, :, 3:]).swapaxes(1, 2).reshape(-1, 2)

@@ -37,7 +37,7 @@ def shapes(model: mujoco.MjModel) -> list[Shape]:
 
 
 def poses(model: mujoco.MjModel, names: Sequence[str], angles: Array) -> Array:
-    """Return turn and place [m] of all bodies for angles of named joints [rad], (F, J) -> (F, nbody, 3, 4)."""
+    """Return turn and place [m] of all bodies at angles of joints [rad], (F, J) -> (F, nbody, 3, 4)."""
     data, address = mujoco.MjData(model), [int(model.joint(name).qposadr[0]) for name in names]
     found = np.empty((len(angles), model.nbody, 3, 4))
     for pose, angle in zip(found, angles, strict=True):

@@ -1,6 +1,6 @@
-"""A report as files: one page that loads nothing, tables, and data for scripts; and its charts as figures.
+"""A report as files: one page that loads nothing, tables, and data; and its charts as figures.
 
-The page is one HTML file: it carries its charts as data, compressed, with the script of Bokeh that draws them.
+The page is one HTML file: it carries its charts as data, with the script of Bokeh that draws them.
 `read_page` takes the content out of such a file again, so that it can be drawn anew, compared, or written as
 figures.
 """
@@ -9,7 +9,7 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import cache
 from importlib.resources import files
@@ -22,7 +22,6 @@ from markupsafe import Markup
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
 from hydroid.report.chart import Chart
-from hydroid.report.moving_arm import MovingArm
 from hydroid.report.page import Page, Plot, Section
 from hydroid.report.table import Table, shown
 
@@ -39,10 +38,11 @@ def write_page(page: Page, out: Path) -> list[Path]:
     Raises:
         RunError: the folder cannot be written.
     """
-    content = {f"{page.name}.html": content_html(page_content(page)), **page.data}
+    content: dict[str, str] = {}
     for name, table in page.tables.items():
         written = {"csv": table.csv(), "md": table.markdown(), "tex": table.latex()}
         content |= {f"tables/{name}.{ending}": text for ending, text in written.items()}
+    content |= {**page.data, f"{page.name}.html": content_html(page_content(page))}
     for name, text in content.items():
         write_atomic(out / name, text)
     return [out / name for name in content]
@@ -74,13 +74,13 @@ def _plots(content: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def page_content(page: Page) -> dict[str, Any]:
     """Return all that a page shows as mappings, lists, text and numbers."""
-    kinds: dict[str, list[Any]] = {"chart": [], "moving": [], "image": []}
+    charts, moving = list[Any](), list[Any]()
 
     def plot(one: Plot) -> dict[str, Any]:
         drawing = one.draw()
-        kind = {Chart: "chart", MovingArm: "moving"}.get(type(drawing), "image")
-        kinds[kind].append(_image(drawing) if kind == "image" else drawing.plain())
-        return {"name": one.name, "caption": one.caption, "zoom": one.zoom, kind: len(kinds[kind]) - 1}
+        kind, drawn = ("chart", charts) if isinstance(drawing, Chart) else ("moving", moving)
+        drawn.append(drawing.plain())
+        return {"name": one.name, "caption": one.caption, "zoom": one.zoom, kind: len(drawn) - 1}
 
     def section(one: Section) -> dict[str, Any]:
         return {
@@ -107,9 +107,57 @@ def page_content(page: Page) -> dict[str, Any]:
         "verdict": None if page.verdict is None else asdict(page.verdict),
         "warnings": list(page.warnings),
         "sections": sections,
-        "charts": kinds["chart"],
-        "moving": kinds["moving"],
-        "images": kinds["image"],
+        "charts": charts,
+        "moving": moving,
         "versions": dict(page.versions),
         "numbers": dict(page.numbers),
     }
+
+
+def _table(table: Table) -> dict[str, Any]:
+    rows = [[shown(cell) for cell in row] for row in table.rows]
+    parts = {"title": table.title, "header": list(table.header), "note": table.note}
+    return parts | {"numeric": list(table.numeric), "rows": rows}
+
+
+def content_html(content: Mapping[str, Any]) -> str:
+    """Return the page of a content as HTML."""
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    own = files("hydroid.report")
+    given = {name.replace(".", "_"): Markup(own.joinpath(name).read_text(encoding="utf-8")) for name in _OWN}
+    template = environment.from_string(own.joinpath(_TEMPLATE).read_text(encoding="utf-8"))
+    packed = _packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")))
+    return template.render(
+        page=content, content=packed, library=_library() if content["charts"] else "", **given
+    )
+
+
+@cache
+def _library() -> str:
+    """Bokeh's scripts, from the installed package."""
+    folder = files("bokeh").joinpath("server", "static", "js")
+    return _packed(";\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in _SCRIPTS))
+
+
+def _packed(text: str) -> str:
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
+
+
+def read_page(file: Path) -> dict[str, Any]:
+    """Return the content of a page that `write_page` has written.
+
+    Raises:
+        RunError: the file is no such page, or is of another version.
+    """
+    try:
+        found = _CONTENT.search(file.read_bytes())
+        content = json.loads(gzip.decompress(base64.b64decode(found[1]))) if found else {}
+    except (OSError, ValueError, EOFError) as error:
+        raise RunError(f"cannot be read ({error})", where=str(file)) from None
+    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
+        raise RunError(
+            "is no report of this version of hydroid", where=str(file), hint="run the command again"
+        )
+    return content

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,9 +9,8 @@ import numpy as np
 from hydroid.advice.residuals import Binned, Regressor, ResidualCheck
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.report import style
 from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.page import FILE, PAGE, Plot, Tab, log_names
+from hydroid.report.page import Plot, Tab, log_names
 
 UNITS = {Regressor.ANGLE: "deg", Regressor.VELOCITY: "deg/s", Regressor.COMMAND: "%"}
 _MOST = 8
@@ -29,13 +27,12 @@ _CAPTION = (
 def residual_tabs(
     problem: Problem, checks: Sequence[ResidualCheck], notes: Callable[[ResidualCheck], str]
 ) -> tuple[Tab, ...]:
-    """Return a tab for each of the angles with the largest errors; that of the largest is also a file."""
+    """Return a tab for each of the angles with the largest errors."""
     names = log_names(problem.logs)
     tabs: list[Tab] = []
     for i, check in enumerate(sorted(checks, key=lambda check: -check.rms)[:_MOST]):
         draw = partial(residual_panels, problem, check)
-        plot = Plot(f"residual_checks_{i + 1}" if i else "residual_checks", _CAPTION, draw, where=PAGE)
-        plot = plot if i else replace(plot, where=PAGE | FILE)
+        plot = Plot(f"residual_checks_{i + 1}" if i else "residual_checks", _CAPTION, draw)
         tabs.append(Tab(f"joint {check.joint}, {names[check.log]}", (plot,), notes(check)))
     return tuple(tabs)
 
@@ -44,13 +41,11 @@ def residual_panels(problem: Problem, check: ResidualCheck) -> Chart:
     """Draw a residual over time, angle, velocity and command, and its autocorrelation."""
     regressed = (_over(what, check.binned[what]) for what in Regressor if what in check.binned)
     period = problem.logs[check.log].period
-    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3)
+    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3, bins=_BINS)
 
 
 def _over_time(check: ResidualCheck) -> Panel:
-    line = Mark(
-        "line", *style.decimated(check.time, np.degrees(check.residual), _BINS), color="orange", width=1.2
-    )
+    line = Mark("line", check.time, np.degrees(check.residual), color="orange", width=1.2)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], check.at_stop, [False]]).astype(int)))
     starts, ends = edges[::2], np.minimum(edges[1::2], len(check.time) - 1)
     stops = Mark(

@@ -10,15 +10,12 @@ from hydroid.fitting.fit import Fit
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.report import style
-from hydroid.report.chart import SERIES, Chart, Mark, Panel
-from hydroid.report.page import FILE, PAGE, Plot, Tab, log_names
+from hydroid.report.chart import SERIES, Chart, Mark, Panel, finite
+from hydroid.report.page import Plot, Tab, log_names
 from hydroid.report.phrases import estimate_label
 from hydroid.report.table import numbers_csv
 from hydroid.words import number
 
-MOST_FILES = 12
-"""responses that are also written as figures, those with the largest errors"""
 _CAPTION = (
     "Measured and simulated angle; measured minus simulated angle with the 95 % prediction band; command. "
     "Drag to zoom into a stretch of time. The full series are in responses/ as CSV."
@@ -113,14 +110,11 @@ def response_tabs(
     responses: Mapping[str, JointResponse], notes: Mapping[str, str] | None = None
 ) -> tuple[Tab, ...]:
     """Return one tab per log with the plots of its joints, by file name; `notes` are of logs by name."""
-    worst = np.argsort([max(each.mean_squares(), default=0.0) for each in responses.values()])[::-1]
-    files = {list(responses)[i] for i in worst[:MOST_FILES]}
     bins = min(_MOST, max(_FEWEST, _POINTS // max(len(responses), 1)))
     logs: dict[str, list[Plot]] = {}
     for name, one in responses.items():
-        where = PAGE | FILE if name in files else PAGE
         logs.setdefault(one.log, []).append(
-            Plot(name, f"Joint {one.joint} in {one.log}. {_CAPTION}", partial(draw, one, bins), True, where)
+            Plot(name, f"Joint {one.joint} in {one.log}. {_CAPTION}", partial(draw, one, bins), True)
         )
     return tuple(Tab(log, tuple(plots), (notes or {}).get(log, "")) for log, plots in logs.items())
 
@@ -133,56 +127,39 @@ def response_data(responses: Mapping[str, JointResponse]) -> dict[str, str]:
 def draw(response: JointResponse, bins: int = _MOST) -> Chart:
     """Draw the measured angle of one joint, every model's response and residual, command and pressures."""
     time, measured = response.time, np.degrees(response.measured)
-    upper = [_curve(time, measured, bins, color="ink", label="measured", width=5, alpha=0.35)]
+    upper = [Mark("line", time, measured, color="ink", label="measured", width=5, alpha=0.35)]
     middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
     reach = _RUNAWAY * max(float(np.ptp(measured)), _LEAST_RANGE)
     low, high = float(measured.min()) - reach, float(measured.max()) + reach
     for color, (name, angle) in zip(
         SERIES * (1 + len(response.simulated)), response.simulated.items(), strict=False
     ):
-        simulated = np.degrees(style.finite(angle))
+        simulated = np.degrees(finite(angle))
         residual = measured - simulated
         rms = float(np.sqrt(np.mean(residual**2)))
         off = name in response.off
         label = f"{name} ({number(rms)} deg rms)" if np.isfinite(rms) else f"{name} (diverged)"
-        look = {"color": color, "label": label, "off": off, "width": 1.6}
         # a response that runs away must not flatten the others
-        upper.append(
-            _curve(time, np.where((simulated > low) & (simulated < high), simulated, np.nan), bins, **look)
-        )
-        middle.append(
-            _curve(time, np.where(np.abs(residual) < reach, residual, np.nan), bins, **look | {"width": 1})
-        )
+        near = np.where((simulated > low) & (simulated < high), simulated, np.nan)
+        error = np.where(np.abs(residual) < reach, residual, np.nan)
+        upper.append(Mark("line", time, near, color=color, label=label, off=off))
+        middle.append(Mark("line", time, error, color=color, label=label, off=off, width=1))
         if name in response.bands:
             # a band that the parameters leave open must not flatten the residual either
             widest = _WIDEST * float(np.nanmax(np.abs(residual), initial=_LEAST_RESIDUAL))
-            half = np.degrees(np.fmin(response.bands[name], np.radians(widest)))
-            at, edge = style.decimated(time, half, bins)
-            band = Mark(
-                "band", at, -edge, edge, color=color, label=f"95 % band of {name}", alpha=0.18, off=off
-            )
-            middle.insert(0, band)
+            half = np.fmin(np.degrees(response.bands[name]), widest)
+            label = f"95 % band of {name}"
+            middle.insert(0, Mark("band", time, -half, half, color=color, label=label, alpha=0.18, off=off))
     panels = [
         Panel("", "angle [deg]", tuple(upper), f"Joint {response.joint} in {response.log}", 280),
         Panel("", "residual [deg]", tuple(middle), height=190),
     ]
     if response.pressures is not None:
-        bars = 1e-5 * response.pressures
-        chambers = zip(("chamber A", "chamber B"), ("green", "pink"), bars.T, strict=True)
-        marks = tuple(_curve(time, p, bins, color=color, label=name) for name, color, p in chambers)
-        panels.append(Panel("", "pressure [bar]", marks, height=150))
-    at, command = style.decimated(time, response.command, bins)
-    panels.append(
-        Panel(
-            "time [s]",
-            "command [%]",
-            (Mark("step", at, command, color="grey"),),
-            height=140,
-            y_limits=(-108, 108),
+        chambers = zip(
+            ("chamber A", "chamber B"), ("green", "pink"), 1e-5 * response.pressures.T, strict=True
         )
-    )
-    return Chart(tuple(panels), linked=True)
-
-
-def _curve(time: Array, values: Array, bins: int, **look: object) -> Mark:
-    return Mark("line", *style.decimated(time, values, bins), **look)  # pyright: ignore[reportArgumentType]
+        marks = tuple(Mark("line", time, p, color=color, label=name) for name, color, p in chambers)
+        panels.append(Panel("", "pressure [bar]", marks, height=150))
+    command = Mark("step", time, response.command, color="grey")
+    panels.append(Panel("time [s]", "command [%]", (command,), height=140, y_limits=(-108, 108)))
+    return Chart(tuple(panels), linked=True, bins=bins)

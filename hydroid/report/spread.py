@@ -1,15 +1,13 @@
 """Several runs with different seeds, of one command or collected from folders: their spread as a page."""
 
 from collections.abc import Collection, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array, ParameterSet
-from hydroid.report import estimates as plots
-from hydroid.report.page import FILE, Light, Page, Plot, Section, Verdict
+from hydroid.report.page import Light, Page, Section, Verdict
 from hydroid.report.parameter_bars import spread_bars
 from hydroid.report.phrases import runs_phrase
 from hydroid.report.table import Cell, Table
@@ -45,7 +43,6 @@ def spread_page(settings: FitSettings, runs: Sequence[RunResult]) -> Page:
         name: (np.array([run.theta for run in each]), np.array([run.rms for run in each]))
         for name, each in estimates.items()
     }
-    draw = partial(plots.spread, parameters, columns, idle)
     best = min(runs, key=lambda run: (run.best.rms, run.seed))
     note = f" {listed(idle)} had no effect in any run." if idle else ""
     lead = f"The smallest output error is {best.rms_deg:.4g} deg rms, of seed {best.seed}.{note}"
@@ -59,7 +56,6 @@ def spread_page(settings: FitSettings, runs: Sequence[RunResult]) -> Page:
                 "Where the estimates lie",
                 "Bar: from the lower to the upper bound. Orange line: the median. Blue dots: the runs.",
                 bars=bars,
-                plots=(Plot("runs", "One dot per run, a line at the median.", draw, where=FILE),),
                 more=tables,
             ),
             Section("Run by run", tables={"runs": runs_table(parameters, runs)}),

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hydroid.fitting.findings import log_findings
@@ -16,10 +15,9 @@ from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.intervals import THRESHOLD, Profile
 from hydroid.problem.problem import Problem
-from hydroid.report import style
 from hydroid.report.by_log_report import by_log_table
 from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.page import FILE, PAGE, Page, Plot, Section, Verdict, log_names
+from hydroid.report.page import Page, Plot, Section, Verdict, log_names
 from hydroid.report.parameter_bars import parameter_bar
 from hydroid.report.phrases import direction_phrases, profile_warnings, rank_phrase, status_phrase
 from hydroid.report.table import Cell, Table, unless_nan
@@ -30,19 +28,10 @@ _SHOWN = 0.1
 """parts of a direction below this are left out of its row"""
 _FEW_REFITS = 40
 """refits below which a 2.5 % quantile lies between the two lowest"""
-_CELL = 0.36  # [in]
 _CORRELATED, _MOST_PAIRS = 0.5, 20
-_MOST_NUMBERS = 14
-"""parameters up to which the cells of a map carry their numbers"""
-_LEAST_DRAWN = 1e-6
-"""singular values below this part of the largest are drawn at the foot"""
 _PROFILE_MARGIN = 0.3
 """part of a profile's interval that is drawn beyond each end"""
 _CAPTIONS = {
-    "singular_values": "The inverse of the relative standard deviation of each direction, with the noise "
-    "taken from the residuals. Below the dashed line the standard deviation is above "
-    f"{100 * WEAK_ABOVE:.0f} %. A mark at the bottom: a change along this direction does not change the "
-    "simulated response.",
     "correlation": "Near ±1 only a combination of the two parameters is known. Parameters that are not "
     "identifiable are left out.",
     "profiles": "The error, in units of the noise, with one parameter held and the others fitted again. "
@@ -109,21 +98,15 @@ def determined_sections(
     problem: Problem, uncertainty: Uncertainty, result: Identifiability
 ) -> tuple[Section, ...]:
     """Return the folded sections on directions, correlation (if there is any) and noise."""
-    values = Plot(
-        "singular_values", _CAPTIONS["singular_values"], partial(singular_values, result), where=PAGE
-    )
-    drawn = partial(correlation, uncertainty, result.names)
     directions = Section(
         "Directions: which combinations are determined",
         tables={"directions": direction_table(result)},
-        plots=(values,),
         folded=True,
     )
     sections = [directions]
     if np.sum(_correlated(uncertainty)) > 1:
-        plot = Plot("correlation", _CAPTIONS["correlation"], drawn, where=FILE)
         pairs = {"correlation": correlation_table(uncertainty, result.names)}
-        sections.append(Section("Correlation of the estimates", tables=pairs, plots=(plot,), folded=True))
+        sections.append(Section("Correlation of the estimates", tables=pairs, folded=True))
     if (logs := by_log(problem, uncertainty)) is not None:
         tables = {"by_log": by_log_table(problem, uncertainty, logs)}
         sections.append(Section("Parameters log by log", tables=tables, folded=True))
@@ -199,73 +182,6 @@ def noise_table(problem: Problem, uncertainty: Uncertainty) -> Table:
         "determine the noise level equally well."
     )
     return Table("Noise", ("log", "joint", "signal", *found), tuple(rows), note, ("rms residual", "source"))
-
-
-def singular_values(result: Identifiability) -> Chart:
-    """Draw how well each combination is determined, and which are not determined to WEAK_ABOVE."""
-    values, limit = result.singular, 1 / WEAK_ABOVE
-    top = max(float(values.max(initial=0.0)), limit)
-    foot = top * _LEAST_DRAWN
-    at, height = np.arange(1.0, len(values) + 1), np.maximum(values, foot)
-    well = values >= limit
-    marks: list[Mark] = []
-    for chosen, color, label in ((well, "blue", "determined"), (~well, "orange", "not determined to 30 %")):
-        stems = np.stack([at[chosen], at[chosen], np.full(chosen.sum(), np.nan)], axis=1).ravel()
-        heights = np.stack(
-            [np.full(chosen.sum(), foot / 3), height[chosen], np.full(chosen.sum(), np.nan)], axis=1
-        )
-        marks.append(Mark("line", stems, heights.ravel(), color=color, width=1, alpha=0.6))
-        marks.append(Mark("points", at[chosen], height[chosen], color=color, label=label, width=8))
-    marks.append(
-        Mark(
-            "rule",
-            y=np.array([limit]),
-            color="grey",
-            label=f"limit of {100 * WEAK_ABOVE:.0f} %",
-            width=1,
-            look="dashed",
-        )
-    )
-    title = "How well the logs determine each combination"
-    across, up = "direction, best determined first", "1 / relative standard deviation"
-    limits = (0.5, len(values) + 0.5), (foot / 3, 3 * top)
-    return Chart(
-        (
-            Panel(
-                across,
-                up,
-                tuple(m for m in marks if m.kind == "rule" or len(m.x)),
-                title,
-                260,
-                *limits,
-                log_y=True,
-            ),
-        )
-    )
-
-
-def correlation(uncertainty: Uncertainty, names: Sequence[str]) -> Figure:
-    """Draw the correlation of the estimates that are identifiable, with numbers where there is room."""
-    shown = _correlated(uncertainty)
-    names = [name for name, each in zip(names, shown, strict=True) if each]
-    values = uncertainty.correlation[np.ix_(shown, shown)]
-    room = style.room_for(names)
-    drawing = style.figure(1.5 + _CELL * len(names), left=room, right=0.1, bottom=0.2 + 0.7 * room)
-    axes = drawing.subplots()
-    image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
-    axes.set_yticks(range(len(names)), names)
-    axes.set_xticks(range(len(names)), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.tick_params(length=0)
-    axes.grid(False)
-    axes.spines[["left", "bottom"]].set_visible(False)
-    if len(names) <= _MOST_NUMBERS:
-        for (i, j), value in np.ndenumerate(values):
-            color = "white" if abs(value) > 0.6 else style.MEASURED
-            text = f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
-            axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
-    drawing.colorbar(image, ax=axes, shrink=0.8, pad=0.02)
-    axes.set_title("Correlation of the estimates")
-    return drawing
 
 
 def correlation_table(uncertainty: Uncertainty, names: Sequence[str]) -> Table:

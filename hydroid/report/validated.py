@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from hydroid.report.fit_report import FITTED
-from hydroid.report.motion_report import MOTION
+from hydroid.report.moving_arm import MOTION
 from hydroid.report.next_steps import PREDICT_UNSEEN
 from hydroid.report.page import Light
 from hydroid.report.validation_report import FROM_FIT, PREDICTION

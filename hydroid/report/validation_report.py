@@ -15,8 +15,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.band import Band
 from hydroid.report.fit_tables import INDICES, INDICES_NOTE, index_cells
-from hydroid.report.motion_report import motion_section
-from hydroid.report.moving_arm import Movement
+from hydroid.report.moving_arm import Movement, motion_section
 from hydroid.report.page import Light, Page, Section, Verdict, file_name, log_names, short_name, unique
 from hydroid.report.responses import JointResponse, logged_pressures, response_data, response_tabs
 from hydroid.report.table import Cell, Table

@@ -1,4 +1,4 @@
-"""The verdict strip of a fit's page: a picture, two sentences, and the lights."""
+"""The verdict strip of a fit's page: two sentences, and the lights."""
 
 import math
 
@@ -8,7 +8,6 @@ from hydroid.fitting.fit import Fit
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.flags import WEAK_ABOVE, Flag
 from hydroid.problem.problem import Problem
-from hydroid.report.arm_picture import arm_picture
 from hydroid.report.page import Light, Verdict
 from hydroid.report.phrases import at_limits, at_zero
 from hydroid.report.quantities_report import known_quantities
@@ -34,10 +33,8 @@ def fit_verdict(problem: Problem, fit: Fit) -> Verdict:
         parameters += (
             f" {determined} {follow} from all of them together {has} a 95 % interval within ±{percent}."
         )
-    pose = problem.logs[0].start
     lights = (_converged(fit), _validated(), *uncertainty_lights(problem, fit.uncertainty))
-    picture = arm_picture(problem.settings.arm, pose, problem.settings.outputs)
-    return Verdict(prediction, parameters, lights, picture)
+    return Verdict(prediction, parameters, lights)
 
 
 def known_count(fit: Fit) -> tuple[int, int]:

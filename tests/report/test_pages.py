@@ -10,17 +10,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from report_fits import MODEL, make_fit, make_problem
 
 from hydroid.errors import RunError
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import error_indices
 from hydroid.report.fit_report import fit_page
-from hydroid.report.page import Page, Plot, Section
-from hydroid.report.page_file import read_page, write_page
-from hydroid.report.responses import MOST_FILES
+from hydroid.report.page import Page, Section
+from hydroid.report.page_file import read_page, write_figures, write_page
 from hydroid.report.spread import run_result, spread_page
+from hydroid.report.table import Table
 from hydroid.report.validation_report import Validation, validation_page
 
 HOSTILE = "<b>&_%$.csv"
@@ -68,10 +67,8 @@ def test_a_fits_report_has_all_its_files_and_no_others(written):
         for t in ("parameters", "errors", "quantities", "directions", "noise", "correlation")
         for e in ("csv", "md", "tex")
     }
-    names = ("response", "pareto", "estimates", "correlation", "speed")
-    figures = {f"figures/{f}.{e}" for f in names for e in ("png", "svg")}
     rest = {"history.csv", "pareto.csv", "tables/curves.csv", "responses/response.csv", "report.html"}
-    assert set(files(path)) == tables | figures | rest
+    assert set(files(path)) == tables | rest
     assert sorted(paths) == sorted(path / name for name in files(path))
 
 
@@ -164,16 +161,16 @@ def test_lights_name_what_is_not_known_and_what_lies_at_a_bound():
     assert lights["Away from bounds"].state == "good"
 
 
-def test_svg_figures_are_well_formed_and_undated(written):
-    figures = {name: content for name, content in files(written[0]).items() if name.endswith(".svg")}
-    assert len(figures) == 5
-    for content in figures.values():
-        ElementTree.fromstring(content)
-        assert b"dc:date" not in content
+def test_every_chart_becomes_a_figure_well_formed_and_undated(written, tmp_path: Path):
+    files = write_figures(read_page(written[0] / "report.html"), tmp_path)
+    assert {file.stem for file in files} == {"response", "speed", "learning", "pareto"}
+    for file in files[1::2]:
+        ElementTree.fromstring(file.read_bytes())
+        assert b"dc:date" not in file.read_bytes()
 
 
-def test_all_responses_are_shown_and_the_worst_are_files():
-    problem = make_problem(tuple(f"{i}.csv" for i in range(MOST_FILES)), outputs=(2, 4), samples=40)
+def test_all_responses_are_shown():
+    problem = make_problem(tuple(f"{i}.csv" for i in range(12)), outputs=(2, 4), samples=40)
     fit = make_fit(problem, names=("best",))
     good = fit.best.responses[3].copy()
     good[:, 0] = problem.logs[3].angle[:, 1]
@@ -183,19 +180,15 @@ def test_all_responses_are_shown_and_the_worst_are_files():
         IDENTITY, problem, replace(fit, estimates={"best": replace(fit.best, responses=responses)})
     )
     section = page.sections[1]
-    assert [tab.name for tab in section.tabs] == [f"{i}.csv" for i in range(MOST_FILES)]
+    assert [tab.name for tab in section.tabs] == [f"{i}.csv" for i in range(12)]
     plots = {plot.name: plot for plot in section.all_plots}
-    assert len(plots) == 2 * MOST_FILES
-    as_files = {name for name, plot in plots.items() if "file" in plot.where}
-    assert len(as_files) == MOST_FILES
-    assert {"response_6_joint_2", "response_6_joint_4"} <= as_files
-    assert "response_4_joint_2" not in as_files
-    assert len(page.tables["errors"].rows) == 2 * MOST_FILES + 1
+    assert len(plots) == 2 * 12
+    assert len(page.tables["errors"].rows) == 2 * 12 + 1
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):
-    (tmp_path / "figures").write_text("in the way")
-    page = Page("p", "t", "l", (Section("s", plots=(Plot("name", "caption", Figure),)),))
+    (tmp_path / "tables").write_text("in the way")
+    page = Page("p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),))
     with pytest.raises(RunError, match="cannot be written"):
         write_page(page, tmp_path)
 
@@ -211,9 +204,7 @@ def test_runs_have_their_spread_their_list_and_a_figure(tmp_path: Path):
     assert table.rows[list(MODEL).index("M1")][-1] == "no effect"
     order = np.argsort([fit.best.rms for fit in fits])
     assert [row[1] for row in page.tables["runs"].rows] == list(order)
-    assert {"tables/runs_search.csv", "tables/runs.tex", "figures/runs.png", "runs.html"} <= set(
-        files(tmp_path)
-    )
+    assert {"tables/runs_search.csv", "tables/runs.tex", "runs.html"} <= set(files(tmp_path))
 
 
 def test_validation_overlays_fits_that_saw_the_same_record():

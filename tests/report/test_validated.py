@@ -9,7 +9,7 @@ from report_fits import make_fit, make_problem
 from hydroid.fitting.validation import error_indices
 from hydroid.report.fit_report import fit_page
 from hydroid.report.next_steps import PREDICT_UNSEEN
-from hydroid.report.page_file import content_html, drawings, page_content
+from hydroid.report.page_file import content_html, page_content
 from hydroid.report.validated import with_validation
 from hydroid.report.validation_report import Validation, validation_page
 
@@ -19,7 +19,7 @@ PROBLEM = make_problem(("fitted.csv",), samples=200)
 @pytest.fixture(scope="module")
 def fit() -> dict[str, Any]:
     page = fit_page({}, PROBLEM, make_fit(PROBLEM, effects=(1e-3, 1e-3, 0.0, 1e-3)))
-    return page_content(page, drawings(page))
+    return page_content(page)
 
 
 def validated(names: dict[str, float], *, fitted: bool = False) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def validated(names: dict[str, float], *, fitted: bool = False) -> dict[str, Any
         arm = PROBLEM.settings.arm
         results.append(Validation("fit", log, response, indices, fitted=fitted, arm=arm))
     page = validation_page(results)
-    return page_content(page, drawings(page))
+    return page_content(page)
 
 
 def tabs(content: dict[str, Any], title: str) -> dict[str, Any]:

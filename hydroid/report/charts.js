@@ -119,10 +119,10 @@
     cells.replaceChildren();
     cells.style.setProperty("--columns", chart.columns);
     const columns = getComputedStyle(cells).gridTemplateColumns.split(" ").length;
-    const width = host.clientWidth / columns;
+    const each = host.clientWidth / columns;
     let shared = null;
     const panels = chart.panels.filter((panel) => panel.marks.length).map((panel) => {
-      const one = addPanel(panel, shared, shown, width);
+      const one = addPanel(panel, shared, shown, each);
       if (chart.linked) {
         if (!shared) {
           const all = chart.panels.map((p) => p.x_limits ?? extent(p, "x", shown));

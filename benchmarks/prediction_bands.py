@@ -14,6 +14,7 @@ import numpy as np
 from hydroid import load_settings
 from hydroid.estimate import FitSummary
 from hydroid.fitting.refinement import refine
+from hydroid.fitting.summary import noise_levels, parameter_estimates
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import prediction_bands
@@ -21,7 +22,6 @@ from hydroid.posterior.covariance import uncertainty
 from hydroid.posterior.delta import precision
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.run.summary import noise_levels, parameter_estimates
 from hydroid.settings.fit import FitSettings
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file, write_atomic
+from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
 from hydroid.settings.load import Settings, load
 
@@ -30,13 +31,17 @@ class ParameterEstimate(Settings):
     """the same from the differences between several logs; null where one log alone determines the value"""
     interval: tuple[float | None, float | None] = (None, None)
     """95 % interval"""
+    interval_by_log: tuple[float | None, float | None] = (None, None)
+    """the same from `sd_by_log`"""
     flag: str | None = None
-    """how well the logs determine it: a value of `uncertainty.flags.Flag`"""
+    """how well the logs determine it: a value of `posterior.flags.Flag`"""
     source: str | None = None
-    """from what it is known: a value of `uncertainty.flags.Source`; null: it is not known, or fixed"""
+    """from what it is known: a value of `posterior.flags.Source`; null: it is not known, or fixed"""
     data_share: float | None = None
     """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
     at_bound: Literal["lower", "upper"] | None = None
+    effect_deg: float | None = None
+    """rms change of the compared angles when the parameter changes by 1 % [deg]"""
 
 
 class NamedEstimate(Settings):
@@ -76,6 +81,14 @@ class QuantityEstimate(Settings):
     interval: tuple[float | None, float | None] = (None, None)
     """95 % interval"""
 
+    @property
+    def within(self) -> float:
+        """Half of the 95 % interval relative to the value; infinite where the interval has no limit."""
+        low, high = self.interval
+        if low is None or high is None or self.value == 0:
+            return math.inf
+        return abs((high - low) / (2 * self.value))
+
 
 class CurveEstimate(Settings):
     """A quantity against a command or an angle; `value` and `interval` are at the points of `at`."""
@@ -89,6 +102,14 @@ class CurveEstimate(Settings):
     value: tuple[float, ...]
     interval: tuple[tuple[float | None, float | None], ...]
     """95 % interval at each point by itself"""
+
+
+def _finding(value: Any) -> Any:
+    """Return a finding from a mapping: files have no tuples."""
+    try:
+        return Finding(**value | {"subjects": tuple(value["subjects"])}) if isinstance(value, dict) else value
+    except (KeyError, TypeError):
+        raise ValueError("is no finding") from None
 
 
 class FitSummary(Settings):
@@ -114,6 +135,8 @@ class FitSummary(Settings):
     """of the search"""
     diverged: int | None = None
     """simulations of the search that diverged"""
+    findings: tuple[Annotated[Finding, BeforeValidator(_finding)], ...] = ()
+    """what to know before using the estimate, the most important first; `hydroid.words` has the sentences"""
     strained_priors: dict[str, float] = Field(default_factory=dict[str, float])
     """priors that the final estimate is far from: the distance in standard deviations, by name"""
     estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
@@ -133,6 +156,11 @@ class FitSummary(Settings):
     def values(self) -> dict[str, float]:
         """The final estimate by name."""
         return {name: parameter.value for name, parameter in self.estimate.items()}
+
+    @property
+    def searched(self) -> str:
+        """Name of the search's estimate, before any refinement."""
+        return next(iter(self.estimates), "")
 
     def plain(self) -> dict[str, Any]:
         """Return mappings, lists, text and numbers, as YAML and JSON hold them."""

@@ -2,11 +2,13 @@
 
 import logging
 import os
+import re
 import signal
 import tempfile
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from hydroid.errors import RunError
@@ -36,6 +38,18 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
     """
     with undisturbed():
         _write(path, content.encode() if isinstance(content, str) else content, keep)
+
+
+def file_name(text: str, taken: set[str]) -> str:
+    """Return a name of letters, digits, dot, dash and underscore, and add it to `taken`.
+
+    It is numbered where a name that differs only in case is taken.
+    """
+    safe = re.sub(r"[^A-Za-z0-9._-]+", "_", text)
+    candidates = (f"{safe}_{n}" if n > 1 else safe for n in count(1))
+    name = next(candidate for candidate in candidates if candidate.lower() not in taken)
+    taken.add(name.lower())
+    return name
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 A sentence is a format string. It may use the finding's numbers by name (`{rms:.2g}`; without a format, four
 digits) and its subjects: `{0}` is the first, `{names}` all of them, `{few}` the first few and how many more
-there are. `{is}`, `{has}`, `{s}`, `{it}` and `{its}` agree with the number of subjects.
+there are. `{is}`, `{has}`, `{s}`, `{it}`, `{them}` and `{its}` agree with the number of subjects.
 """
 
 import math
@@ -22,6 +22,8 @@ class Words:
     statement: str
     hint: str = ""
 
+
+_BRINGS = "{what} would be known to {after} % instead of {before} %."
 
 WORDS: dict[str, Words] = {
     # a fit
@@ -50,6 +52,82 @@ WORDS: dict[str, Words] = {
         "The model errs differently in each log, so the 95 % intervals of {few} are too narrow.",
         "Use the intervals by log.",
     ),
+    "no effect": Words(
+        "{few} {has} no effect on the compared angles.", "Hold {them} fixed, or compare another joint."
+    ),
+    "not identifiable": Words(
+        "The logs do not determine {few}.",
+        "State priors, compare more joints, or add logs in other poses.",
+    ),
+    "prior only": Words("The logs add next to nothing to the prior{s} of {few}."),
+    "weakly identifiable": Words("{few} {is} known to 30 to 100 % only."),
+    "effect unknown": Words("The simulation diverges when {few} {is} changed: {its} effect is unknown."),
+    "interval rough": Words(
+        "The interval{s} of {few} {is} rough: {its} width may be off by {percent:.0f} %."
+    ),
+    "common scale": Words("{few} can be multiplied by one factor, and the motion stays the same."),
+    "combination": Words(
+        "{few} cannot be told apart: certain changes of them together give nearly the same motion."
+    ),
+    "more combinations": Words("{count} more combinations are open: see Directions."),
+    "quantities open": Words("The logs do not determine these quantities: {few}."),
+    # advice: the statement says what to do, the hint what it would bring
+    "nothing missing": Words(
+        "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error much."
+    ),
+    "terms may be missing": Words(
+        "Find what the model lacks: a quick test points at {few}.",
+        "`suggest` tries the most promising terms and prints the command for the best.",
+    ),
+    "term missing": Words(
+        "Free {0}: the rms error is predicted to fall from {rms}° to {freed}°.",
+        "Keep it if the error on an unseen log falls too.",
+    ),
+    "more terms missing": Words(
+        "{few} would also lower the error, but may describe the same error.",
+        "Free one at a time, and validate each new fit.",
+    ),
+    "weigh": Words("Weigh {0} to ±{sd:.0f} %.", _BRINGS),
+    "state": Words("State {0} to ±{sd:.0f} %, from a data sheet or a measurement.", _BRINGS),
+    "measure joint": Words("Compare the angle of joint {0} too.", _BRINGS),
+    "measure pressures": Words("Log the chamber pressures and compare them.", _BRINGS),
+    "constant commands": Words("Add a log of constant commands of {0} % in both directions.", _BRINGS),
+    "payload": Words("Repeat the logs with {0} kg in the gripper.", _BRINGS),
+    "experiment": Words("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
+    "fit the hydraulics": Words(
+        "Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."
+    ),
+    "predict unseen": Words(
+        "Predict a log that this fit has not seen.", "Only such a log can test the model."
+    ),
+    # a profile
+    "better optimum": Words(
+        "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
+        "Fit again from there, with more iterations or another seed.",
+    ),
+    "profile bounded": Words(
+        "Within the profile of {profile}, {few} reached a bound, which limits its interval."
+    ),
+    # a residual
+    "residual depends": Words(
+        "{0}: the measured angle is {error:.2g}° {side} than the simulated one where the {1} is {low} to "
+        "{high} {unit}."
+    ),
+    "residual correlated": Words(
+        "{0}: the error keeps its sign for {seconds:.2g} s.", "No sensor is that slow: the model errs."
+    ),
+    "residual at stop": Words(
+        "{0}: the joint is at its stop for {seconds:.2g} s, with an error of {rms:.2g}°."
+    ),
+    # a prediction
+    "error as expected": Words(
+        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°."
+    ),
+    "error not expected": Words(
+        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°.",
+        "The model, not the noise, limits the prediction.",
+    ),
+    "error without band": Words("{0} on {1}: the error is {rms:.2g}°. The fit has no band for it."),
     "few logs disagree": Words(
         "The logs disagree about {few} by more than the noise explains.",
         "Add logs before you use these values: so few cannot tell why.",
@@ -106,9 +184,9 @@ class _Number(float):
 
 def _filled(words: str, finding: Finding) -> str:
     names, one = finding.subjects, len(finding.subjects) == 1
-    grammar = {"is": "is", "has": "has", "s": "", "it": "it", "its": "its"}
+    grammar = {"is": "is", "has": "has", "s": "", "it": "it", "them": "it", "its": "its"}
     if not one:
-        grammar = {"is": "are", "has": "have", "s": "s", "it": "they", "its": "their"}
+        grammar = {"is": "are", "has": "have", "s": "s", "it": "they", "them": "them", "its": "their"}
     numbers = {
         key: value if isinstance(value, str) else _Number(value) for key, value in finding.numbers.items()
     }

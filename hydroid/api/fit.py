@@ -43,7 +43,7 @@ class FitResult:
     @cached_property
     def summary(self) -> FitSummary:
         """The final estimate with its uncertainty, as in `estimate.yaml`."""
-        from hydroid.run.summary import summarise
+        from hydroid.fitting.summary import summarise
 
         return summarise(self.problem, self.fit)
 
@@ -128,10 +128,11 @@ def fit(
 
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "Fit":
     """Begin the folder's run, or continue it, to its report."""
+    from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.report.fit_report import fit_page
-    from hydroid.report.page_file import write_page
+    from hydroid.report.drawing import draw
+    from hydroid.run.record import fit_result, save_result
 
     checkpoints = folder.begin_or_continue(problem.settings, problem.logs)
     result = run_fit(problem, progress, checkpoints)
@@ -143,8 +144,9 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Progress") -> "F
         if result.best.usable
         else None
     )
-    page = fit_page(folder.identity(), problem, result, suggested, str(folder.path))
-    write_page(page, folder.path)
+    advised = None if suggested is None else advice(last, suggested, str(folder.path))
+    save_result(folder.path, fit_result(last, result, advised))
+    draw([folder.path], folder.path)
     folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
     return result
 

@@ -16,7 +16,7 @@ from hydroid.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
-    from hydroid.advice.suggest import Suggestions
+    from hydroid.advice.proposals import Advice
     from hydroid.api.look import LogSources
 
 
@@ -27,12 +27,12 @@ def suggest(
     *,
     repair: bool = False,
     progress: Progress = no_progress,
-) -> "Study[Suggestions]":
+) -> "Study[Advice]":
     """Find what the model lacks, what the residual shows, and what would determine more.
 
         study = hydroid.suggest("runs/a")
-        for test in study.result.missing.free:
-            print(test.term.name, test.rms)
+        for test in study.result.content["missing"]:
+            print(test["name"], test["rms_deg"])
 
     Args:
         model: as of `design`.
@@ -46,9 +46,11 @@ def suggest(
         SettingsError: no log is given, and `model` is no run folder.
         RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
     """
+    from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
     from hydroid.posterior.covariance import uncertainty
     from hydroid.problem.problem import Problem
+    from hydroid.report.page import log_names
     from hydroid.report.suggestion_report import suggestion_page
 
     opened = open_model(model)
@@ -59,7 +61,9 @@ def suggest(
     result = suggestions(problem, uncertainty(problem, opened.theta), progress=progress)
     source = Path(opened.source)
     run = str(source.parent) if is_file(source.parent / CONFIG) else "RUN"
-    return Study(result, suggestion_page(problem, result, opened.name, run)).write(out)
+    advised = advice(problem, result, run)
+    page = suggestion_page(problem.settings, advised, log_names(problem.logs), opened.name)
+    return Study(advised, page).write(out)
 
 
 def run_logs(model: ModelSource) -> list[Path]:

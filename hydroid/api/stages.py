@@ -139,7 +139,7 @@ def collect(runs: Sequence[str | Path], out: str | Path = "runs/collected") -> "
     from hydroid.run.collection import read_runs
 
     collection = read_runs([str(run) for run in runs], Path(out))
-    return Study(collection, spread_page(collection.settings, collection.runs)).write(out)
+    return Study(collection, spread_page(collection)).write(out)
 
 
 def _fit_files(
@@ -214,13 +214,10 @@ def _workers(settings: FitSettings, options: FitOptions) -> "AbstractContextMana
 
 def _spread(out: Path, results: Sequence[FitResult]) -> "Page":
     from hydroid.report.page_file import write_page
-    from hydroid.report.spread import run_result, spread_page
+    from hydroid.report.spread import spread_page
+    from hydroid.run.collection import read_runs
 
-    parameters = results[0].problem.parameters
-    runs = [
-        run_result(r.folder or out, r.problem.settings.search.seed, r.fit, parameters.names) for r in results
-    ]
-    page = spread_page(results[0].problem.settings, runs)
+    page = spread_page(read_runs([str(r.folder) for r in results], out))
     write_page(page, out)
     return page
 

@@ -188,12 +188,9 @@ def collect(
 
 
 def _show(runs: "FitRuns", output: Output) -> None:
-    from hydroid.fitting.findings import fit_findings
-    from hydroid.report.fit_tables import objective_table, parameter_table
-    from hydroid.report.phrases import fit_summary
-    from hydroid.report.quantities_report import best_known
+    from hydroid.report.fit_report import fit_lines
+    from hydroid.report.parameters_report import parameter_table
     from hydroid.report.spread import final_spread
-    from hydroid.words import sentence
 
     first = runs.results[0]
     if runs.spread is not None:
@@ -201,8 +198,6 @@ def _show(runs: "FitRuns", output: Output) -> None:
         found = [r.summary.plain() | {"out": str(r.folder)} for r in runs.results]
         show(output, lambda: {"out": str(runs.out), "runs": found}, lines)
         return
-    problem, fit = first.problem, first.fit
-    tables = [objective_table(problem, fit), parameter_table(problem, fit)]
-    words = [fit_summary(fit), *best_known(fit.quantities), *map(sentence, fit_findings(problem, fit))]
+    table = parameter_table(first.model.settings, first.summary)
     content = partial(dict[str, Any], first.summary.plain(), out=str(runs.out))
-    show(output, content, [*tables, *words, str(runs.out / "report.html")])
+    show(output, content, [table, *fit_lines(first.summary), str(runs.out / "report.html")])

@@ -1,7 +1,6 @@
 """`hydroid validate`, `identifiability`, `sensitivity` and `surface`."""
 
 from enum import Enum
-from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,9 +12,7 @@ from hydroid.cli.progress import Progress
 
 if TYPE_CHECKING:
     from hydroid.identified_model import IdentifiedModel
-    from hydroid.posterior.band import Band
     from hydroid.report.uncertainty_report import UncertaintyStudy
-    from hydroid.report.validation_report import Validation
 
 
 class Stage(Enum):
@@ -54,9 +51,10 @@ def validate(
 
     models = [load_identified(path, overrides=overrides(setting)) for path in fit]
     study = validate(models, logs, out, repair=repair, leave_one_out=leave_one_out)
-    found = [row for result in study.result for row in _indices(result)]
-    verdicts = [f"- {point}" for section in study.page.sections for point in section.points]
-    show(output, lambda: {"results": found}, [study.table, *verdicts, str(out / "validation.html")])
+    found = [row for result in study.result for row in result.plain()]
+    warnings = [f"- {warning}" for warning in study.page.warnings]
+    table = study.page.tables["errors"]
+    show(output, lambda: {"results": found}, [table, *warnings, str(out / "validation.html")])
 
 
 def identifiability(
@@ -85,8 +83,6 @@ def identifiability(
             metavar="K,D", help="Parameters to profile. Each point of a profile takes a refinement."
         ),
     ] = "",
-    bootstrap: Annotated[int, typer.Option(min=0, max=100_000, help="Number of bootstrap refits.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     out: Folder = Path("runs/identifiability"),
     setting: Set = None,
     repair: Repair = False,
@@ -99,7 +95,7 @@ def identifiability(
     from hydroid.api.judge import identifiability
     from hydroid.api.look import load_settings, read_logs
     from hydroid.identified_model import load_identified, start_values
-    from hydroid.report.phrases import direction_phrases
+    from hydroid.words import sentence
 
     default, changes = f"fit-{stage.value}", overrides(setting)
     if fit is None:
@@ -112,18 +108,12 @@ def identifiability(
             read_logs(logs, model.settings, repair=repair),
             out,
             profile=names(profile),
-            bootstrap=(bootstrap, seed),
             progress=progress,
         )
-    phrases = direction_phrases(study.result.problem, study.result.identifiability)
-    content = _uncertainty(study.result, phrases)
-    warnings = study.page.warnings
-    lines = [*(f"- {phrase}" for phrase in phrases), *warnings]
-    show(
-        output,
-        lambda: content | {"warnings": list(warnings)},
-        [study.table, *lines, str(out / "identifiability.html")],
-    )
+    notes = [f"- {sentence(finding)}" for finding in study.result.summary.findings]
+    moved = [study.result.moved] if study.result.moved else []
+    lines = [study.result.table, *moved, *notes, str(out / "identifiability.html")]
+    show(output, lambda: _uncertainty(study.result), lines)
 
 
 def sensitivity(
@@ -200,50 +190,11 @@ def _pair(text: str) -> tuple[str, str]:
     return pair[0], pair[1]
 
 
-def _indices(result: "Validation") -> list[dict[str, Any]]:
+def _uncertainty(study: "UncertaintyStudy") -> dict[str, Any]:
     from hydroid.estimate import finite
 
-    return [
-        {
-            "fit": result.fit,
-            "log": result.log.source,
-            "joint": joint,
-            "mae_deg": finite(degrees(indices.mean_absolute)),
-            "rms_deg": finite(degrees(indices.rms)),
-            "max_deg": finite(degrees(indices.largest)),
-            "fit_percent": finite(indices.fit),
-            **_band(result.bands.get(joint)),
-        }
-        for joint, indices in result.indices.items()
-    ]
-
-
-def _band(band: "Band | None") -> dict[str, Any]:
-    from hydroid.estimate import finite
-
-    if band is None:
-        return {}
-    return {
-        "noise_deg": degrees(band.noise),
-        "expected_deg": finite(degrees(band.expected)),
-        "model_error_deg": degrees(band.model_error),
-        "inside_percent": 100 * band.inside,
-        "model_limits": band.model_limits,
-    }
-
-
-def _uncertainty(study: "UncertaintyStudy", phrases: tuple[str, ...]) -> dict[str, Any]:
-    from hydroid.estimate import finite
-    from hydroid.run.summary import parameter_estimates
-
-    profiles = {p.name: [finite(end) for end in p.interval] for p in study.profiles}
-    estimate = parameter_estimates(study.problem, study.uncertainty)
-    return {
-        "at": study.source,
-        "rank": study.identifiability.rank,
-        "unidentifiable_directions": list(phrases),
-        "estimate": {
-            name: parameter.model_dump(mode="json") | {"profile_interval": profiles.get(name)}
-            for name, parameter in estimate.items()
-        },
-    }
+    content, profiles = study.summary.plain(), {p.name: p.interval for p in study.profiles}
+    for name, parameter in content["estimate"].items():
+        parameter["profile_interval"] = [finite(end) for end in profiles[name]] if name in profiles else None
+    rank = study.identifiability.rank
+    return {"at": study.source, "rank": rank} | {key: content[key] for key in ("findings", "estimate")}

@@ -31,7 +31,6 @@ def suggest(
     """
     from hydroid.api.plan import suggest
     from hydroid.identified_model import load_identified
-    from hydroid.report.suggestion_report import suggestion_content
 
     model = load_identified(estimate.fit, estimate.config, overrides(estimate.setting))
     with Progress(quiet=output.silent) as progress:
@@ -41,7 +40,7 @@ def suggest(
         points = [point for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
         if section.text or points:
             lines += [section.title, *([section.text] if section.text else []), *(f"- {p}" for p in points)]
-    show(output, lambda: suggestion_content(study.result), [*lines, str(out / "suggestions.html")])
+    show(output, lambda: dict(study.result.content), [*lines, str(out / "suggestions.html")])
 
 
 def design(

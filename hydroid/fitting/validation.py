@@ -1,11 +1,27 @@
-"""How well a fit reproduces a log: the article's table 9, and what others print beside it."""
+"""How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import degrees, sqrt
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from hydroid.errors import SettingsError
+from hydroid.estimate import finite
+from hydroid.findings import Finding
+from hydroid.fitting.fit import Fit
+from hydroid.fitting.refinement import refine
+from hydroid.fitting.summary import account
+from hydroid.identified_model import IdentifiedModel
+from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.posterior.band import Band, prediction_bands
+from hydroid.posterior.covariance import uncertainty
+from hydroid.prediction import predict
+from hydroid.problem.problem import Problem
+from hydroid.settings.search import RefinementSettings
 
 STILL = 1e-9
 """an angle whose rms distance from its mean is below this does not move, but for rounding [rad]"""
@@ -23,6 +39,82 @@ class ErrorIndices:
     rms: float
     largest: float
     fit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What one model, or each estimate of one fit, makes of a log's commands.
+
+    Attributes:
+        fit: name of the model.
+        log: what it is compared with.
+        joints: K that are compared, numbered from 1.
+        simulated: their angles [rad], shape (T, K), by estimate; the first is the one to use.
+        bands: prediction bands of the first by joint; empty of a model that is no fit.
+        unseen: whether the model was made without this log; None: not known.
+    """
+
+    fit: str
+    log: Log
+    joints: tuple[int, ...]
+    simulated: Mapping[str, Array]
+    bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
+    unseen: bool | None = None
+
+    @property
+    def response(self) -> Array:
+        """The angles of the estimate to use [rad], shape (T, K)."""
+        return next(iter(self.simulated.values()))
+
+    @property
+    def indices(self) -> dict[int, ErrorIndices]:
+        """Of the estimate to use, by joint."""
+        return {joint: pooled_indices([self.pair(joint)]) for joint in self.joints}
+
+    def pair(self, joint: int, estimate: str | None = None) -> tuple[Array, Array]:
+        """Return the measured and the simulated angle of a joint [rad], both of shape (T,)."""
+        angles = self.response if estimate is None else self.simulated[estimate]
+        return self.log.angle[:, joint - 1], angles[:, self.joints.index(joint)]
+
+    @property
+    def as_expected(self) -> bool | None:
+        """Whether the error is no larger than the fitted logs lead to expect; None: a band is missing."""
+        if any(band.model_limits for band in self.bands.values()):
+            return False
+        return True if self.bands and all(band.exists for band in self.bands.values()) else None
+
+    @property
+    def rms_deg(self) -> float:
+        """Rms error over all joints [deg]."""
+        return degrees(sqrt(sum(i.rms**2 for i in self.indices.values()) / len(self.joints)))
+
+    @property
+    def finding(self) -> Finding:
+        """What the prediction shows: its error, and whether the fitted logs lead to expect it."""
+        numbers = {"rms": self.rms_deg}
+        if bands := list(self.bands.values()):
+            inside = 100 * min(band.inside for band in bands)
+            expected = degrees(sqrt(sum(band.expected**2 for band in bands) / len(bands)))
+            numbers |= {"inside": inside, "expected": expected}
+        kinds = {True: "error as expected", False: "error not expected", None: "error without band"}
+        level = "warning" if self.as_expected is False else "note"
+        return Finding(kinds[self.as_expected], level, (self.fit, Path(self.log.source).name), numbers)
+
+    def plain(self) -> list[dict[str, Any]]:
+        """Return one mapping per joint, as JSON has them (docs/json.md)."""
+        return [
+            {
+                "fit": self.fit,
+                "log": self.log.source,
+                "joint": joint,
+                "mae_deg": finite(degrees(indices.mean_absolute)),
+                "rms_deg": finite(degrees(indices.rms)),
+                "max_deg": finite(degrees(indices.largest)),
+                "fit_percent": finite(indices.fit),
+                **_plain(self.bands.get(joint)),
+            }
+            for joint, indices in self.indices.items()
+        ]
 
 
 def error_indices(measured: Array, simulated: Array) -> ErrorIndices:
@@ -44,3 +136,73 @@ def pooled_indices(pairs: Sequence[tuple[Array, Array]]) -> ErrorIndices:
         float(np.max(np.abs(error))),
         100 * (1 - rms / spread) if spread > STILL else float("nan"),
     )
+
+
+def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
+    """Return a model's prediction of a log.
+
+    Raises:
+        RunError: the simulation diverged.
+    """
+    joints = tuple(model.settings.outputs)
+    response = predict(model, log, joints)
+    return Prediction(
+        model.name, log, joints, {model.name: response}, prediction_bands(model, log, response), unseen
+    )
+
+
+def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
+    """Return what the estimates of a fit make of its own logs, the final estimate first."""
+    known, slopes = fit.quantities.precision, fit.uncertainty.jacobian.slopes[fit.uncertainty.free]
+    bands: dict[int, dict[int, Band]] = {}
+    for channel, noise in zip(problem.channels, fit.uncertainty.noise, strict=True):
+        if channel.quantity == "angle":
+            sd = known.deviation(np.nan_to_num(slopes[:, channel.rows])) / channel.weight
+            level = noise.level / channel.weight
+            error = channel.measured - fit.best.responses[channel.log][:, channel.column]
+            half = known.quantile * np.hypot(sd, level)
+            inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
+            expected = float(np.sqrt(np.mean(sd**2) + level**2))
+            bands.setdefault(channel.log, {})[channel.joint] = Band(
+                level, half, inside, rms, expected, np.inf
+            )
+    names = [fit.final, *(name for name in fit.estimates if name != fit.final)]
+    return tuple(
+        Prediction(
+            fit.final,
+            log,
+            tuple(problem.settings.outputs),
+            {name: fit.estimates[name].responses[i] for name in names},
+            bands.get(i, {}),
+            unseen=False,
+        )
+        for i, log in enumerate(problem.logs)
+    )
+
+
+def without_one(model: IdentifiedModel, logs: Sequence[Log], left_out: int) -> IdentifiedModel:
+    """Return the model refined on all logs but one, with its own uncertainty.
+
+    Raises:
+        SettingsError: there is one log only.
+    """
+    if len(logs) < 2:
+        raise SettingsError("needs two logs or more", where="--leave-one-out")
+    problem = Problem(model.settings, [log for i, log in enumerate(logs) if i != left_out])
+    refinement = model.settings.refinement or RefinementSettings()
+    unit = refine(problem, model.theta, refinement, lambda simulated, rms: None).point
+    theta = problem.parameters.from_unit(unit[None])[0]
+    name = f"{model.name} without {Path(logs[left_out].source).stem}"
+    return IdentifiedModel(model.settings, theta, name, account(problem, uncertainty(problem, theta)))
+
+
+def _plain(band: Band | None) -> dict[str, Any]:
+    if band is None:
+        return {}
+    return {
+        "noise_deg": degrees(band.noise),
+        "expected_deg": finite(degrees(band.expected)),
+        "model_error_deg": degrees(band.model_error),
+        "inside_percent": 100 * band.inside,
+        "model_limits": band.model_limits,
+    }

@@ -1,203 +1,132 @@
-"""Several finished reports side by side: their verdicts, errors, parameters and responses on one page."""
+"""Several models on the same logs: the page of a validation, and of several finished runs side by side."""
 
-import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
+from math import inf, sqrt
 
-from hydroid.report.page import Bar
-from hydroid.report.page_file import SCHEMA
-from hydroid.words import number, plain
+import numpy as np
 
-_SERIES = ("orange", "blue", "green", "pink", "yellow", "sky")
-
-Content = Mapping[str, Any]
-
-
-def comparison(contents: Mapping[str, Content]) -> dict[str, Any]:
-    """Return the content of a page that compares others, by name; see `page_file.page_content`."""
-    tables = [t for t in (_errors(contents),) if t["rows"]]
-    charts, tabs = _responses(contents)
-    sections: list[dict[str, Any]] = [
-        _section("Verdicts", tables=[_verdicts(contents)], text="Each report in one line."),
-    ]
-    if tabs:
-        text = "The responses of all reports to the same logs. Those that are off can be switched on."
-        sections.append(_section("Prediction", text=text, tabs=tabs, tables=tables))
-    sections += _parameters(contents)
-    sections += [
-        _section(f"Before you use {name}", points=list(content["warnings"]))
-        for name, content in contents.items()
-        if content["warnings"]
-    ]
-    best = _best(contents)
-    return {
-        "schema": SCHEMA,
-        "name": "comparison",
-        "title": f"{len(contents)} reports side by side",
-        "lead": best,
-        "verdict": {"prediction": best, "parameters": "", "lights": []},
-        "warnings": [],
-        "sections": sections,
-        "charts": charts,
-        "moving": [],
-        "versions": next(iter(contents.values()))["versions"],
-        "numbers": {"kind": "comparison"},
-    }
+from hydroid.fitting.validation import Prediction
+from hydroid.identified_model import IdentifiedModel
+from hydroid.report.page import Bar, Light, Page, Section, Verdict, short_name
+from hydroid.report.parameters_report import parameter_bar
+from hydroid.report.predictions import motion, prediction_section, response_data
+from hydroid.report.table import Cell, Table
+from hydroid.run.record import Record
+from hydroid.settings.arm import Arm
+from hydroid.words import sentence
 
 
-def names_of(files: Sequence[Path]) -> list[str]:
-    """Return short names of reports, all different: of their folders, or with those above them."""
-    parts = [file.resolve().parent.parts for file in files]
-    depth = 1
-    while len({part[-depth:] for part in parts}) < len(parts) and depth < max(map(len, parts)):
-        depth += 1
-    return ["/".join(part[-depth:]) for part in parts]
+def validation_page(
+    predictions: Sequence[Prediction], arm: Arm, folds: Sequence[IdentifiedModel] = ()
+) -> Page:
+    """Return the page of several fits on several logs; its table is `errors` (article, table 9).
 
-
-def _section(title: str, **filled: Any) -> dict[str, Any]:
-    empty: dict[str, Any] = {
-        key: [] for key in ("points", "facts", "tables", "more", "plots", "tabs", "bars", "steps")
-    }
-    return {"title": title, "text": "", "folded": False} | empty | filled
-
-
-def _table(
-    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = ""
-) -> dict[str, Any]:
-    return {
-        "title": title,
-        "header": list(header),
-        "rows": rows,
-        "numeric": [False] * len(header),
-        "note": note,
-    }
-
-
-def _verdicts(contents: Mapping[str, Content]) -> dict[str, Any]:
-    """One row per report: its sentences, and the answer to each question that any of them asks."""
-    strips = {name: content["verdict"] or {} for name, content in contents.items()}
-    questions = list(
-        dict.fromkeys(light["question"] for s in strips.values() for light in s.get("lights", ()))
+    `folds` are models that were refined without one log each.
+    """
+    ordered, verdict = ranked(predictions), _verdict(predictions)
+    sections = [prediction_section(ordered, arm), *motion(ordered, arm)]
+    if folds:
+        sections.append(Section("Without one log", tables={"folds": _fold_table(folds)}))
+    data = response_data(ordered, arm)
+    found = (p.finding for p in predictions)
+    warnings = tuple(sentence(f) for f in found if f.level == "warning")
+    title = "Validation"
+    return Page(
+        "validation", title, verdict.prediction, tuple(sections), warnings, data=data, verdict=verdict
     )
-    rows: list[list[str]] = []
-    for name, strip in strips.items():
-        answers = {light["question"]: light["answer"] for light in strip.get("lights", ())}
-        sentence = strip.get("prediction", contents[name]["lead"])
-        rows.append([name, sentence, strip.get("parameters", ""), *(answers.get(q, "–") for q in questions)])
-    return _table("", ("report", "prediction", "parameters", *questions), rows)
 
 
-def _errors(contents: Mapping[str, Content]) -> dict[str, Any]:
-    """All errors on logs: of fits on their own, of validations on theirs."""
-    rows: list[list[str]] = []
-    found: dict[tuple[str, ...], str] = {}  # in which report each stands first: a fit's own may show it too
-    for name, content in contents.items():
-        numbers = content["numbers"]
-        if numbers.get("kind") == "fit" and numbers["rms_deg"] is not None:
-            rows.append([name, "its own logs", "fitted", number(numbers["rms_deg"])])
-        for error in numbers.get("errors", ()):
-            seen = "unseen" if error["unseen"] else "fitted"
-            rms = "–" if error["rms_deg"] is None else number(error["rms_deg"])
-            found.setdefault((error["fit"], error["log"], seen, rms), name)
-    rows += [[fit if fit == name else f"{fit} (in {name})", *rest] for (fit, *rest), name in found.items()]
-    return _table("Errors", ("report", "log", "log is", "rms [deg]"), rows)
-
-
-def _best(contents: Mapping[str, Content]) -> str:
-    """Name the best fit on unseen logs, or on its own where no log is unseen."""
-    unseen = [
-        (error["rms_deg"], error["fit"])
-        for content in contents.values()
-        for error in content["numbers"].get("errors", ())
-        if error["unseen"] and error["rms_deg"] is not None
-    ]
-    if unseen:
-        value, name = min(unseen)
-        return f"{name} predicts an unseen log best, with an error of {value:.2g}° rms."
-    own = [(c["numbers"].get("rms_deg"), name) for name, c in contents.items()]
-    known = [(value, name) for value, name in own if value is not None]
-    if known:
-        value, name = min(known)
-        return (
-            f"{name} reproduces its own logs best, with an error of {value:.2g}° rms. No log here is unseen."
-        )
-    return "; ".join(f"{name}: {content['title']}" for name, content in contents.items())
-
-
-def _parameters(contents: Mapping[str, Content]) -> list[dict[str, Any]]:
-    """One list of bars per report, over the same bounds: the widest of all."""
-    fits = {n: c["numbers"]["parameters"] for n, c in contents.items() if c["numbers"].get("kind") == "fit"}
-    if not fits:
-        return []
-    bars: list[dict[str, Any]] = []
-    for parameter in dict.fromkeys(name for known in fits.values() for name in known):
-        having = {name: known[parameter] for name, known in fits.items() if parameter in known}
-        low = min(p["bounds"][0] for p in having.values())
-        high = max(p["bounds"][1] for p in having.values())
-        log = low > 0 and all(p["log"] for p in having.values())
-
-        def place(value: float, low: float = low, high: float = high, log: bool = log) -> float:
-            if log:
-                value, low, high = (math.log(max(v, 1e-300)) for v in (value, low, high))
-            return min(max((value - low) / (high - low), 0.0), 1.0)
-
-        for i, (name, p) in enumerate(having.items()):
-            ends = [end for end in p["interval"] if end is not None]
-            known = len(ends) == 2
-            bars.append(
-                vars(
-                    Bar(
-                        parameter if i == 0 else "",
-                        f"{p['meaning']}: {name}" if i == 0 else name,
-                        f"{number(p['value'])} {p['unit']}".rstrip(),
-                        f"{number(ends[0])} to {number(ends[1])}" if known else "no interval",
-                        (plain(float(f"{low:.3g}")), plain(float(f"{high:.3g}"))),
-                        state="known" if known else "unknown",
-                        at=place(p["value"]),
-                        band=(place(ends[0]), place(ends[1])) if known else None,
-                    )
-                )
-            )
+def comparison_page(records: Mapping[str, Record]) -> Page:
+    """Return the page of several runs side by side, by name: responses to the same logs, and parameters."""
+    named = [replace(p, fit=name) for name, record in records.items() for p in record.predictions]
+    arm = next(iter(records.values())).settings.arm
     text = "Each parameter with its 95 % interval, fit by fit, between the widest bounds of all."
-    return [_section("Parameters", text=text, bars=bars)]
+    warnings = tuple(
+        f"{name}: {sentence(f)}"
+        for name, record in records.items()
+        for f in record.summary.findings
+        if f.level != "note"
+    )
+    verdict = _verdict(named)
+    sections = (prediction_section(ranked(named), arm), Section("Parameters", text, bars=_bars(records)))
+    title = f"{len(records)} fits side by side"
+    return Page("comparison", title, verdict.prediction, sections, warnings, verdict=verdict)
 
 
-def _responses(contents: Mapping[str, Content]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Charts of responses, those to one record merged, and tabs by log."""
-    charts: dict[str, dict[str, Any]] = {}
-    tabs: dict[str, dict[str, Any]] = {}
-    for name, content in contents.items():
-        for tab in (t for s in content["sections"] if s["title"].startswith("Prediction") for t in s["tabs"]):
-            for plot in tab["plots"]:
-                chart = content["charts"][plot["chart"]]
-                title = chart["panels"][0]["title"]
-                if title in charts:
-                    _merge(charts[title], chart, name)
-                    continue
-                charts[title] = _named(chart, name)
-                own = tabs.setdefault(tab["name"], {"name": tab["name"], "note": tab["note"], "plots": []})
-                own["plots"].append(plot | {"chart": len(charts) - 1})
-    return list(charts.values()), list(tabs.values())
+def ranked(predictions: Sequence[Prediction]) -> list[Prediction]:
+    """Return predictions with the fit of the smallest error on unseen logs first."""
+    order = list(_errors(predictions))
+    return sorted(predictions, key=lambda p: order.index(p.fit))
 
 
-def _named(chart: Content, name: str) -> dict[str, Any]:
-    """Return a chart whose models carry the report's name; all but its first panel's label stay."""
-    panels = [p | {"marks": [_of(mark, name) for mark in p["marks"]]} for p in chart["panels"]]
-    return dict(chart) | {"panels": panels}
+def _judged(predictions: Sequence[Prediction]) -> list[Prediction]:
+    """Predictions of unseen logs, or all where there is none."""
+    return [p for p in predictions if p.unseen] or list(predictions)
 
 
-def _of(mark: Content, name: str) -> dict[str, Any]:
-    shared = not mark["label"] or mark["label"] in ("measured", "chamber A", "chamber B")
-    return dict(mark) if shared else dict(mark) | {"label": f"{name}: {mark['label']}"}
+def _errors(predictions: Sequence[Prediction]) -> dict[str, float]:
+    """Rms error of each fit on the judged logs [deg], the smallest first; infinite without any."""
+    squares: dict[str, list[float]] = {p.fit: [] for p in predictions}
+    for one in _judged(predictions):
+        squares[one.fit].append(one.rms_deg**2)
+    errors = {fit: sqrt(sum(each) / len(each)) if each else inf for fit, each in squares.items()}
+    return dict(sorted(errors.items(), key=lambda item: item[1]))
 
 
-def _merge(into: dict[str, Any], chart: Content, name: str) -> None:
-    """Add the shown models of a chart to another of the same record, in colours that are free."""
-    labels = dict.fromkeys(m["label"] for p in into["panels"] for m in p["marks"] if ": " in m["label"])
-    free = len({label.partition(":")[0] for label in labels})
-    for panel, more in zip(into["panels"], chart["panels"], strict=False):
-        for mark in more["marks"]:
-            added = _of(mark, name)
-            if added["label"] != mark["label"] and not mark["off"]:
-                panel["marks"].append(added | {"color": _SERIES[free % len(_SERIES)]})
+def _verdict(predictions: Sequence[Prediction]) -> Verdict:
+    """Return the best fit's error on unseen logs, the others', and whether it is as expected."""
+    judged, ((best, error), *others) = _judged(predictions), _errors(predictions).items()
+    count, kind = len({p.log.source for p in judged}), "unseen log" if judged[0].unseen else "fitted log"
+    which = f"one {kind}" if count == 1 else f"{count} {kind}s"
+    prediction = f"{short_name(best)} predicts {which} with an error of {error:.2g}° rms."
+    rest = (
+        f"Others: {', '.join(f'{short_name(name)} {value:.2g}°' for name, value in others)}."
+        if others
+        else ""
+    )
+    own = [p.as_expected for p in judged if p.fit == best and p.bands]
+    if not own:
+        return Verdict(prediction, rest)
+    question = "As the fitted logs lead to expect"
+    if False in own:
+        light = Light(
+            question, "fair", f"No: on {own.count(False)} of {len(own)} logs the error is clearly larger."
+        )
+    elif None in own:
+        light = Light(
+            question, "open", f"Not known: the fit leaves {own.count(None)} of {len(own)} responses open."
+        )
+    else:
+        light = Light(question, "good", "Yes.")
+    return Verdict(prediction, rest, (light,))
+
+
+def _bars(records: Mapping[str, Record]) -> tuple[Bar, ...]:
+    """One bar per parameter and run, over the widest bounds of all."""
+    bars: list[Bar] = []
+    sets = {name: record.settings.parameter_set().parameters for name, record in records.items()}
+    for parameter in dict.fromkeys(p.name for own in sets.values() for p in own if p.fixed is None):
+        having = {name: p for name, own in sets.items() for p in own if p.name == parameter}
+        bounds = min(p.lower for p in having.values()), max(p.upper for p in having.values())
+        for i, (name, p) in enumerate(having.items()):
+            settings, estimate = records[name].settings, records[name].summary.estimate[parameter]
+            bar = parameter_bar(settings, p, estimate, bounds=bounds)
+            symbol, label = (parameter, f"{bar.name}: {name}") if i == 0 else ("", name)
+            bars.append(replace(bar, symbol=symbol, name=label))
+    return tuple(bars)
+
+
+def _fold_table(folds: Sequence[IdentifiedModel]) -> Table:
+    """Return the parameters of models that were refined without one log each."""
+    values = np.array([fold.theta for fold in folds])
+    rows: list[tuple[Cell, ...]] = []
+    parameters = folds[0].settings.parameter_set().parameters
+    for parameter, column in zip(parameters, values.T, strict=True):
+        if parameter.fixed is None:
+            mean, spread = float(column.mean()), float(column.std(ddof=1))
+            relative = 100 * spread / abs(mean) if mean else inf
+            rows.append((parameter.name, parameter.unit, *map(float, column), relative))
+    header = ("name", "unit", *(short_name(fold.source) for fold in folds), "spread [%]")
+    note = "Each column: refined without one log. spread: their standard deviation relative to their mean."
+    return Table("Parameters without one log", header, tuple(rows), note, ("spread [%]",))

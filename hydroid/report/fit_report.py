@@ -1,312 +1,256 @@
-"""The report of a fit: prediction and convergence, parameters, what the logs determine, the search."""
+"""The page of a fit, from what its run stores: prediction, what is known and what is not, what to do next."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from math import degrees
-from typing import Any
+from math import sqrt
 
 import numpy as np
 
-from hydroid.advice.suggest import Suggestions
+from hydroid.advice.proposals import action_findings, missing_findings
 from hydroid.errors import SettingsError
-from hydroid.estimate import finite
-from hydroid.fitting.findings import fit_findings
-from hydroid.fitting.fit import Fit
+from hydroid.estimate import FitSummary
+from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
+from hydroid.fitting.validation import Prediction
+from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
-from hydroid.problem.problem import Problem
+from hydroid.posterior.delta import stored_precision
+from hydroid.posterior.flags import WEAK_ABOVE
+from hydroid.problem.stage import Stage
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
-from hydroid.report.fit_tables import objective_table, parameter_table
-from hydroid.report.moving_arm import Movement, motion_section
-from hydroid.report.names import plain_name
-from hydroid.report.next_steps import fit_steps
 from hydroid.report.objectives import learning, pareto
-from hydroid.report.page import Page, Plot, Section, Step, Tab, log_names
-from hydroid.report.parameter_bars import fit_bars
-from hydroid.report.phrases import (
-    ALGORITHMS,
-    STAGES,
-    direction_phrases,
-    fit_summary,
-    norm_label,
-    parameter_advice,
-    prior_phrase,
-    rank_phrase,
-)
-from hydroid.report.quantities_report import curves_csv, lost_quantities, quantity_section
-from hydroid.report.responses import joint_responses, response_data, response_tabs
-from hydroid.report.suggestion_report import action_effect, action_name, suggestion_sections
+from hydroid.report.page import PAGE, Light, Page, Plot, Section, Step, Tab, Verdict, log_names
+from hydroid.report.parameters_report import parameter_section
+from hydroid.report.phrases import ALGORITHMS, norm_label, prior_phrase
+from hydroid.report.predictions import motion, prediction_section, response_data
+from hydroid.report.quantities_report import BEST_WITHIN, curves_csv, quantity_section
+from hydroid.report.suggestion_report import MOST_STEPS, step, suggestion_sections
 from hydroid.report.table import Table, numbers_csv
 from hydroid.report.uncertainty_report import determined_sections
-from hydroid.report.verdict import fit_verdict
+from hydroid.run.record import Record
 from hydroid.words import number, sentence
 
-FITTED = "Prediction of the fitted logs"
-"""title of a section"""
+_OPEN = (
+    "quantities open",
+    "no effect",
+    "not identifiable",
+    "prior only",
+    "weakly identifiable",
+    "common scale",
+    "combination",
+    "more combinations",
+    "interval rough",
+)
+"""kinds of findings that stand under what is not known"""
 _FILES = (
-    "config.yaml, arm.yaml and model/ (what was asked, and the fitted arm), estimate.yaml, tables/, "
-    "responses/ (every series in full), history.csv, pareto.csv, run.json (hashes), run.log"
+    "config.yaml, arm.yaml and model/ (the fitted arm), estimate.yaml, result.npz, tables/, responses/ (all "
+    "series in full), history.csv, pareto.csv, run.json (hashes), run.log"
 )
-_SAME = {
-    "mech": "with the same versions. This config.yaml holds all settings, and the seed.",
-    "hyd": "with the same versions. This config.yaml holds all settings, the seed, and the values of stage 1 "
-    "if it used any: the command needs no --mech.",
-}
-_CITATION = (
-    "A. Montazeri, C. West, S. Monk and C. J. Taylor, Dynamic modelling and parameter estimation of a "
-    "hydraulic robot manipulator using a multi-objective genetic algorithm, 2017. To cite hydroid: "
-    "CITATION.cff."
-)
-_MOST_DIRECTIONS = 6
-_LEARNING = "Best candidate so far, and the median of each population."
-_PARETO = "Each grey line is one candidate of the Pareto set; the estimates are drawn on top."
-_SINGLE = (
-    "The search minimises the error over the whole record and does not look for the Pareto set. Shown are "
-    "those candidates of its last population to which no other is better in every segment."
-)
-_SEVERAL = "Among these candidates, a better fit of one segment goes with a worse fit of another."
 
 
-def fit_page(
-    identity: Mapping[str, Any],
-    problem: Problem,
-    fit: Fit,
-    suggested: Suggestions | None = None,
-    run: str = "RUN",
-) -> Page:
-    """Return the page of a fit; `identity` holds the run's versions and log hashes, `run` is its folder."""
-    found = joint_responses(problem, fit)
-    outputs = len(problem.outputs)
-    names = [
-        "response" if len(found) == 1 else f"response_{i // outputs + 1}_joint_{r.joint}"
-        for i, r in enumerate(found)
-    ]
-    responses = dict(zip(names, found, strict=True))
-    last = problem.varied(problem.settings.freed()) if fit.final == "joint" else problem
+def fit_page(record: Record) -> Page:
+    """Return the page of a fit, with the unseen logs that it was validated on."""
+    settings, summary, result = record.settings, record.summary, record.result
+    findings = [f for f in summary.findings if f.kind not in _OPEN]
+    folded = (*(advice_sections(record)), *determined_sections(summary, result.noise, _names(record)))
+    search = (_search(record), _front(record))
     sections = (
-        fit_steps(problem, fit, suggested, run),
-        Section(
-            FITTED,
-            tabs=response_tabs(responses),
-            more={"errors": objective_table(problem, fit)},
-        ),
-        *_known(last, fit),
-        _unknown(last, fit, suggested),
-        *_actuators(last, fit),
-        *motion_section(problem.settings.arm, _movements(problem, fit)),
-        *_folded(last, fit, suggested, run),
-        Section("Reproduce", facts=_facts(identity, problem, run)),
+        Section("Do next", steps=steps(record)),
+        prediction_section(record.predictions, settings.arm),
+        *quantity_section(settings, summary, [p.log for p in result.fitted]),
+        parameter_section(settings, summary, {}),
+        _unknown(summary),
+        *_actuators(record),
+        *motion(record.predictions, settings.arm),
+        *(replace(section, folded=True) for section in (*folded, *search)),
+        Section("Reproduce", facts=_facts(record), folded=True),
     )
-    versions = {k: str(identity[k]) for k in ("hydroid", "mujoco", "numpy", "python") if k in identity}
-    title = f"Fit of {problem.settings.arm.name}, stage {STAGES[problem.settings.stage][:1]}"
-    return Page(
-        "report",
-        title,
-        fit_summary(fit),
-        sections,
-        tuple(sentence(finding) for finding in fit_findings(last, fit)),
-        versions,
-        _data(problem, fit) | response_data(responses),
-        fit_verdict(last, fit),
-        fit_numbers(last, fit),
-    )
-
-
-def fit_numbers(problem: Problem, fit: Fit) -> dict[str, Any]:
-    """Return what a comparison of pages needs: each parameter with unit, value, interval and bounds."""
-    known = fit.uncertainty
-    columns = problem.parameters.parameters, fit.best.theta.tolist(), known.interval.tolist()
-    parameters = {
-        p.name: {
-            "unit": p.unit,
-            "value": value,
-            "interval": [finite(end) for end in ends],
-            "bounds": [p.lower, p.upper],
-            "log": p.log,
-            "meaning": plain_name(problem.settings.parameters[p.name]),
-        }
-        for p, value, ends in zip(*columns, strict=True)
-        if p.lower < p.upper and p.fixed is None
+    verdict = fit_verdict(record)
+    versions = {
+        k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")
     }
-    return {"kind": "fit", "rms_deg": finite(degrees(fit.best.rms)), "parameters": parameters}
+    title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
+    warnings = tuple(sentence(finding) for finding in findings)
+    return Page("report", title, verdict.prediction, sections, warnings, versions, _data(record), verdict)
 
 
-def _known(problem: Problem, fit: Fit) -> tuple[Section, ...]:
-    """What follows from all parameters together, and each parameter between its bounds."""
-    words = (
-        "Bar: from the lower to the upper bound. Orange line: the estimate, with its 95 % interval. Grey: "
-        "the interval of its prior. Blue dots: other estimates of the search. The intervals are only right "
-        "if the model is right."
+def fit_verdict(record: Record) -> Verdict:
+    """Return the error on unseen and on fitted logs, what the logs fix, and two lights."""
+    summary, unseen = record.summary, list(record.validations.values())
+    count = len(record.result.fitted)
+    logs = "the fitted log" if count == 1 else f"the {count} fitted logs"
+    own = (
+        "diverges on"
+        if summary.rms_deg is None
+        else f"reproduces {logs} with an error of {summary.rms_deg:.2g}° rms"
     )
-    return (
-        quantity_section(problem, fit.quantities),
-        Section(
-            "Parameters",
-            " ".join(filter(None, (rank_phrase(fit.identifiability), _given_supply(problem), words))),
-            bars=fit_bars(problem, fit),
-            more={"parameters": parameter_table(problem, fit)},
-        ),
-    )
-
-
-def _given_supply(problem: Problem) -> str:
-    """Say what rests on a supply pressure that is given: without pressures in the log only p A is known."""
-    free = {p.quantity for p in problem.settings.parameters.values() if p.fixed is None}
-    compared = problem.settings.objective.pressure_weight > 0
-    if problem.settings.stage != "hyd" or "supply_pressure" in free or compared:
-        return ""
-    supply = number(problem.settings.hydraulics.supply_pressure)
-    return (
-        f"Areas, masses, torques and flows hold for a supply of {supply} bar, which is given; speeds, dead "
-        "bands and times do not depend on it."
+    prediction = f"The fit {own}."
+    if unseen:
+        rms = sqrt(sum(p.rms_deg**2 for p in unseen) / len(unseen))
+        which = "an unseen log" if len(unseen) == 1 else f"{len(unseen)} unseen logs"
+        prediction = f"The fit predicts {which} with an error of {rms:.2g}° rms and {own}."
+    return Verdict(
+        prediction, known_phrase(summary), (_converged(summary), _validated(unseen, record.folder))
     )
 
 
-def _unknown(problem: Problem, fit: Fit, suggested: Suggestions | None) -> Section:
-    """What the logs leave open, and the actions that would settle it."""
-    points = (
-        *parameter_advice(problem, fit),
-        *_few_directions(direction_phrases(problem, fit.identifiability)),
-        *lost_quantities(fit.quantities),
-    )
-    steps: tuple[Step, ...] = ()
-    if points and suggested is not None:
-        steps = tuple(Step(f"{action_name(problem, a)}.", f"{action_effect(a)}.") for a in suggested.actions)
-    text = "" if points else "Nothing: the logs determine every free parameter."
-    more = " What would settle it stands below, the best first." if steps else ""
-    return Section("What is not known", f"{text}{more}".strip(), points, steps=steps)
+def known_phrase(summary: FitSummary) -> str:
+    """Say how many quantities and parameters the logs fix."""
+    free = [p for p in summary.estimate.values() if p.data_share is not None]
+    known = sum(p.sd is not None and p.sd <= WEAK_ABOVE * abs(p.value) for p in free)
+    parameters = f"Of the {len(free)} parameters they fix {known} to {100 * WEAK_ABOVE:.0f} %."
+    fixed = sum(q.within <= BEST_WITHIN for q in summary.quantities.values())
+    if not fixed:
+        return parameters.replace("they fix", "the logs fix")
+    return f"The logs fix {fixed} of the machine's properties, such as speeds and dead bands. {parameters}"
 
 
-def _few_directions(phrases: Sequence[str]) -> tuple[str, ...]:
-    """Return the first sentences on unidentifiable directions, and where the others stand."""
-    more = len(phrases) - _MOST_DIRECTIONS
-    shown = tuple(f"{phrase}." for phrase in (phrases if more <= 1 else phrases[:_MOST_DIRECTIONS]))
-    return shown if more <= 1 else (*shown, f"{more} more combinations: see Directions, below.")
+def fit_lines(summary: FitSummary) -> list[str]:
+    """Return what a terminal prints under the tables: the findings that must be read before any use."""
+    return [sentence(f) for f in summary.findings if f.level != "note"]
 
 
-def _actuators(problem: Problem, fit: Fit) -> tuple[Section, ...]:
-    """The curves of each compared joint's actuator, with their bands."""
-    if problem.settings.stage != "hyd":
+def steps(record: Record) -> tuple[Step, ...]:
+    """Return what to do next, the first things first."""
+    settings, run = record.settings, shlex.quote(record.folder)
+    findings: list[Finding] = []
+    if settings.stage == "mech":
+        command = f"hydroid fit-hyd {record.given} --mech {run}"
+        findings.append(Finding("fit the hydraulics", "note", (), {"command": command}))
+    if not record.validations:
+        command = f"hydroid validate OTHER.csv --fit {run}"
+        findings.append(Finding("predict unseen", "note", (), {"command": command}))
+    if record.result.advice is not None:
+        content = record.result.advice.content
+        missing = [f for f in missing_findings(content) if "command" in f.numbers]
+        findings += [*missing, *action_findings(content, settings)]
+    return tuple(step(finding) for finding in findings[:MOST_STEPS])
+
+
+def advice_sections(record: Record) -> tuple[Section, ...]:
+    """Return what the model lacks, what the residual shows and what actions would bring."""
+    advice = record.result.advice
+    if advice is None:
         return ()
-    stage, arm = problem.stage, problem.settings.arm
-    candidate = stage.candidates(fit.best.theta[None])
+    return suggestion_sections(record.settings, advice, _names(record))
+
+
+def _names(record: Record) -> list[str]:
+    return log_names([p.log for p in record.result.fitted])
+
+
+def _converged(summary: FitSummary) -> Light:
+    if summary.converged is None:
+        return Light("Converged", "fair", "Not refined.")
+    return Light("Converged", "good", "Yes.") if summary.converged else Light("Converged", "bad", "No.")
+
+
+def _validated(unseen: Sequence[Prediction], folder: str) -> Light:
+    question = "Validated on unseen logs"
+    if not unseen:
+        return Light(question, "open", "Not tested.")
+    worse = sum(p.as_expected is False for p in unseen)
+    if worse:
+        answer = f"The error is clearly larger than expected on {worse} of {len(unseen)}."
+        return Light(question, "fair", answer)
+    return Light(question, "good", "The errors are as expected.")
+
+
+def _unknown(summary: FitSummary) -> Section:
+    points = tuple(sentence(f) for f in summary.findings if f.kind in _OPEN)
+    return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
+
+
+def _actuators(record: Record) -> tuple[Section, ...]:
+    """The curves of each compared joint's actuator, with their bands."""
+    settings, summary = record.settings, record.summary
+    if settings.stage != "hyd":
+        return ()
+    stage, arm = Stage(settings), settings.arm
+    theta = settings.parameter_set().vector(summary.values, record.folder)
+    precision = stored_precision(IdentifiedModel(settings, theta, record.folder, summary))
     tabs: list[Tab] = []
-    for joint in problem.settings.outputs:
+    for joint in settings.outputs:
         try:
-            actuator = joint_actuator(arm, candidate, joint, "the estimate")
+            actuator = joint_actuator(arm, stage.candidates(theta[None]), joint, "the estimate")
         except SettingsError:
             continue  # no force-stroke curve runs through its two points: it diverged
-        records = partial(_records, problem, joint)
-        known = KnownActuator(fit.quantities.precision, records)
-        plot = replace(actuator_plot(replace(actuator, known=known)), name=f"actuator_joint_{joint}")
+        if precision is not None:
+
+            def records(values: Array, joint: int = joint) -> object:
+                return joint_records(arm, stage.candidates(values), joint)
+
+            actuator = replace(actuator, known=KnownActuator(precision, records))
+        plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}", where=PAGE)
         tabs.append(Tab(actuator.title, (plot,)))
-    text = "What its parameters mean in steady state, from the command to the torque at the joint."
-    return (Section("The actuator", text, tabs=tuple(tabs)),) if tabs else ()
+    return (Section("The actuator", tabs=tuple(tabs)),) if tabs else ()
 
 
-def _movements(problem: Problem, fit: Fit) -> list[Movement]:
-    """How the arm moves in each log, measured and simulated with the final estimate."""
-    joints = problem.settings.outputs
-    logs = zip(log_names(problem.logs), problem.logs, fit.best.responses, strict=True)
-    return [Movement.of(name, log, joints, response) for name, log, response in logs]
+def _search(record: Record) -> Section:
+    result, objective = record.result, record.settings.objective
+    facts: list[tuple[str, str]] = []
+    if len(result.history):
+        rounds, evaluations, simulated, diverged = (int(v) for v in result.history[-1, :4])
+        facts = [
+            ("starts" if record.settings.search.algorithm == "multistart" else "populations", str(rounds)),
+            (
+                "candidates",
+                f"{evaluations:,}, of which {simulated:,} were simulated and {diverged:,} diverged",
+            ),
+        ]
+    for one in result.refinements:
+        effort = f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}"
+        facts.append((f"least squares: {one.name}", effort))
+    caption = "Best candidate so far, and the median of each population."
+    plot = Plot("learning", caption, partial(learning, result.history, objective), where=PAGE)
+    return Section("How the search went", facts=tuple(facts), plots=(plot,))
 
 
-def _records(problem: Problem, joint: int, theta: Array) -> Any:
-    return joint_records(problem.settings.arm, problem.stage.candidates(theta), joint)
+def _front(record: Record) -> Section:
+    result, final = record.result, record.summary.final
+    order = sorted(result.segments, key=lambda name: (name != final, name != record.summary.searched))
+    segments = {name: result.segments[name] for name in order}
+    draw = partial(pareto, result.front[1], segments, record.settings.objective)
+    caption = "Each grey line is one candidate of the Pareto set. A lower line fits that segment better."
+    return Section("Pareto set", plots=(Plot("pareto", caption, draw, where=PAGE),))
 
 
-def _folded(problem: Problem, fit: Fit, suggested: Suggestions | None, run: str) -> tuple[Section, ...]:
-    objective = problem.settings.objective
-    lacks, residual, actions = (
-        suggestion_sections(problem, suggested, run) if suggested is not None else (None, None, None)
-    )
-    text = _SEVERAL if _has_segment_objectives(problem, fit) else _SINGLE
-    hidden = (
-        lacks,
-        actions,
-        *determined_sections(problem, fit.uncertainty, fit.identifiability),
-        Section(
-            "How the search went",
-            facts=_effort(problem, fit),
-            plots=(Plot("learning", _LEARNING, partial(learning, fit, objective)),),
-        ),
-        Section("Pareto set", text, plots=(Plot("pareto", _PARETO, partial(pareto, fit, objective)),)),
-    )
-    folded = tuple(replace(section, folded=True) for section in hidden if section is not None)
-    if residual is None:
-        return folded
-    return (residual, *folded)
-
-
-def _facts(identity: Mapping[str, Any], problem: Problem, run: str) -> tuple[tuple[str, str], ...]:
-    settings = problem.settings
-    hashes = list(identity.get("logs", {}).values())
-    logs: list[tuple[str, str]] = []
-    for i, (log, name) in enumerate(zip(problem.logs, log_names(problem.logs), strict=True)):
-        seconds, samples = len(log.time) * log.period, len(log.time)
-        digest = f", SHA-256 {hashes[i][:12]}…" if i < len(hashes) else ""
-        label = "log" if len(problem.logs) == 1 else f"log {i + 1}"
-        logs.append((label, f"{name}, {number(seconds)} s, {samples} samples{digest}"))
-    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+def _facts(record: Record) -> tuple[tuple[str, str], ...]:
+    settings, run = record.settings, record.folder
     config, again = shlex.quote(f"{run}/config.yaml"), shlex.quote(f"{run}-again")
+    logs = [
+        (name, f"{number(len(p.log.time) * p.log.period)} s, SHA-256 {digest[:12]}…")
+        for p, name, digest in zip(
+            record.result.fitted, _names(record), record.identity["logs"].values(), strict=True
+        )
+    ]
+    search, segments = settings.search, record.result.front[1].shape[1] - 1
     return (
-        ("command", f"hydroid fit-{settings.stage} {given} --config {config} --out {again}"),
-        ("same bits", _SAME[settings.stage]),
-        ("arm", f"{settings.arm.name}; its geometry is not estimated but read from arm.yaml"),
-        ("stage", STAGES[settings.stage]),
+        ("command", f"hydroid fit-{settings.stage} {record.given} --config {config} --out {again}"),
         *logs,
         *((f"payload in {name}", f"{number(mass)} kg") for name, mass in settings.payloads.items()),
         *((f"prior {name}", prior_phrase(prior)) for name, prior in settings.priors.items()),
-        ("compared", f"measured angle of joint {', '.join(str(j) for j in settings.outputs)}"),
-        ("joints without command and comparison", settings.simulation.other_joints),
-        ("objective", f"{norm_label(settings.objective)}, {len(problem.bounds)} segments"),
-        ("search", ALGORITHMS.get(settings.search.name, f"{settings.search.name}, of pymoo")),
-        ("seed", str(settings.search.seed)),
+        ("objective", f"{norm_label(settings.objective)}, {segments} segments"),
+        ("search", f"{ALGORITHMS.get(search.name, search.name)}, seed {search.seed}"),
         ("files", _FILES),
-        ("method", _CITATION),
     )
 
 
-def _has_segment_objectives(problem: Problem, fit: Fit) -> bool:
-    """Say whether the search minimised each segment; of a library's algorithm the estimates tell it."""
-    algorithm = problem.settings.search.algorithm
-    return "average" in fit.estimates if algorithm == "pymoo" else algorithm == "nsga2"
-
-
-def _effort(problem: Problem, fit: Fit) -> tuple[tuple[str, str], ...]:
-    facts: list[tuple[str, str]] = []
-    if len(fit.history):
-        multistart = problem.settings.search.algorithm == "multistart"
-        rounds, evaluations, simulated, diverged = (int(v) for v in fit.history[-1, :4])
-        repeated = "; the others repeat earlier ones" if evaluations > simulated else ""
-        ranked = "; they rank behind all others" if diverged else ""
-        facts += [
-            ("starts", str(rounds))
-            if multistart
-            else ("populations", f"{rounds}: the first one and {rounds - 1} generations"),
-            ("candidates", f"{evaluations:,}, of which {simulated:,} were simulated{repeated}"),
-            ("diverged", f"{diverged:,} of {simulated:,} simulated candidates{ranked}"),
-        ]
-    for name, one in fit.refinements.items():
-        effort = f"{one.iterations} iterations, {one.evaluations:,} simulations"
-        facts.append((f"least squares: {name}", f"{effort}; {one.ending.value}"))
-    return tuple(facts)
-
-
-def _data(problem: Problem, fit: Fit) -> dict[str, str]:
+def _data(record: Record) -> dict[str, str]:
     """Return the history and the Pareto set with every bit, in the search's units: rad unless relative."""
-    counts = len(HISTORY) - 2
-    rows = tuple((*(int(v) for v in row[:counts]), *(float(v) for v in row[counts:])) for row in fit.history)
-    theta, evaluation = fit.front
-    unit = "" if problem.settings.objective.relative else "_rad"
-    segments = (f"segment_{s}{unit}" for s in range(1, evaluation.segments.shape[1] + 1))
-    header = (*problem.parameters.names, *segments, f"overall{unit}")
-    front = np.column_stack([theta, evaluation.segments, evaluation.overall])
-    curves = curves_csv(fit.quantities.curves)
+    result, counts = record.result, len(HISTORY) - 2
+    rows = tuple(
+        (*(int(v) for v in row[:counts]), *(float(v) for v in row[counts:])) for row in result.history
+    )
+    theta, objectives = result.front
+    unit = "" if record.settings.objective.relative else "_rad"
+    segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
+    header = (*record.settings.parameter_set().names, *segments, f"overall{unit}")
     return {
         "history.csv": Table("", HISTORY, rows).csv(),
-        "pareto.csv": numbers_csv(header, front),
-        "tables/curves.csv": curves,
+        "pareto.csv": numbers_csv(header, np.column_stack([theta, objectives])),
+        "tables/curves.csv": curves_csv(record.summary.curves),
+        **response_data(record.predictions, record.settings.arm),
     }

@@ -1,6 +1,6 @@
 """Parameters in plain words: what each quantity is, for readers who do not know its symbol."""
 
-from hydroid.settings.problem import ParameterSettings
+from hydroid.settings.fit import FitSettings
 
 _MEANINGS = {
     "gain": "torque per command",
@@ -60,12 +60,14 @@ _MEANINGS = {
 _SIDES = {"_a": ", towards A", "_b": ", towards B"}
 
 
-def plain_name(settings: ParameterSettings) -> str:
-    """Say in plain words what a parameter is, and where it acts."""
-    quantity = settings.quantity
+def plain_name(settings: FitSettings, parameter: str) -> str:
+    """Say in plain words what a parameter is, and where it acts if several joints are compared."""
+    own = settings.parameters[parameter]
+    quantity = own.quantity
     side = "" if quantity in _MEANINGS else _SIDES.get(quantity[-2:], "")
     meaning = _MEANINGS.get(quantity) or _MEANINGS.get(quantity[:-2], quantity.replace("_", " "))
-    if settings.link is not None:
-        return f"{meaning} of {settings.link}"
-    where = f", joint {settings.joints[0]}" if settings.joints and len(settings.joints) == 1 else ""
+    if own.link is not None:
+        return f"{meaning} of {own.link}"
+    joints = [] if len(settings.outputs) == 1 else own.joints or []
+    where = f", {settings.arm.joint_names[joints[0] - 1]}" if len(joints) == 1 else ""
     return f"{meaning}{side}{where}"

@@ -1,37 +1,37 @@
 """A report as data: sections of text, tables, bars and charts; `page_file` writes it."""
 
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from hydroid.log import Log
+from hydroid.report.chart import Chart
+from hydroid.report.moving_arm import MovingArm
 from hydroid.report.table import Table
 
+PAGE, FILE = frozenset({"page"}), frozenset({"file"})
+"""where a figure is shown"""
+Drawing = Figure | Chart | MovingArm
 _LONGEST_NAME = 40
-
-
-class Drawing(Protocol):
-    """A `Chart` or a `MovingArm`."""
-
-    def plain(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
-        ...
 
 
 @dataclass(frozen=True)
 class Plot:
     """A figure: the name of its files, what it shows in words, and the function that draws it.
 
-    The page draws it, a chart with buttons to zoom it if `zoom`; `write_figures` makes files of charts.
+    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`. A `MovingArm` is drawn there only. A
+    matplotlib figure is an image there. `where` says where it is shown: in the page, as a file, or both.
     """
 
     name: str
     caption: str
     draw: Callable[[], Drawing]
     zoom: bool = False
+    where: frozenset[str] = PAGE | FILE
 
 
 @dataclass(frozen=True)
@@ -121,11 +121,12 @@ class Light:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer in a sentence on the prediction and one on the parameters, and lights."""
+    """The answer in a sentence on the prediction and one on the parameters, lights, and a picture (SVG)."""
 
     prediction: str
     parameters: str = ""
     lights: tuple[Light, ...] = ()
+    picture: str = ""
 
 
 @dataclass(frozen=True)
@@ -178,18 +179,6 @@ def unique(name: str, taken: Collection[str]) -> str:
     """Return the name, numbered where it is taken."""
     candidates = (f"{name} ({n})" if n > 1 else name for n in count(1))
     return next(candidate for candidate in candidates if candidate not in taken)
-
-
-def file_name(text: str, taken: set[str]) -> str:
-    """Return a name of letters, digits, dot, dash and underscore, and add it to `taken`.
-
-    It is numbered where a name that differs only in case is taken.
-    """
-    safe = re.sub(r"[^A-Za-z0-9._-]+", "_", text)
-    candidates = (f"{safe}_{n}" if n > 1 else safe for n in count(1))
-    name = next(candidate for candidate in candidates if candidate.lower() not in taken)
-    taken.add(name.lower())
-    return name
 
 
 def short_name(name: str) -> str:

@@ -1,15 +1,16 @@
-"""A report as files: one page that loads nothing, tables, and data; and its charts as figures.
+"""A report as files: one page that loads nothing, tables, figures, and data for scripts.
 
-The page is one HTML file: it carries its charts as data, with the script of Bokeh that draws them.
-`read_page` takes the content out of such a file again, so that it can be drawn anew, compared, or written as
-figures.
+Every command builds a `Page` and `write_page` writes it: the page itself, `tables/` (CSV, Markdown, LaTeX),
+`figures/` (PNG, SVG) and data for scripts. The page is one HTML file that loads nothing from elsewhere: it
+carries its charts as data, compressed, with the script of Bokeh that draws them. `read_page` takes the
+content out of such a file again, so that it can be drawn anew and compared.
 """
 
 import base64
 import gzip
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib.resources import files
@@ -18,69 +19,77 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from hydroid.errors import RunError
 from hydroid.files import write_atomic
-from hydroid.report.chart import Chart
-from hydroid.report.page import Page, Plot, Section
+from hydroid.report.chart import Chart, figure
+from hydroid.report.moving_arm import MovingArm
+from hydroid.report.page import FILE, PAGE, Drawing, Page, Plot, Section
+from hydroid.report.style import rendered, style
 from hydroid.report.table import Table, shown
 
-SCHEMA = 2
+SCHEMA = 1
 """version of the content that a page carries"""
 _CONTENT = re.compile(rb'<script type="text/plain" id="content">([A-Za-z0-9+/=]*)</script>')
-_TEMPLATE, _OWN = "template.html.j2", ("page.css", "moving_arm.js", "charts.js")
+_OWN = ("template.html.j2", "page.css", "moving_arm.js", "charts.js")
 _SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
 
 
 def write_page(page: Page, out: Path) -> list[Path]:
-    """Write a report to the folder `out`: the page, its tables as CSV, Markdown and LaTeX, and its data.
+    """Write a report to the folder `out`; return the files.
 
     Raises:
         RunError: the folder cannot be written.
     """
-    content: dict[str, str] = {}
+    content: dict[str, str | bytes] = {}
     for name, table in page.tables.items():
-        written = {"csv": table.csv(), "md": table.markdown(), "tex": table.latex()}
-        content |= {f"tables/{name}.{ending}": text for ending, text in written.items()}
-    content |= {**page.data, f"{page.name}.html": content_html(page_content(page))}
+        content |= {
+            f"tables/{name}.csv": table.csv(),
+            f"tables/{name}.md": table.markdown(),
+            f"tables/{name}.tex": table.latex(),
+        }
+    images = dict[str, bytes]()
+    with style():
+        drawn = drawings(page)
+        for plot in page.plots:
+            drawing = drawn[plot.name]
+            if isinstance(drawing, Chart) and plot.where >= FILE:
+                drawing = figure(drawing)
+            if isinstance(drawing, Figure):
+                png, images[plot.name] = rendered(drawing)
+                if plot.where >= FILE:
+                    content |= {
+                        f"figures/{plot.name}.png": png,
+                        f"figures/{plot.name}.svg": images[plot.name],
+                    }
+    content |= {**page.data, f"{page.name}.html": content_html(page_content(page, drawn, images))}
     for name, text in content.items():
         write_atomic(out / name, text)
     return [out / name for name in content]
 
 
-def write_figures(content: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write every chart of a page's content to the folder `out` as PNG and SVG; return the files.
-
-    Raises:
-        RunError: the folder cannot be written.
-    """
-    from hydroid.report.figure import rendered
-
-    written: list[Path] = []
-    for plot in _plots(content):
-        if "chart" in plot:
-            images = rendered(Chart.of(content["charts"][plot["chart"]]))
-            for ending, image in zip(("png", "svg"), images, strict=True):
-                written.append(out / f"{plot['name']}.{ending}")
-                write_atomic(written[-1], image)
-    return written
+def drawings(page: Page) -> dict[str, Drawing]:
+    """Return all that a page and its files draw, by name."""
+    return {plot.name: plot.draw() for plot in page.plots}
 
 
-def _plots(content: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for section in content["sections"]:
-        for some in (section, *section["tabs"]):
-            yield from some["plots"]
+def page_content(
+    page: Page, drawn: Mapping[str, Drawing], images: Mapping[str, bytes] | None = None
+) -> dict[str, Any]:
+    """Return all that a page shows as mappings, lists, text and numbers; images are SVG."""
+    charts = {name: one.plain() for name, one in drawn.items() if isinstance(one, Chart)}
+    moving = {name: one.plain() for name, one in drawn.items() if isinstance(one, MovingArm)}
+    place = {name: {"chart": i} for i, name in enumerate(charts)}
+    place |= {name: {"moving": i} for i, name in enumerate(moving)}
+    shown = {plot.name for plot in page.plots if plot.where >= PAGE} - charts.keys() - moving.keys()
 
-
-def page_content(page: Page) -> dict[str, Any]:
-    """Return all that a page shows as mappings, lists, text and numbers."""
-    charts, moving = list[Any](), list[Any]()
-
-    def plot(one: Plot) -> dict[str, Any]:
-        drawing = one.draw()
-        kind, drawn = ("chart", charts) if isinstance(drawing, Chart) else ("moving", moving)
-        drawn.append(drawing.plain())
-        return {"name": one.name, "caption": one.caption, "zoom": one.zoom, kind: len(drawn) - 1}
+    def plots(some: Sequence[Plot]) -> list[dict[str, Any]]:
+        return [
+            {"name": p.name, "caption": p.caption, "zoom": p.zoom} | place.get(p.name, {})
+            for p in some
+            if p.where >= PAGE
+        ]
 
     def section(one: Section) -> dict[str, Any]:
         return {
@@ -90,15 +99,14 @@ def page_content(page: Page) -> dict[str, Any]:
             "facts": [list(fact) for fact in one.facts],
             "tables": [_table(table) for table in one.tables.values()],
             "more": [_table(table) for table in one.more.values()],
-            "plots": [plot(p) for p in one.plots],
-            "tabs": [{"name": t.name, "note": t.note, "plots": [plot(p) for p in t.plots]} for t in one.tabs],
+            "plots": plots(one.plots),
+            "tabs": [{"name": t.name, "note": t.note, "plots": plots(t.plots)} for t in one.tabs],
             "bars": [asdict(bar) for bar in one.bars],
             "steps": [asdict(step) for step in one.steps],
             "folded": one.folded,
             "link": one.link,
         }
 
-    sections = [section(one) for one in page.sections]
     return {
         "schema": SCHEMA,
         "name": page.name,
@@ -106,9 +114,10 @@ def page_content(page: Page) -> dict[str, Any]:
         "lead": page.lead,
         "verdict": None if page.verdict is None else asdict(page.verdict),
         "warnings": list(page.warnings),
-        "sections": sections,
-        "charts": charts,
-        "moving": moving,
+        "sections": [section(one) for one in page.sections],
+        "charts": list(charts.values()),
+        "moving": list(moving.values()),
+        "images": {name: svg.decode() for name, svg in (images or {}).items() if name in shown},
         "versions": dict(page.versions),
         "numbers": dict(page.numbers),
     }
@@ -126,9 +135,10 @@ def content_html(content: Mapping[str, Any]) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     own = files("hydroid.report")
-    given = {name.replace(".", "_"): Markup(own.joinpath(name).read_text(encoding="utf-8")) for name in _OWN}
-    template = environment.from_string(own.joinpath(_TEMPLATE).read_text(encoding="utf-8"))
+    read = {name: own.joinpath(name).read_text(encoding="utf-8") for name in _OWN}
+    given = {name.replace(".", "_"): Markup(text) for name, text in read.items() if name != _OWN[0]}
     packed = _packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")))
+    template = environment.from_string(read[_OWN[0]])
     return template.render(
         page=content, content=packed, library=_library() if content["charts"] else "", **given
     )

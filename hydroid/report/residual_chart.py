@@ -1,51 +1,45 @@
 """The chart of the residual checks: each residual over time, angle, velocity and command."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
+from hydroid.advice.proposals import UNITS
 from hydroid.advice.residuals import Binned, Regressor, ResidualCheck
 from hydroid.parameters import Array
-from hydroid.problem.problem import Problem
+from hydroid.report import style
 from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.page import Plot, Tab, log_names
+from hydroid.report.page import PAGE, Plot, Tab
 
-UNITS = {Regressor.ANGLE: "deg", Regressor.VELOCITY: "deg/s", Regressor.COMMAND: "%"}
-_MOST = 8
-"""angles that are drawn, those with the largest errors"""
 _HEIGHT = 190
 _BINS = 300
 _CAPTION = (
-    "Measured minus simulated angle over time, and its mean in intervals of angle, velocity and command, "
-    "with two standard errors of the mean for correlated samples. Shaded stretches of time: the joint stands "
-    "at its stop."
+    "Measured minus simulated angle over time, and its mean over angle, velocity and command with two "
+    "standard errors. Shaded: the joint stands at its stop."
 )
 
 
-def residual_tabs(
-    problem: Problem, checks: Sequence[ResidualCheck], notes: Callable[[ResidualCheck], str]
-) -> tuple[Tab, ...]:
-    """Return a tab for each of the angles with the largest errors."""
-    names = log_names(problem.logs)
-    tabs: list[Tab] = []
-    for i, check in enumerate(sorted(checks, key=lambda check: -check.rms)[:_MOST]):
-        draw = partial(residual_panels, problem, check)
-        plot = Plot(f"residual_checks_{i + 1}" if i else "residual_checks", _CAPTION, draw)
-        tabs.append(Tab(f"joint {check.joint}, {names[check.log]}", (plot,), notes(check)))
-    return tuple(tabs)
+def residual_tabs(checks: Sequence[ResidualCheck], places: Sequence[str]) -> tuple[Tab, ...]:
+    """Return a tab for each residual; `places` names joint and log of each."""
+    return tuple(
+        Tab(place, (Plot(f"residual_{i + 1}", _CAPTION, partial(residual_panels, check), where=PAGE),))
+        for i, (check, place) in enumerate(zip(checks, places, strict=True))
+    )
 
 
-def residual_panels(problem: Problem, check: ResidualCheck) -> Chart:
+def residual_panels(check: ResidualCheck) -> Chart:
     """Draw a residual over time, angle, velocity and command, and its autocorrelation."""
     regressed = (_over(what, check.binned[what]) for what in Regressor if what in check.binned)
-    period = problem.logs[check.log].period
-    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3, bins=_BINS)
+    period = float(check.time[1] - check.time[0])
+    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3)
 
 
 def _over_time(check: ResidualCheck) -> Panel:
-    line = Mark("line", check.time, np.degrees(check.residual), color="orange", width=1.2)
+    line = Mark(
+        "line", *style.decimated(check.time, np.degrees(check.residual), _BINS), color="orange", width=1.2
+    )
     edges = np.flatnonzero(np.diff(np.concatenate([[False], check.at_stop, [False]]).astype(int)))
     starts, ends = edges[::2], np.minimum(edges[1::2], len(check.time) - 1)
     stops = Mark(

@@ -1,67 +1,48 @@
-"""Several runs with different seeds, of one command or collected from folders: their spread as a page."""
+"""Several runs with different seeds: the spread of their estimates as a page."""
 
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from hydroid.fitting.fit import Fit
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import Array, Parameter, ParameterSet
+from hydroid.posterior.covariance import at_bounds
+from hydroid.posterior.flags import Flag
 from hydroid.report.page import Light, Page, Section, Verdict
-from hydroid.report.parameter_bars import spread_bars
-from hydroid.report.phrases import runs_phrase
+from hydroid.report.parameters_report import parameter_bar
 from hydroid.report.table import Cell, Table
+from hydroid.run.collection import Collection as Runs
 from hydroid.run.collection import RunEstimate, RunResult
-from hydroid.settings.fit import FitSettings
 from hydroid.words import listed
 
 _NEAR = 0.05
 """part of the smallest error by which runs that found the same optimum may differ"""
 
 
-def run_result(path: Path, seed: int, fit: Fit, names: Sequence[str]) -> RunResult:
-    """Return what a fit in a folder found."""
-    searched, best = (RunEstimate(seed, e.theta, e.rms) for e in (fit.searched, fit.best))
-    none = frozenset(name for name, idle in zip(names, fit.without_effect, strict=True) if idle)
-    return RunResult(path, searched, best, fit.refinement is not None, none)
-
-
-def spread_page(settings: FitSettings, runs: Sequence[RunResult]) -> Page:
-    """Return the page of several runs, at least one, that differ in their seeds only.
+def spread_page(collected: Runs) -> Page:
+    """Return the page of several runs that differ in their seeds only.
 
     Its tables are `runs` (run by run), `runs_search` and, where runs were refined, `runs_refined`.
     """
-    parameters = settings.parameter_set()
-    common = frozenset[str].intersection(*(run.without_effect for run in runs))
-    idle = [name for name in parameters.names if name in common]
+    settings, runs, parameters = collected.settings, collected.runs, collected.parameters
+    idle = [n for n in parameters.names if all(n in run.without_effect for run in runs)]
     estimates = {"search": [run.searched for run in runs]}
     if any(run.refined for run in runs):
         estimates["refined"] = [run.best for run in runs]
     tables = {f"runs_{name}": spread_table(parameters, each, idle, name) for name, each in estimates.items()}
-
-    columns = {
-        name: (np.array([run.theta for run in each]), np.array([run.rms for run in each]))
-        for name, each in estimates.items()
-    }
-    best = min(runs, key=lambda run: (run.best.rms, run.seed))
+    best = collected.best
     note = f" {listed(idle)} had no effect in any run." if idle else ""
-    lead = f"The smallest output error is {best.rms_deg:.4g} deg rms, of seed {best.seed}.{note}"
-    bars = spread_bars(parameters, settings.parameters, columns[next(reversed(columns))][0], idle)
-    return Page(
-        "runs",
-        f"{len(runs)} runs with different seeds",
-        lead,
-        (
-            Section(
-                "Where the estimates lie",
-                "Bar: from the lower to the upper bound. Orange line: the median. Blue dots: the runs.",
-                bars=bars,
-                more=tables,
-            ),
-            Section("Run by run", tables={"runs": runs_table(parameters, runs)}),
-        ),
-        verdict=Verdict(lead, lights=(_agreement(runs),)),
+    lead = f"The smallest error is {best.rms_deg:.4g}° rms, of seed {best.seed}.{note}"
+    bars = tuple(
+        parameter_bar(settings, p, best.summary.estimate[p.name], [float(run.best.theta[i]) for run in runs])
+        for i, p in enumerate(parameters.parameters)
     )
+    text = "Bar: from the lower to the upper bound. Orange line: the best run. Blue dots: all runs."
+    sections = (
+        Section("Where the estimates lie", text, bars=bars, more=tables),
+        Section("Run by run", tables={"runs": runs_table(parameters, runs)}),
+    )
+    title, verdict = f"{len(runs)} runs with different seeds", Verdict(lead, lights=(_agreement(runs),))
+    return Page("runs", title, lead, sections, verdict=verdict)
 
 
 def _agreement(runs: Sequence[RunResult]) -> Light:
@@ -86,7 +67,7 @@ def spread_table(
     """
     theta = np.array([run.theta for run in runs])
     rows: list[tuple[Cell, ...]] = [
-        (p.name, p.unit, *_quartiles(values), runs_phrase(p, values, without_effect))
+        (p.name, p.unit, *_quartiles(values), _flag(p, values, without_effect))
         for p, values in zip(parameters.parameters, theta.T, strict=True)
     ]
     rows.append(("rms output error", "deg", *_quartiles(np.degrees([run.rms for run in runs])), ""))
@@ -110,3 +91,13 @@ def runs_table(parameters: ParameterSet, runs: Sequence[RunResult]) -> Table:
 def _quartiles(values: Array) -> tuple[float, ...]:
     low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1])
     return float(median), float(low), float(q1), float(q3), float(high)
+
+
+def _flag(parameter: Parameter, values: Array, without_effect: Collection[str]) -> str:
+    """Say what is to be known about a parameter over several runs, values of shape (N,); may be empty."""
+    if not parameter.lower < parameter.upper or (parameter.fixed is not None and not np.ptp(values)):
+        return Flag.FIXED.value
+    if parameter.name in without_effect:
+        return Flag.NO_EFFECT.value
+    counts = ((side, int(np.sum(at))) for side, at in at_bounds(parameter, values))
+    return ", ".join(f"at {side} bound in {n} of {len(values)} runs" for side, n in counts if n)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hydroid.errors import HydroidError, RunError
-from hydroid.estimate import NAME, NamedEstimate, read_estimate
+from hydroid.estimate import NAME, FitSummary, read_estimate
 from hydroid.identified_model import ARM, CONFIG
 from hydroid.parameters import Array, ParameterSet
 from hydroid.posterior.flags import Flag
@@ -32,17 +32,12 @@ class RunEstimate:
 
 @dataclass(frozen=True, eq=False)
 class RunResult:
-    """What one run found.
-
-    path: the run's folder. searched: the search's estimate. best: the final one. refined: whether these two
-    differ. without_effect: parameters without effect on the outputs.
-    """
+    """What one run came to: its folder, the search's estimate and the final one, and its summary."""
 
     path: Path
     searched: RunEstimate
     best: RunEstimate
-    refined: bool
-    without_effect: frozenset[str]
+    summary: FitSummary
 
     @property
     def seed(self) -> int:
@@ -53,6 +48,16 @@ class RunResult:
     def rms_deg(self) -> float:
         """Rms output error of the final estimate [deg]."""
         return math.degrees(self.best.rms)
+
+    @property
+    def refined(self) -> bool:
+        """Whether the final estimate is another than the search's."""
+        return self.summary.final != self.summary.searched
+
+    @property
+    def without_effect(self) -> frozenset[str]:
+        """Parameters without effect on the outputs."""
+        return frozenset(n for n, p in self.summary.estimate.items() if p.flag == Flag.NO_EFFECT)
 
 
 @dataclass(frozen=True)
@@ -139,18 +144,16 @@ def _read(path: Path) -> _Run:
 def _result(path: Path, seed: int, parameters: ParameterSet) -> RunResult:
     file = path / NAME
     summary = read_estimate(file)
-    names = list(summary.estimates)
-    if not names or summary.final not in names:
+    if summary.final not in summary.estimates:
         raise RunError("is not an estimate that a run has written", where=str(file))
 
-    def estimate(found: NamedEstimate) -> RunEstimate:
-        if found.rms_deg is None:
+    def estimate(name: str) -> RunEstimate:
+        one = summary.estimates[name]
+        if one.rms_deg is None:
             raise RunError("is the estimate of a simulation that diverged", where=str(file))
-        return RunEstimate(seed, parameters.vector(found.values, str(file)), math.radians(found.rms_deg))
+        return RunEstimate(seed, parameters.vector(one.values, str(file)), math.radians(one.rms_deg))
 
-    without = frozenset(name for name, p in summary.estimate.items() if p.flag == Flag.NO_EFFECT)
-    first, last = (estimate(summary.estimates[name]) for name in (names[0], summary.final))
-    return RunResult(path, first, last, summary.final != names[0], without)
+    return RunResult(path, estimate(summary.searched), estimate(summary.final), summary)
 
 
 def _refuse_others(runs: Sequence[_Run]) -> None:

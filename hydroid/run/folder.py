@@ -17,6 +17,7 @@ from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.fitting.fit import Fit
+from hydroid.fitting.summary import summarise
 from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.plant import Plant
@@ -25,7 +26,6 @@ from hydroid.run.checkpoint import CheckpointFile
 from hydroid.run.identity import DESCRIPTION, identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
-from hydroid.run.summary import summarise
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 

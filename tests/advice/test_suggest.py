@@ -10,6 +10,7 @@ from conftest import step_log
 from hydroid import load_settings
 from hydroid.advice.actions import ActionKind, least_squares_information, next_actions
 from hydroid.advice.missing import Verdict, missing_terms
+from hydroid.advice.proposals import advice, setting_line
 from hydroid.advice.residuals import Regressor, residual_checks
 from hydroid.advice.suggest import suggestions
 from hydroid.advice.terms import ExtendedModel, terms
@@ -21,7 +22,7 @@ from hydroid.posterior.open_start import with_open_start
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.report.page_file import write_page
-from hydroid.report.suggestion_report import setting_line, suggestion_content, suggestion_page
+from hydroid.report.suggestion_report import suggestion_page
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import QUANTITIES, SPANS, TARGETS
 from hydroid.settings.problem import ParameterSettings
@@ -201,10 +202,11 @@ def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncert
     result = suggestions(problem, known)
     kinds = {action.kind for action in result.actions}
     assert kinds <= set(ActionKind)
-    page = suggestion_page(problem, result, "here")
-    assert "Freeing delay would lower the rms error" in page.lead
+    advised = advice(problem, result)
+    page = suggestion_page(problem.settings, advised, ["a.csv"], "here")
+    assert page.lead.startswith("Free delay: the rms error is predicted to fall")
     write_page(page, tmp_path)
     assert "parameters.delay={quantity: delay" in (tmp_path / "suggestions.html").read_text(encoding="utf-8")
-    content = suggestion_content(result)
+    content = advised.content
     assert content["missing"][0]["name"] == "delay"
     assert len(content["actions"]) == len(result.actions)

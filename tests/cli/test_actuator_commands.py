@@ -27,7 +27,6 @@ def test_an_estimate_is_drawn_with_the_settings_beside_it(tmp_path: Path):
     (run / "estimate.yaml").write_text("parameters: {A_A: 900, F1: 7.5}\n")
     done = hydroid("plot-actuator", "--params", run / "estimate.yaml", "--out", "out", cwd=tmp_path)
     assert done.stdout == f"{Path('out') / 'actuator.html'}\n"
-    hydroid("report", "out", "--figures", cwd=tmp_path)
     assert (tmp_path / "out" / "figures" / "actuator.svg").stat().st_size > 0
     assert (tmp_path / "out" / "figures" / "actuator.png").read_bytes().startswith(b"\x89PNG")
 

@@ -1,13 +1,16 @@
 """Fits made by hand for the report's tests: any shape of problem, no simulation."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from hydroid.estimate import CurveEstimate, QuantityEstimate
 from hydroid.fitting.fit import Estimate, Fit
+from hydroid.fitting.summary import summarise
+from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
-from hydroid.parameters import Parameter, ParameterSet
+from hydroid.posterior.band import Band
 from hydroid.posterior.covariance import Uncertainty, uncertainty_from
 from hydroid.posterior.delta import precision
 from hydroid.posterior.directions import identifiability
@@ -18,6 +21,7 @@ from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
+from hydroid.run.record import Record, fit_result
 from hydroid.search.descent import Descent, Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -36,15 +40,16 @@ def make_problem(
 ) -> Problem:
     """A problem with everything a report looks at, and no model behind it."""
     problem = object.__new__(Problem)
-    one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
     how = {"segments": {"equal": segments}} | objective
-    problem.settings = FitSettings(
-        parameters=dict.fromkeys(parameters, one), outputs=list(outputs), objective=how
-    )
     fixed = fixed or {}
-    problem.parameters = ParameterSet(
-        tuple(Parameter(name, "kg", low, high, fixed.get(name)) for name, (low, high) in parameters.items())
-    )
+    own = {
+        name: ParameterSettings(
+            quantity="gain", bounds=ends if ends[0] < ends[1] else None, fixed=fixed.get(name)
+        )
+        for name, ends in parameters.items()
+    }
+    problem.settings = FitSettings(parameters=own, outputs=list(outputs), objective=how, scale="linear")
+    problem.parameters = problem.settings.parameter_set()
     rng = np.random.default_rng(3)
     logs = []
     for number, source in enumerate(sources):
@@ -151,6 +156,25 @@ def make_quantities(problem: Problem, uncertain: Uncertainty) -> Quantities:
             **one,
         )
     return Quantities(scalars, curves, precision(problem.parameters, uncertain), {})
+
+
+def make_record(
+    problem: Problem, fit: Fit, unseen: Mapping[str, Prediction] | None = None, folder: str = "RUN"
+) -> Record:
+    """What the run of a fit stores, with predictions of unseen logs by name."""
+    logs = {log.source: "f" * 64 for log in problem.logs}
+    identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
+    summary = summarise(problem, fit)
+    return Record(folder, identity, problem.settings, summary, fit_result(problem, fit, None), unseen or {})
+
+
+def make_prediction(
+    log: Log, joints: tuple[int, ...] = (2,), fit: str = "hyd", error: float = 0.01, band: bool = True
+) -> Prediction:
+    """An unseen log that is predicted with a constant error [rad], as the fit leads to expect."""
+    response = log.angle[:, [joint - 1 for joint in joints]] - error
+    bands = {j: Band(0.01, np.full(len(log.time), 0.02), 1.0, error, 0.01, 0.02) for j in joints if band}
+    return Prediction(fit, log, joints, {fit: response}, bands, unseen=True)
 
 
 def make_uncertainty(

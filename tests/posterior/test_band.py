@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import hydroid
-from hydroid.fitting.validation import error_indices
+from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
 from hydroid.posterior.band import Band, prediction_bands, start_effects
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.validation_report import Validation, validation_page
+from hydroid.report.comparison import validation_page
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 CHANGES = {
@@ -56,10 +56,8 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
         start = start_effects(Problem(settings, [log]), model.theta, {2: band.noise})[2]
         assert band.error**2 == pytest.approx(band.expected**2 - np.sum(start**2) / len(log.time), rel=0.3)
         assert band.limit > band.expected
-    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
-    page = validation_page([Validation("one", log, response, indices, {2: band})])
-    (verdict,) = page.sections[1].points
-    assert ("is clearly larger than the fitted logs" in verdict) is limits
+    one = Prediction("one", log, (2,), {"one": response}, {2: band})
+    assert (one.finding.kind == "error not expected") is limits
 
 
 def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
@@ -106,8 +104,8 @@ def test_without_a_band_nothing_is_called_as_expected(fitted):
     log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
     response = predict(model, log, settings.outputs)
     band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf, limit=np.inf)
-    indices = {2: error_indices(log.angle[:, 1], response[:, 0])}
-    page = validation_page([Validation("one", log, response, indices, {2: band})])
-    assert page.sections[1].points[0].endswith("There is no band: the fit leaves this angle open.")
+    one = Prediction("one", log, (2,), {"one": response}, {2: band})
+    assert one.finding.kind == "error without band"
+    page = validation_page([one], settings.arm)
     assert page.verdict is not None
     assert [light.state for light in page.verdict.lights][-1] == "open"

@@ -14,7 +14,7 @@ from hydroid.errors import RunError
 from hydroid.estimate import read_estimate
 from hydroid.posterior.delta import stored_precision
 from hydroid.prediction import simulate_log
-from hydroid.report.quantities_report import best_known, curves_csv, quantity_table
+from hydroid.report.quantities_report import curves_csv, quantity_table
 
 TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
 FIXED = {"I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
@@ -88,14 +88,11 @@ def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):
     np.testing.assert_array_equal(saved.interval, found.interval)
 
 
-def test_the_report_tells_the_best_known_and_names_what_is_not(fitted):
+def test_the_report_has_the_quantities_that_are_determined(fitted):
     quantities = fitted.fit.quantities
-    table = quantity_table(quantities)
-    labels = [row[1] for row in table.rows]
-    heading, *lines = best_known(quantities)
-    assert "95 %" in heading
-    assert 3 <= len(lines) <= 6
-    assert all(any(label in line for label in labels) for line in lines)
+    table = quantity_table(fitted.summary, fitted.problem.settings.arm.joint_names)
+    known = [q.label for q in quantities.scalars.values() if q.within <= 1.0]
+    assert [row[1] for row in table.rows] == known
     rows = curves_csv(quantities.curves).splitlines()
     assert len(rows) == 1 + sum(len(curve.at) for curve in quantities.curves.values())
 

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_fits import make_fit, make_problem
+from report_fits import make_fit, make_prediction, make_problem, make_record
 
-from hydroid.fitting.validation import error_indices
+from hydroid.report.comparison import validation_page
 from hydroid.report.fit_report import fit_page
 from hydroid.report.page_file import write_page
-from hydroid.report.validation_report import Validation, validation_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -75,10 +74,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     fit = make_fit(problem, effects=(1e-3, 1e-3, 0.0, 1e-3))
     folder = tmp_path_factory.mktemp("pages")
     log = replace(problem.logs[0], source="unseen.csv")
-    indices = {2: error_indices(log.angle[:, 1], log.angle[:, 1] + 0.01)}
-    results = [Validation(name, log, log.angle[:, [1]] + 0.01, indices, fitted=False) for name in ("a", "b")]
-    identity = {"hydroid": "0", "mujoco": "4", "logs": {"a.csv": "f" * 64}}
-    for page in (fit_page(identity, problem, fit), validation_page(results)):
+    results = [make_prediction(log, fit=name) for name in ("a", "b")]
+    arm = problem.settings.arm
+    for page in (fit_page(make_record(problem, fit)), validation_page(results, arm)):
         write_page(page, folder)
     return {name: folder / f"{name}.html" for name in ("report", "validation")}
 
@@ -93,7 +91,7 @@ def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, width: 
     assert found["charts"] > 0
     assert found["empty"] == 0
     assert found["unnamed"] == 0
-    assert (found["moved"] > 0) == (name == "report")  # these validations know no arm
+    assert found["moved"] > 0
     levels = found["headings"]
     assert levels[0] == 1
     assert np.max(np.diff(levels)) <= 1

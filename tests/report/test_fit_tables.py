@@ -7,17 +7,13 @@ import pytest
 from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.findings import Finding
-from hydroid.fitting.findings import fit_findings
-from hydroid.fitting.validation import error_indices
-from hydroid.posterior.directions import identifiability
-from hydroid.report.fit_tables import objective_table, parameter_table
+from hydroid.fitting.summary import summarise
+from hydroid.fitting.validation import error_indices, fitted, pooled_indices
 from hydroid.report.page import log_names
-from hydroid.report.phrases import parameter_advice
-from hydroid.report.responses import joint_responses
+from hydroid.report.parameters_report import parameter_table
+from hydroid.report.predictions import error_table
 from hydroid.report.spread import spread_table
 from hydroid.report.table import Table
-from hydroid.report.uncertainty_report import UncertaintyStudy, interval_table
-from hydroid.report.validation_report import Validation, validation_page
 from hydroid.run.collection import RunEstimate
 
 
@@ -36,76 +32,55 @@ def with_theta(fit, problem, effects=None, **values: float):
 def test_every_estimate_of_every_parameter_is_in_the_table():
     problem = make_problem()
     fit = make_fit(problem)
-    table = parameter_table(problem, fit)
+    table = parameter_table(problem.settings, summarise(problem, fit))
     assert column(table, "name") == list(MODEL)
-    for name, header in {"average": "search (average)", "best": "best", "refined": "refined"}.items():
-        assert column(table, header) == list(fit.estimates[name].theta)
+    for name, estimate in fit.estimates.items():
+        assert column(table, name) == list(estimate.theta)
     assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.effects))
     assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
     assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
     assert set(table.optional) < set(table.header)
 
 
-def test_flags_name_what_the_data_cannot_tell():
+def test_flags_and_findings_name_what_the_data_cannot_tell():
     problem = make_problem(fixed={"D": 100.0})
     effects = (1e-3, 0.0, 0.0, 1e-3)
     fit = make_fit(problem, effects=effects)
     low, high = MODEL["K"]
-    assert column(parameter_table(problem, fit), "flag") == ["", "fixed", "no effect", ""]
+    summary = summarise(problem, fit)
+    assert column(parameter_table(problem.settings, summary), "flag") == ["", "fixed", "no effect", ""]
+    assert Finding("no effect", "note", ("M1",)) in summary.findings
     at = with_theta(fit, problem, effects, K=low + 1e-4 * (high - low), M2=MODEL["M2"][1])
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
-    assert column(parameter_table(problem, at), "flag") == expected
+    assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
+    assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
     off = with_theta(fit, problem, effects, K=low + 2e-3 * (high - low))
-    assert column(parameter_table(problem, off), "flag")[0] == ""
-    assert any(sentence.startswith("M1: no effect") for sentence in parameter_advice(problem, fit))
-    assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in fit_findings(problem, at)
-    assert not fit_findings(problem, replace(off, estimates={"refined": off.best}))
+    off = replace(off, estimates={"refined": off.best})
+    assert not [f for f in summarise(problem, off).findings if f.level != "note"]
 
 
 def test_errors_are_those_of_the_responses():
     problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
     fit = make_fit(problem)
-    table = objective_table(problem, fit)
-    assert len(table.rows) == len(fit.estimates) * (4 + 1)
-    everything = [row for row in table.rows if row[1] == "all"]
-    for row, estimate in zip(everything, fit.estimates.values(), strict=True):
-        assert row[4] == pytest.approx(np.degrees(estimate.rms))
-        assert row[-1] == pytest.approx(np.degrees(estimate.overall))
-        assert row[5] == pytest.approx(row[-1])  # the norm is the largest error
+    table = error_table(fitted(problem, fit), problem.settings.arm)
+    assert column(table, "joint")[:4] == ["shoulder", "elbow", "shoulder", "elbow"]
+    everything = [row for row in table.rows if row[1] == "all fitted"]
+    assert [row[0] for row in everything] == [fit.final, *(n for n in fit.estimates if n != fit.final)]
+    for row in everything:
+        assert row[5] == pytest.approx(np.degrees(fit.estimates[row[0]].rms))
 
 
 def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
     problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
-    fit = make_fit(problem, names=("best",))
-    *_, everything = objective_table(problem, fit).rows
-    error = spread = 0.0
-    for response in joint_responses(problem, fit):
-        error += np.sum((response.measured - response.simulated["search (best)"]) ** 2)
-        spread += np.sum((response.measured - np.mean(response.measured)) ** 2)
-    assert everything[6] == pytest.approx(100 * (1 - np.sqrt(error / spread)))
+    pairs = [p.pair(joint) for p in fitted(problem, make_fit(problem)) for joint in p.joints]
+    error = sum(np.sum((measured - simulated) ** 2) for measured, simulated in pairs)
+    spread = sum(np.sum((measured - np.mean(measured)) ** 2) for measured, _ in pairs)
+    assert pooled_indices(pairs).fit == pytest.approx(100 * (1 - np.sqrt(error / spread)))
 
 
 def test_a_joint_that_moves_by_rounding_has_no_fit():
-    log = make_problem().logs[0]
-    rest = 0.3 + 1e-16 * np.arange(len(log.time))
-    indices = {2: error_indices(rest, rest + 0.1)}
-    table = validation_page([Validation("ga", log, rest[:, None] + 0.1, indices)]).tables["validation"]
-    assert "| – |" in table.markdown()
-
-
-def test_a_relative_objective_has_no_unit():
-    problem = make_problem(relative=True, norm=2)
-    fit = make_fit(problem)
-    overall = [e.overall for e in fit.estimates.values()]
-    assert column(objective_table(problem, fit), "objective [-]") == overall
-
-
-def test_joint_responses_cut_the_long_row_apart_again():
-    problem = make_problem(("a.csv", "b.csv", "c.csv"), outputs=(2, 5))
-    records = joint_responses(problem, make_fit(problem))
-    assert np.array_equal(np.concatenate([r.measured for r in records]), problem.measured)
-    assert [r.joint for r in records] == [2, 5] * 3
-    assert all(len(half) == len(r.time) for r in records for half in r.bands.values())
+    rest = 0.3 + 1e-16 * np.arange(50)
+    assert np.isnan(error_indices(rest, rest + 0.1).fit)
 
 
 @pytest.mark.parametrize(
@@ -131,18 +106,3 @@ def test_the_spread_over_runs_is_median_quartiles_and_flags_whatever_the_order()
     bounds = ["at upper bound in 3 of 3 runs", "fixed", "no effect", "at lower bound in 1 of 3 runs", ""]
     assert column(table, "flag") == bounds
     assert spread_table(problem.parameters, runs[::-1], ["M1"], "refined").rows == table.rows
-
-
-@pytest.mark.parametrize("refits", [5, 200])
-def test_a_bootstrap_says_its_size_and_why_it_gives_no_interval(refits: int):
-    problem = make_problem(fixed={"D": 100.0})
-    uncertainty = make_uncertainty(problem, make_fit(problem).best.theta, (1e-3, 0.0, 0.0, 1e-3))
-    rng = np.random.default_rng(0)
-    drawn = uncertainty.theta * rng.uniform(0.9, 1.1, (refits, 4))
-    study = UncertaintyStudy(problem, "t", uncertainty, identifiability(problem, uncertainty), refits=drawn)
-    table = interval_table(study)
-    low = column(table, "bootstrap from")
-    assert low[0] == pytest.approx(np.quantile(drawn[:, 0], 0.025))
-    assert low[1:3] == [None, -np.inf]  # fixed; no effect, shown as a dash
-    assert f"{refits} refits" in table.note
-    assert ("too few" in table.note) == (refits == 5)

@@ -6,18 +6,19 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from report_fits import make_fit, make_problem, make_uncertainty
 
+from hydroid.fitting.validation import fitted
 from hydroid.posterior.directions import identifiability
 from hydroid.posterior.intervals import THRESHOLD, Profile
 from hydroid.posterior.sweep import Surface
 from hydroid.problem.problem import Evaluation
-from hydroid.report.analysis_report import landscape
-from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.figure import figure, rendered, style
-from hydroid.report.objectives import learning, pareto
-from hydroid.report.responses import draw, joint_responses
+from hydroid.report.chart import Chart, Mark, Panel, figure
+from hydroid.report.objectives import contours, learning, pareto
+from hydroid.report.predictions import JointResponse, draw, joint_responses
+from hydroid.report.style import MAX_BINS, decimated, rendered, style
 from hydroid.report.uncertainty_report import UncertaintyStudy, draw_profiles
 from hydroid.settings.problem import ObjectiveSettings
 
@@ -30,19 +31,30 @@ def _styled():
         yield
 
 
-def draw_all(problem, fit) -> list[Chart]:
+def responses(problem, fit) -> list[JointResponse]:
+    return joint_responses(fitted(problem, fit), problem.settings.arm)
+
+
+def drawn_front(problem, fit) -> Chart:
+    evaluation = fit.front[1]
+    objectives = np.column_stack([evaluation.segments, evaluation.overall])
+    segments = {name: fit.estimates[name].segments for name in (fit.final, *fit.estimates)}
+    return pareto(objectives, segments, problem.settings.objective)
+
+
+def draw_all(problem, fit) -> list[Figure | Chart]:
     objective = problem.settings.objective
     return [
-        *(draw(response) for response in joint_responses(problem, fit)),
-        learning(fit, objective),
-        pareto(fit, objective),
+        *(draw(response) for response in responses(problem, fit)),
+        learning(fit.history, objective),
+        drawn_front(problem, fit),
     ]
 
 
-def check(chart: Chart) -> None:
-    plain = json.loads(json.dumps(chart.plain(), allow_nan=False))
-    assert Chart.of(plain).plain() == plain
-    drawn = figure(chart)
+def check(drawn: Figure | Chart) -> None:
+    if isinstance(drawn, Chart):
+        json.dumps(drawn.plain(), allow_nan=False)
+        drawn = figure(drawn)
     drawn.draw_without_rendering()
     for axes in drawn.axes:
         assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
@@ -85,7 +97,7 @@ def test_any_fit_can_be_drawn(shape: str):
     fit = make_fit(problem, **of_fit)
     for drawn in draw_all(problem, fit):
         if shape == "names without glyphs":
-            rendered(drawn)  # with boxes, without a warning
+            rendered(figure(drawn) if isinstance(drawn, Chart) else drawn)  # with boxes, without a warning
         else:
             check(drawn)
 
@@ -100,21 +112,20 @@ def test_what_is_not_finite_is_left_out():
     broken = replace(fit, history=history, front=(fit.front[0], Evaluation(segments, fit.front[1].overall)))
     for drawn in draw_all(problem, broken):
         check(drawn)
-    check(learning(replace(fit, history=np.full((2, 6), np.inf)), problem.settings.objective))
-    check(learning(replace(fit, history=np.empty((0, 6))), problem.settings.objective))
+    check(learning(np.full((2, 6), np.inf), problem.settings.objective))
+    check(learning(np.empty((0, 6)), problem.settings.objective))
 
 
 def test_the_response_shows_measured_angle_every_estimate_residual_and_command():
     problem = make_problem()
     fit = make_fit(problem)
-    (record,) = joint_responses(problem, fit)
+    (record,) = responses(problem, fit)
     upper, middle, lower = draw(record).panels
     measured = np.degrees(record.measured)
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     for name, estimate in fit.estimates.items():
-        label = name if name != "average" else "search (average)"
         simulated = np.degrees(estimate.responses[0][:, 0])
-        ((label, mark),) = labelled(upper, f"{label} (").items()
+        ((label, mark),) = labelled(upper, f"{name} (").items()
         assert mark.y == pytest.approx(simulated)
         assert f"{np.degrees(estimate.rms):.3g}"[:3] in label
         assert labelled(middle)[label].y == pytest.approx(measured - simulated)
@@ -122,16 +133,17 @@ def test_the_response_shows_measured_angle_every_estimate_residual_and_command()
     band = labelled(middle)["95 % band of refined"]
     assert np.all(band.end > 0)
     assert np.array_equal(band.y, -band.end)
-    assert np.array_equal(lower.marks[0].y, record.command)
+    assert np.array_equal(lower.marks[0].y, record.of.log.command[:, 1])
 
 
 def test_pressures_are_drawn_where_they_are_logged():
     problem = make_problem()
-    (record,) = joint_responses(problem, make_fit(problem))
-    pressed = replace(record, pressures=np.tile([5e6, 2e6], (len(record.time), 1)))
+    (record,) = responses(problem, make_fit(problem))
+    pressure = np.tile([5e6, 2e6], (*record.of.log.angle.shape, 1))
+    pressed = replace(record, of=replace(record.of, log=replace(record.of.log, pressure=pressure)))
     panels = draw(pressed).panels
     assert [panel.y for panel in panels] == ["angle [deg]", "residual [deg]", "pressure [bar]", "command [%]"]
-    assert labelled(panels[2])["chamber A"].y == pytest.approx(np.full(len(record.time), 50.0))
+    assert labelled(panels[2])["chamber A"].y == pytest.approx(np.full(len(record.measured), 50.0))
 
 
 def test_a_response_that_runs_away_does_not_flatten_the_others():
@@ -139,7 +151,7 @@ def test_a_response_that_runs_away_does_not_flatten_the_others():
     fit = make_fit(problem)
     away = replace(fit.estimates["utopia"], responses=(np.linspace(0, 1e6, 120)[:, None],))
     fit = replace(fit, estimates=fit.estimates | {"utopia": away})
-    record = joint_responses(problem, fit)[0]
+    record = responses(problem, fit)[0]
     reach = 4 * max(np.degrees(np.ptp(record.measured)), 1.0)
     for panel, middle in zip(draw(record).panels, (np.degrees(record.measured.mean()), 0.0), strict=False):
         (runaway,) = labelled(panel, "utopia").values()
@@ -150,10 +162,10 @@ def test_a_response_that_runs_away_does_not_flatten_the_others():
 def test_the_front_is_one_line_with_gaps_and_estimates_on_top():
     problem = make_problem()
     fit = make_fit(problem, front=9)
-    (panel,) = pareto(fit, problem.settings.objective).panels
+    (panel,) = drawn_front(problem, fit).panels
     front, *others = panel.marks
     order = np.argsort(fit.front[1].overall, kind="stable")
-    drawn = np.append(front.y, np.nan).reshape(9, -1)
+    drawn = front.y.reshape(9, -1)
     assert drawn[:, :-1] == pytest.approx(np.degrees(fit.front[1].segments)[order])
     assert np.isnan(drawn[:, -1]).all()
     assert len({mark.label for mark in others if mark.label}) == len(fit.estimates)
@@ -162,7 +174,7 @@ def test_the_front_is_one_line_with_gaps_and_estimates_on_top():
 def test_the_learning_curve_shows_best_and_median_in_deg():
     problem = make_problem()
     fit = make_fit(problem)
-    values = labelled(learning(fit, problem.settings.objective).panels[0])
+    values = labelled(learning(fit.history, problem.settings.objective).panels[0])
     assert values["best so far"].y == pytest.approx(np.degrees(fit.history[:, 4]))
     assert values["median of the population"].y == pytest.approx(np.degrees(fit.history[:, 5]))
 
@@ -173,7 +185,7 @@ def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bo
     fit = make_fit(problem)
     history = fit.history.copy()
     history[:, 4] = history[:, 5] = np.geomspace(0.1 * ratio, 0.1, 7)
-    chart = learning(replace(fit, history=history), problem.settings.objective)
+    chart = learning(history, problem.settings.objective)
     assert chart.panels[0].log_y == log
     drawn = figure(chart)
     drawn.draw_without_rendering()
@@ -189,8 +201,8 @@ def test_a_file_leaves_out_what_is_off_and_has_every_label_once():
     drawn = figure(chart, "A title")
     assert [len(axes.lines) for axes in drawn.axes] == [1, 1]
     apart = Chart((Panel("x", "y", (shown,)), Panel("x", "y", (replace(shown, label="c"),))))
-    assert apart.apart
-    assert not chart.apart
+    assert apart.legends_apart
+    assert not chart.legends_apart
 
 
 def test_every_kind_of_mark_can_be_drawn():
@@ -203,31 +215,18 @@ def test_every_kind_of_mark_can_be_drawn():
         Mark("spans", x[:1], end=x[1:2]),
         Mark("rule", y=x[:1], look="dashed"),
         Mark("rule", x[:1], look="dotted"),
-        Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
-        Mark("text", x, x, texts=("a", "b", "c")),
     )
     check(
         Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4], names=("a", "b"))), columns=2)
     )
 
 
-def test_validation_overlays_every_fit():
-    problem = make_problem()
-    record = joint_responses(problem, make_fit(problem))[0]
-    simulated = {f"fit {i} $x$": record.measured + 0.01 * i for i in range(9)} | {
-        "gone": record.measured * np.nan
-    }
-    chart = draw(replace(record, simulated=simulated))
-    check(chart)
-    assert len(labelled(chart.panels[0])) == 11
-    assert list(labelled(chart.panels[0]))[-1] == "gone (diverged)"
-
-
 def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
     fit = make_fit(make_problem())
 
     def drawn() -> tuple[bytes, bytes]:
-        return rendered(pareto(fit, ObjectiveSettings()))
+        with style():
+            return rendered(figure(drawn_front(make_problem(), fit)))
 
     plain = drawn()
     with mpl.rc_context({"font.size": 30.0, "svg.fonttype": "none", "axes.grid": False}):
@@ -238,26 +237,23 @@ def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
 
 def test_a_dollar_in_a_name_is_a_dollar():
     problem = make_problem(("a$x^2$.csv",))
-    drawn = figure(draw(joint_responses(problem, make_fit(problem))[0]))
+    drawn = figure(draw(responses(problem, make_fit(problem))[0]))
     named = [text for text in drawn.findobj(Text) if "$" in text.get_text()]
     assert named
     assert not any(text.get_parse_math() for text in named)
 
 
-@pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])
-def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
+@pytest.mark.parametrize("samples", [1, 7, 2 * MAX_BINS, 2 * MAX_BINS + 1, 100_003])
+def test_a_decimated_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     rng = np.random.default_rng(0)
     time, curve = np.arange(samples) * 0.01, rng.normal(size=samples).cumsum()
-    thin = Mark("line", time, curve).thinned(1000)
-    kept = thin.y
-    assert len(kept) <= 2002
-    assert np.array_equal(curve[np.searchsorted(time, thin.x)], kept)
+    at, kept = decimated(time, curve)
+    assert len(kept) <= max(2 * MAX_BINS + 2, 3)
+    assert np.array_equal(curve[np.searchsorted(time, at)], kept)
     assert (kept[0], kept[-1], kept.min(), kept.max()) == (curve[0], curve[-1], curve.min(), curve.max())
-    band = Mark("band", time, -np.abs(curve), np.abs(curve)).thinned(1000)
-    assert (band.y.min(), band.end.min()) == (-np.abs(curve).max(), np.abs(curve).min())
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
-        assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
+        assert np.isnan(decimated(time, gap)[1]).any()
 
 
 def make_surface(estimate: tuple[float, float]) -> Surface:
@@ -270,11 +266,11 @@ def make_surface(estimate: tuple[float, float]) -> Surface:
 def test_a_surface_marks_the_estimate_and_the_lowest_point_where_they_are():
     for estimate in ((0.2, 200.0), (0.21, 260.0)):
         surface = make_surface(estimate)
-        chart = landscape(surface, ObjectiveSettings())
-        check(chart)
-        marks = {mark.label.split(" (")[0]: mark for mark in chart.panels[0].marks}
+        drawn = contours(surface, ObjectiveSettings())
+        check(drawn)
+        marks = {line.get_label().split(" (")[0]: line for line in drawn.axes[0].lines}
         for label, (x, y, *_) in (("estimate", estimate), ("lowest point drawn", surface.lowest)):
-            assert (marks[label].x[0], marks[label].y[0]) == pytest.approx((x, y))
+            assert (marks[label].get_xdata()[0], marks[label].get_ydata()[0]) == pytest.approx((x, y))
         assert surface.lowest[2] <= surface.estimate_error
 
 

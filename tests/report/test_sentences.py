@@ -1,49 +1,25 @@
-"""Sentences whose words depend on numbers: what an action brings, and whether an error is as expected."""
+"""What suggestions propose: findings that change something, and commands that can be pasted."""
 
-import numpy as np
 import pytest
 import yaml
 from report_fits import make_problem
 
 from hydroid import load_settings
-from hydroid.advice.actions import Action, ActionKind
 from hydroid.advice.missing import TermTest, Verdict
+from hydroid.advice.proposals import action_findings, freeing_command, setting_line
 from hydroid.advice.terms import Term
-from hydroid.fitting.validation import error_indices
-from hydroid.posterior.band import Band
-from hydroid.report.suggestion_report import action_effect, freeing_command, setting_line
-from hydroid.report.validation_report import Validation, validation_page
 from hydroid.settings.load import parse_override
-
-
-def test_an_action_names_what_improves_beside_what_it_states():
-    action = Action(ActionKind.STATE, "D", 8, (7, 8), "C", (0.015, 0.011), 1.2, "dead time", (0.2, 0.1))
-    assert action_effect(action) == (
-        "Besides D itself, C improves most: standard deviation 1.5 % to 1.1 %. Of the "
-        "quantities, dead time improves most: standard deviation 20 % to 10 %"
-    )
+from hydroid.words import hint
 
 
 @pytest.mark.parametrize(
-    ("inside", "error", "words"),
-    [
-        (0.96, 0.01, "96 % of the samples lie inside the band: the error (0.57°) is no larger than"),
-        (0.94, 0.03, "the error (1.7°) is not clearly larger than the fitted logs lead to expect (1.1°)"),
-        (
-            0.5,
-            0.2,
-            "The error (11°) is clearly larger than the fitted logs lead to expect (1.1°; by",
-        ),
-    ],
+    ("after", "expected"), [(11.0, "C would be known to 11 % instead of 15 %."), (15.0, "")]
 )
-def test_a_validation_says_whether_the_error_is_as_expected(inside: float, error: float, words: str):
-    log = make_problem().logs[0]
-    band = Band(0.015, np.full(len(log.time), 0.04), inside, error, 0.02, 0.035)
-    indices = {2: error_indices(log.angle[:, 1], log.angle[:, 1] + error)}
-    page = validation_page([Validation("hyd", log, log.angle[:, [1]] + error, indices, {2: band}, False)])
-    assert words in page.sections[1].points[0]
-    state = {light.question: light.state for light in page.verdict.lights}
-    assert state["As the fitted logs lead to expect"] == ("fair" if inside < 0.9 else "good")
+def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str):
+    action = {"action": "state", "of": "D", "parameter": "C", "before_percent": 15.0, "after_percent": after}
+    action |= {"quantity": None, "quantity_before_percent": None, "quantity_after_percent": None}
+    found = action_findings({"actions": [action]}, make_problem().settings)
+    assert " ".join(hint(finding) for finding in found) == expected
 
 
 def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1():

@@ -1,0 +1,261 @@
+"""What a finished run stores, and from which its report is drawn: `estimate.yaml` and `result.npz`.
+
+    record = load_record("runs/a")
+    record.summary.values, record.result.fitted[0].response
+
+`result.npz` holds a tree of dataclasses: its arrays as they are, and what is left as JSON under `content`. A
+validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
+"""
+
+import io
+import json
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from hydroid.advice.proposals import Advice
+from hydroid.errors import RunError
+from hydroid.estimate import NAME, FitSummary, read_estimate
+from hydroid.files import file_name, write_atomic
+from hydroid.fitting.fit import Fit
+from hydroid.fitting.validation import Prediction, fitted
+from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.parameters import Array
+from hydroid.posterior.covariance import Uncertainty
+from hydroid.problem.problem import Problem
+from hydroid.run.folder import RunFolder
+from hydroid.settings.fit import FitSettings
+
+RESULT, VALIDATIONS = "result.npz", "validations"
+"""names of the file of arrays, and of the folder of unseen logs"""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What one refinement took: its iterations and simulations, and why it ended."""
+
+    name: str
+    iterations: int
+    simulations: int
+    ending: str
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """One compared signal: its rms residual and its noise in `unit`, and the noise's correlation."""
+
+    log: int
+    joint: int
+    signal: str
+    unit: str
+    residual: float
+    level: float
+    correlation_s: float
+    effective_samples: float
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """The arrays of a fit.
+
+    Attributes:
+        fitted: what its estimates make of its logs.
+        history: of the search, shape (G, len(HISTORY)).
+        front: non-dominated candidates, (n, P), with objectives by segment and overall, (n, S + 1).
+        segments: objectives of each estimate by segment, shape (S,).
+        refinements: what each took.
+        noise: of every compared signal.
+        advice: None where the final estimate diverged.
+    """
+
+    fitted: tuple[Prediction, ...]
+    history: Array
+    front: tuple[Array, Array]
+    segments: Mapping[str, Array]
+    refinements: tuple[Effort, ...]
+    noise: tuple[ChannelNoise, ...]
+    advice: Advice | None
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A finished run.
+
+    Attributes:
+        folder: where it is, as a command takes it.
+        identity: versions, and hashes of its logs by source.
+        settings: after a joint refinement with every parameter free that was refined.
+        summary: the final estimate, and the others.
+        result: arrays.
+        validations: predictions of unseen logs by name.
+    """
+
+    folder: str
+    identity: Mapping[str, Any]
+    settings: FitSettings
+    summary: FitSummary
+    result: FitResult
+    validations: Mapping[str, Prediction]
+
+    @property
+    def given(self) -> str:
+        """Its logs as a command takes them."""
+        return " ".join(shlex.quote(p.log.source) for p in self.result.fitted)
+
+    @property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """Of all logs, the unseen ones first."""
+        return (*self.validations.values(), *self.result.fitted)
+
+
+def fit_result(problem: Problem, fit: Fit, advice: Advice | None) -> FitResult:
+    """Return what a run stores beside its summary; `problem` is that of the last refinement."""
+    theta, evaluation = fit.front
+    return FitResult(
+        fitted(problem, fit),
+        fit.history,
+        (theta, np.column_stack([evaluation.segments, evaluation.overall])),
+        {name: estimate.segments for name, estimate in fit.estimates.items()},
+        tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
+        channel_noise(problem, fit.uncertainty),
+        advice,
+    )
+
+
+def channel_noise(problem: Problem, known: Uncertainty) -> tuple[ChannelNoise, ...]:
+    """Return the noise of every compared signal."""
+    rows: list[ChannelNoise] = []
+    for channel, noise in zip(problem.channels, known.noise, strict=True):
+        angle = channel.quantity == "angle"
+        factor = (np.degrees(1) if angle else 1e-5) / channel.weight
+        residual = factor * float(np.sqrt(np.mean(known.jacobian.residual[channel.rows] ** 2)))
+        rows.append(
+            ChannelNoise(
+                channel.log,
+                channel.joint,
+                channel.quantity.replace("_", " "),
+                "deg" if angle else "bar",
+                residual,
+                factor * noise.level,
+                noise.correlation_time * problem.logs[channel.log].period,
+                noise.effective_sample_size,
+                noise.source,
+            )
+        )
+    return tuple(rows)
+
+
+def save_result(folder: Path, result: FitResult) -> None:
+    """Write `result.npz`.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    write_atomic(folder / RESULT, _packed(result))
+
+
+def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
+    """Store predictions of unseen logs, under the logs' names, in the run that a model is from; return it.
+
+    Nothing is stored of a model that is from no run, or whose settings are not the run's. A log that was
+    validated before is replaced.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    source = Path(model.source)
+    folder = source.parent
+    unseen = [p for p in predictions if p.unseen]
+    if source.name != NAME or not (folder / RESULT).is_file() or not unseen:
+        return None
+    if load_identified(source).settings != model.settings:
+        return None
+    taken: set[str] = set()
+    for one in unseen:
+        write_atomic(
+            folder / VALIDATIONS / file_name(Path(one.log.source).name, taken) / RESULT, _packed(one)
+        )
+    return folder
+
+
+def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:
+    """Read a finished run; the validations named in `without` are left out.
+
+    Raises:
+        RunError: the folder holds no finished run, it is damaged, or there is no such validation.
+    """
+    path = Path(folder)
+    identity = RunFolder(path).identity()
+    settings, summary = RunFolder(path).settings(), read_estimate(path / NAME)
+    if summary.final == "joint":
+        settings = settings.freed()
+    files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
+    names = [file.parent.name for file in files]
+    if missing := [name for name in without if name not in names]:
+        hint = f"it has {', '.join(names)}" if names else "it has none"
+        raise RunError(f"has no validation {missing[0]}", where=str(folder), hint=hint)
+    kept = {file.parent.name: _read(file, Prediction) for file in files if file.parent.name not in without}
+    return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), kept)
+
+
+def _packed(value: object) -> bytes:
+    """Return a tree of dataclasses, mappings, sequences and arrays as npz without pickle."""
+    arrays: dict[str, np.ndarray] = {}
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            arrays[name := f"a{len(arrays)}"] = value
+            return {"array": name}
+        if is_dataclass(value):
+            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        if isinstance(value, Mapping):
+            return {str(key): plain(one) for key, one in value.items()}
+        if isinstance(value, tuple | list):
+            return [plain(one) for one in value]
+        return value.item() if isinstance(value, np.generic) else value
+
+    content = np.frombuffer(json.dumps(plain(value)).encode(), dtype=np.uint8)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, content=content, **arrays)  # pyright: ignore[reportArgumentType]
+    return buffer.getvalue()
+
+
+def _read(file: Path, kind: type[T]) -> T:
+    """Read a tree that `_packed` made, as a dataclass.
+
+    Raises:
+        RunError: it cannot be read, or another version wrote it.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        return _adapter(kind).validate_python((_filled(json.loads(arrays["content"].tobytes()), arrays),))[0]
+    except FileNotFoundError:
+        raise RunError("holds no result", where=str(file.parent), hint="finish the fit: --resume") from None
+    except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
+        what = f"cannot be read ({type(error).__name__})"
+        raise RunError(what, where=str(file), hint="fit again with this version") from None
+
+
+def _filled(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    if isinstance(value, dict):
+        if value.keys() == {"array"}:
+            return arrays[value["array"]]
+        return {key: _filled(one, arrays) for key, one in value.items()}
+    return [_filled(one, arrays) for one in value] if isinstance(value, list) else value
+
+
+@cache
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    # inside a tuple: pydantic takes a configuration for no dataclass by itself
+    one: Any = tuple.__class_getitem__((kind,))
+    return TypeAdapter(one, config=ConfigDict(arbitrary_types_allowed=True))

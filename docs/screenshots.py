@@ -41,7 +41,7 @@ KINDS = {
     "collect": ("collect", "fit-mech", "fit-mech-2"),
     "collisions": ("collisions", ALL_JOINTS),
     "actuator": ("plot-actuator", "--fit", "fit-hyd"),
-    "compare": ("report", "fit-mech", "fit-hyd", "validate"),
+    "compare": ("report", "fit-mech", "fit-mech-2"),
 }
 """the command that makes each report; names of other kinds stand for their folders"""
 WIDTHS = (400, 1400)

@@ -48,7 +48,7 @@ def predict_log(model: IdentifiedModel, log: Log, *, all_pressures: bool = False
     measured: list[int] = []
     if settings.stage == "hyd":
         measured = [j for j in range(log.joints) if log.driven[j]]
-        measured = [j for j in measured if all_pressures or settings.log.pressure_of(j + 1)]
+        measured = [j for j in measured if all_pressures or settings.log.columns("pressure", j + 1)]
     response = _respond(model, log, moving, measured)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hydroid.findings import Finding
+from hydroid.log_words import LOG_WORDS
 
 MOST_NAMES = 4
 """names that `{few}` gives"""
@@ -132,7 +133,7 @@ WORDS: dict[str, Words] = {
         "The logs disagree about {few} by more than the noise explains.",
         "Add logs before you use these values: so few cannot tell why.",
     ),
-}
+} | {kind: Words(*words) for kind, words in LOG_WORDS.items()}
 
 
 def statement(finding: Finding) -> str:

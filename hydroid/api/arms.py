@@ -122,7 +122,7 @@ def simulate_arms(
         RunError: the simulation diverged, or the file cannot be written.
     """
     from hydroid.arm.pair import SIDES
-    from hydroid.log.written import write_logs
+    from hydroid.log import write_logs
 
     model = open_model(model)
     found: dict[str, Log] = {}

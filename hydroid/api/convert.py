@@ -14,7 +14,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import replace_setting, validate
 
 if TYPE_CHECKING:
-    from hydroid.log import ColumnGuess, Finding, Log
+    from hydroid.log import ColumnGuess, Log, LogFinding
 
 MOST_JOINTS = 12
 """of a log whose columns are guessed"""
@@ -25,7 +25,7 @@ class Conversion:
     """A converted log: what was written, what reading it found, and the guess if there were no settings."""
 
     log: "Log"
-    findings: "list[Finding]"
+    findings: "list[LogFinding]"
     guess: "ColumnGuess | None"
 
 
@@ -84,14 +84,15 @@ def convert(
     joints = max(layout.joints, default=1) if settings is None else len(names)
     ranges = np.full((joints, 2), np.inf) * [-1, 1] if settings is None else joint_ranges(settings)
     read, findings = read_log(path, layout, ranges, repair=repair)
-    columns: dict[str, dict[str, dict[str, str] | None] | None] = {}
+    columns: dict[int, dict[str, None] | None] = {}
     pressures = _with_pressures(read)
     for joint in range(1, read.joints + 1):
-        own: dict[str, dict[str, str] | None] = {} if read.measured[joint - 1] else {"angle": None}
-        own |= {"pressure": {}} if joint in pressures else {}
+        own = {} if read.measured[joint - 1] else {"angle": None}
+        own |= {} if joint in pressures else {"pressure": None}
         known = read.measured[joint - 1] or read.driven[joint - 1]
-        columns[str(joint)] = own if known else None
-    write_log(Path(out), read, LogSettings.model_validate({"joints": columns}), exact=True)
+        columns[joint] = own if known else None
+    plain = LogSettings.model_validate({"pressure": {}, "joints": columns})
+    write_log(Path(out), read, plain, exact=True)
     return Conversion(replace(read, source=str(out)), findings, guess)
 
 

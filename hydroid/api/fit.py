@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hydroid.api.look import LogSources
     from hydroid.fitting.fit import Fit
     from hydroid.fitting.fit import Watcher as Progress
-    from hydroid.log import Finding, Log
+    from hydroid.log import Log, LogFinding
     from hydroid.parameters import Array
     from hydroid.problem.problem import Problem, Spread
     from hydroid.run.folder import RunFolder
@@ -74,7 +74,7 @@ def fit(
     resume: bool = False,
     progress: "Progress | None" = None,
     workers: "Spread | None" = None,
-    findings: "Sequence[Finding]" = (),
+    findings: "Sequence[LogFinding]" = (),
 ) -> FitResult:
     """Fit parameters to logs.
 

@@ -15,7 +15,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
 if TYPE_CHECKING:
-    from hydroid.log import Finding, Log
+    from hydroid.log import Log, LogFinding
 
     LogSources = str | Path | Log | Sequence[str | Path | Log]
 
@@ -67,12 +67,12 @@ def read_logs(logs: "LogSources", settings: FitSettings, *, repair: bool = False
 
 def read_with_findings(
     logs: "LogSources", settings: FitSettings, *, repair: bool = False
-) -> "tuple[list[Log], list[Finding]]":
+) -> "tuple[list[Log], list[LogFinding]]":
     """Do as `read_logs`, and return the warnings and notes too."""
     from hydroid.log import Log, read_log
 
     read: list[Log] = []
-    found: list[Finding] = []
+    found: list[LogFinding] = []
     for path in [logs] if isinstance(logs, str | Path | Log) else logs:
         if isinstance(path, Log):
             read.append(path)
@@ -125,7 +125,7 @@ class LogCheck:
 
     path: Path
     log: "Log | None"
-    findings: "list[Finding]"
+    findings: "list[LogFinding]"
     moved_deg: dict[int, float] = field(default_factory=dict[int, float])
 
 
@@ -134,7 +134,7 @@ class Check:
     """What `check` found in each file, and in all usable ones together."""
 
     logs: list[LogCheck]
-    findings: "list[Finding]"
+    findings: "list[LogFinding]"
 
 
 def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = False) -> Check:
@@ -150,7 +150,7 @@ def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = F
         settings: of the fit that is to use them.
         repair: fill holes up to `log.repair_s`.
     """
-    from hydroid.log import check_log, motion_findings, moved, survey
+    from hydroid.log import check_log, driven_joints, motion_findings, survey
 
     how: dict[str, Any] = {"outputs": settings.outputs, "repair": repair}
     results: list[LogCheck] = []
@@ -159,8 +159,7 @@ def check(logs: Sequence[str | Path], settings: FitSettings, *, repair: bool = F
         if log is None:
             results.append(LogCheck(path, log, findings))
             continue
-        joints = (np.flatnonzero(log.driven & log.measured) + 1).tolist()
-        motions = {joint: moved(log, joint) for joint in joints}
+        motions = {joint: motion.travel for joint, motion in driven_joints(log).items()}
         results.append(LogCheck(path, log, [*findings, *motion_findings(log)], motions))
     return Check(results, survey([result.log for result in results if result.log]))
 
@@ -211,8 +210,8 @@ def joint_ranges(settings: FitSettings) -> np.ndarray:
     return np.stack([settings.arm.lower, settings.arm.upper], axis=1)
 
 
-def _report(findings: "Sequence[Finding]") -> None:
-    from hydroid.log.log import grouped, in_one_line
+def _report(findings: "Sequence[LogFinding]") -> None:
+    from hydroid.log import grouped, in_one_line
 
     for finding, others in grouped(findings):
         level = logging.WARNING if finding.level == "warning" else NOTE

@@ -20,7 +20,7 @@ from hydroid.cli.output import show
 
 if TYPE_CHECKING:
     from hydroid.api.look import Check, LogCheck
-    from hydroid.log import Finding
+    from hydroid.log import LogFinding
 
 
 def check(
@@ -83,7 +83,7 @@ def _plain(result: "LogCheck") -> dict[str, Any]:
     }
 
 
-def plain_finding(finding: "Finding") -> dict[str, str]:
+def plain_finding(finding: "LogFinding") -> dict[str, str]:
     """Return a finding as JSON holds it."""
     names = ("level", "kind", "what", "where", "hint")
     return {name: getattr(finding, name) for name in names}

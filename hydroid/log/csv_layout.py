@@ -8,19 +8,19 @@ below the names is left out only if it holds no number: any other fault there is
 
 import csv
 import re
-import shlex
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from hydroid.log.clock import is_clock
+from hydroid.units import bare, unit_of
 
 SAMPLE = 400
-"""lines with content, from the first, that are looked at"""
-_UNITS = """s sec secs second seconds ms msec us µs ns min h % pct percent deg ° degree degrees rad mrad 1 -
-none V mV volt volts mA A amp bar mbar Pa kPa MPa psi N kN Nm mm cm m m/s deg/s rad/s °/s l/min rpm Hz kg"""
-UNITS = frozenset(unit.lower() for unit in _UNITS.split())
+"""lines with content, from the first, that are searched"""
+TIME = re.compile(
+    r"(?:.*?[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
+)
+"""a time of day, with or without a date"""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ def find_layout(lines: Sequence[str], wanted: Collection[str] = ()) -> Layout | 
     named = [i for i in texts if not _are_units(rows[i])] or texts
     if not named:
         return _commented(lines, first, separator, usual) or _layout(separator, content[0], rows, [], above)
-    header, names = _names(named, rows, wanted)
+    header, rows[header] = _names(named, rows, wanted)
     below = [i for i in texts if i > header and len(rows[i]) == len(rows[header])]
-    return _layout(separator, header, {**rows, header: names}, below, above)
+    return _layout(separator, header, rows, below, above)
 
 
 def _names(
@@ -84,17 +84,14 @@ def _layout(
     separator: str, header: int, rows: dict[int, list[str]], below: Sequence[int], above: Sequence[int]
 ) -> Layout:
     names, remarks = tuple(rows[header]), list[str]()
-    units = dict[str, str]()
-    for i in below:
-        if _are_units(rows[i]):
-            units |= {n: bare(u) for n, u in zip(names, rows[i], strict=False) if n and bare(u)}
-    before = [i for i in above if i < header]
-    if before:
+    of_units = [i for i in below if _are_units(rows[i])]
+    pairs = [(name, bare(unit)) for i in of_units for name, unit in zip(names, rows[i], strict=False)]
+    units = {name: unit for name, unit in pairs if name and unit}
+    if before := [i for i in above if i < header]:
         remarks.append(f"the names are in line {header + 1}; {_lines(before)} above {_is(before)} left out")
     if units:
         remarks.append(f"line {below[0] + 1} holds units ({', '.join(dict.fromkeys(units.values()))})")
-    others = [i for i in below if not _are_units(rows[i])]
-    if others:
+    if others := [i for i in below if i not in of_units]:
         remarks.append(f"{_lines(others)} below the names {_is(others)} text and left out")
     return Layout(separator, header + 1, names, units, frozenset(i + 1 for i in below), tuple(remarks))
 
@@ -116,10 +113,10 @@ def _separator(sample: Sequence[str]) -> str:
 
     def merit(separator: str) -> tuple[int, int, bool]:
         rows = [split(line, separator) for line in sample]
-        counts = [sum(_counts(c, separator) for c in row) for row in rows]
-        usual = _usual([n if n == len(row) and n > 1 else 0 for n, row in zip(counts, rows, strict=True)])
-        mixed = _usual([n if len(row) > 1 else 0 for n, row in zip(counts, rows, strict=True)])
-        return usual * counts.count(usual), mixed * counts.count(mixed), len(rows[0]) > 1
+        counts = [sum(_counts(c, separator) for c in row) * (len(row) > 1) for row in rows]
+        whole = [n * (n == len(row)) for n, row in zip(counts, rows, strict=True)]
+        usual, mixed = _usual(whole), _usual(counts)
+        return usual * whole.count(usual), mixed * counts.count(mixed), len(rows[0]) > 1
 
     best = max("\t;,", key=merit)
     return " " if merit(best)[1] == 0 and merit(" ")[0] > 0 else best  # cells may hold spaces, or be blank
@@ -133,15 +130,16 @@ def _usual(counts: Sequence[int]) -> int:
 
 def is_content(line: str, separator: str = ",") -> bool:
     """Return whether a line is neither blank, nor empty cells, nor a comment."""
-    bare = line.strip(" \t" + separator)
-    return bare != "" and not bare.startswith("#")
+    return line.strip(" \t" + separator)[:1] not in ("", "#")
 
 
 def split(line: str, separator: str) -> list[str]:
     """Return the cells of a line; of a line in columns of spaces, however many part them."""
-    if separator == " ":
-        return shlex.split(line) if line.count('"') % 2 == 0 and '"' in line else line.split()
-    return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
+    spaces = separator == " "
+    if '"' in line:
+        line = line.strip() if spaces else line
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=spaces))
+    return line.split(None if spaces else separator)
 
 
 def is_number(cell: str, separator: str = ",") -> bool:
@@ -153,18 +151,18 @@ def is_number(cell: str, separator: str = ",") -> bool:
     return "_" not in cell
 
 
+def is_clock(cell: str) -> bool:
+    """Return whether a cell holds a time of day, such as 12:30:05.25 or 2024-05-01T12:30:05."""
+    return len(cell) < 50 and TIME.fullmatch(cell.strip()) is not None
+
+
 def _counts(cell: str, separator: str) -> bool:
     return is_number(cell, separator) or is_clock(cell)
 
 
-def bare(unit: str) -> str:
-    """Return a unit without the brackets around it."""
-    return unit.strip().strip("[]()<>").strip()
-
-
 def _are_units(row: Sequence[str]) -> bool:
     there = [cell for cell in row if cell]
-    return bool(there) and all(bare(cell).lower() in UNITS for cell in there)
+    return bool(there) and all(unit_of(cell) for cell in there)
 
 
 def _distinct(row: Sequence[str]) -> bool:

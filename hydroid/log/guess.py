@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.clock import likely_unit
-from hydroid.log.column_words import Kind, direction, joint_of, kind_of, number_in, unit_of
-from hydroid.log.command_range import likely_pair, likely_range
 from hydroid.log.log import Floats
+from hydroid.log.names import Kind, column_unit, direction, joint_of, kind_of, number_in
+from hydroid.log.ranges import likely_pair, likely_range
 from hydroid.log.table import Table
-from hydroid.settings.log import SECONDS
+from hydroid.units import UNITS, likely_time_unit
 
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """sample periods that are proposed [s]"""
@@ -49,6 +48,11 @@ class _Column:
     unit: str
     values: Floats
     why: str
+    clock: bool
+
+    @property
+    def steps(self) -> Floats:
+        return np.diff(self.values[np.isfinite(self.values)])
 
 
 def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
@@ -63,52 +67,46 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
     Raises:
         LogError: no column looks like a time.
     """
-    columns, clocks = _columns(table)
+    columns = _columns(table)
     time = _time(table, columns)
-    rest = [column for column in columns if column is not time]
-    clock = time.name in clocks
-    unit = "s" if clock else _time_unit(time)
-    step = float(np.nanmedian(np.diff(time.values))) * SECONDS[unit]
-    log: dict[str, Any] = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
-    log["period_s"] = min(PERIODS, key=lambda period: abs(np.log(period / step)))
-    reasons = [
-        f"{time.name}: time in {'dates or times of day' if clock else unit}, {time.why}, every {step:.3g} s"
-    ]
-    angles, why = _by_joint([c for c in rest if c.kind == "angle"], joints)
-    reasons += why
-    commands, why = _by_joint([c for c in rest if c.kind == "command"], joints)
-    reasons += why
-    rad = _in_radians([column for (column, *_) in angles.values()])
-    log["joints"] = {}
-    named = {
-        k: f"joint {k}" if name == f"joint{k}" else f"joint {k} ({name})" for k, name in enumerate(joints, 1)
-    }
+    step = float(np.nanmedian(np.diff(time.values)))
+    unit = "s" if time.clock else time.unit if time.unit in UNITS else likely_time_unit(step) or "s"
+    step *= UNITS[unit].factor
+    said = "dates or times of day" if time.clock else unit
+    reasons = [f"{time.name}: time in {said}, {time.why}, every {step:.3g} s"]
+    others = [column for column in columns if column is not time]
+    angles, commands = (
+        _by_joint([c for c in others if c.kind == k], joints, reasons) for k in ("angle", "command")
+    )
+    unitless = [np.nanmax(np.abs(column.values)) for column, *_ in angles.values() if column.unit == ""]
+    default = "rad" if unitless and max(unitless) <= RADIANS else "deg"
+    entries = dict[int, dict[str, Any]]()
     for joint in sorted({*angles, *commands}):
-        entry: dict[str, Any] = {"command": None, "angle": None}
+        entries[joint] = {"command": None, "angle": None}
+        name = "" if joints[joint - 1] == f"joint{joint}" else f" ({joints[joint - 1]})"
         if joint in commands:
-            entry["command"], said = _command(commands[joint])
-            reasons.append(f"{said} of {named[joint]}, {commands[joint][0].why}")
+            entries[joint]["command"], said = _command(commands[joint])
+            reasons.append(f"{said} of joint {joint}{name}, {commands[joint][0].why}")
         if joint in angles:
-            column = angles[joint][0]
-            is_rad = column.unit == "rad" or (column.unit == "" and rad)
-            entry["angle"] = {"column": column.name, "unit": "rad" if is_rad else "deg"}
-            said = f"{column.name}: angle in {entry['angle']['unit']}"
-            reasons.append(f"{said} of {named[joint]}, {column.why}")
-        log["joints"][joint] = entry
+            (column, *_) = angles[joint]
+            angle_unit = column.unit if column.unit == "rad" else default if column.unit == "" else "deg"
+            entries[joint]["angle"] = {"column": column.name, "unit": angle_unit}
+            reasons.append(f"{column.name}: angle in {angle_unit} of joint {joint}{name}, {column.why}")
     used = {time.name, *(c.name for group in (*angles.values(), *commands.values()) for c in group)}
+    log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
+    log |= {"period_s": min(PERIODS, key=lambda period: abs(np.log(period / step))), "joints": entries}
     return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
 
 
-def _columns(table: Table) -> tuple[list[_Column], frozenset[str]]:
-    """Read every column of numbers, those of the usual length; also returns which hold times of day."""
+def _columns(table: Table) -> list[_Column]:
+    """Read every column of numbers, those of the usual length."""
     names = list(dict.fromkeys(name for name in table.names if name))
-    told = {name: kind_of(name, unit_of(name, table.units.get(name, ""))) for name in names}
-    held = {name for name in names if told[name] == "command"}
-    read: dict[str, Floats] = {}
-    clocks = frozenset[str]()
-    for group in (names, [name for name in names if told[name] != "other"], *([name] for name in names)):
+    units = {name: column_unit(name, table.units.get(name, "")) for name in names}
+    kinds = {name: kind_of(name, units[name]) for name in names}
+    read, clocks = dict[str, Floats](), set[str]()
+    for group in (names, [name for name in names if kinds[name] != "other"], *([name] for name in names)):
         try:
-            cells = table.read(group, held)
+            cells = table.read(group, {name for name in names if kinds[name] == "command"})
         except LogError:
             continue  # text, or different lengths or clocks
         read |= dict(zip(group, cells.values.T, strict=True))
@@ -120,74 +118,57 @@ def _columns(table: Table) -> tuple[list[_Column], frozenset[str]]:
     columns = list[_Column]()
     for name, values in read.items():
         if len(values) == usual and np.isfinite(values).any():
-            unit = unit_of(name, table.units.get(name, ""))
-            kind, why = kind_of(name, unit), "by its unit" if unit else "by its name"
+            unit, kind, why = units[name], kinds[name], "by its unit" if units[name] else "by its name"
             if kind == "" and np.ptp(values[np.isfinite(values)]) > 0:
                 kind, why = _kind_by_motion(values), "by how its numbers change"
-            columns.append(_Column(name, kind, unit, values, why))
-    return columns, clocks
+            columns.append(_Column(name, kind, unit.name if unit else "", values, why, name in clocks))
+    return columns
 
 
 def _kind_by_motion(values: Floats) -> Kind:
-    steps = np.abs(np.diff(values[np.isfinite(values)]))
-    jumps = steps.max() > JUMP * np.ptp(values[np.isfinite(values)])
-    return "command" if jumps or (steps == 0).mean() > STILL else "angle"
+    values = values[np.isfinite(values)]
+    steps = np.abs(np.diff(values))
+    return "command" if steps.max() > JUMP * np.ptp(values) or (steps == 0).mean() > STILL else "angle"
 
 
 def _time(table: Table, columns: Sequence[_Column]) -> _Column:
-    def steady(values: Floats) -> bool:
-        steps = np.diff(values[np.isfinite(values)])
-        return len(steps) > 0 and bool((steps > 0).all()) and np.median(steps) > STEADY * steps.mean()
-
-    rising = [column for column in columns if steady(column.values)]
+    """Return the first column that is named a time and rises steadily, or else is or does one of both."""
+    rising = [
+        column
+        for column in columns
+        if len(steps := column.steps) and (steps > 0).all() and np.median(steps) > STEADY * steps.mean()
+    ]
     named = [column for column in columns if column.kind == "time"]
-    for choice in ([c for c in rising if c.kind == "time"], named, rising):
+    for choice in ([column for column in rising if column in named], named, rising):
         if choice:
             return choice[0]
     hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
     raise LogError("has no column that looks like a time", where=table.source, hint=hint)
 
 
-def _time_unit(time: _Column) -> str:
-    """Return the unit that the file gives, or the one in which there are 2 to 1000 samples a second."""
-    given = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us"}
-    unit = given.get(time.unit, time.unit)
-    return unit if unit in SECONDS else likely_unit(float(np.nanmedian(np.diff(time.values)))) or "s"
-
-
 def _by_joint(
-    columns: Sequence[_Column], joints: Sequence[str]
-) -> tuple[dict[int, list[_Column]], list[str]]:
-    """Give each column a joint: one column, or two for the directions; also says what is uncertain."""
-    found: dict[int, list[_Column]] = {}
-    reasons = list[str]()
-    numbers = [number for c in columns if (number := number_in(c.name)) is not None]
-    from_zero = 0 in numbers
-    free = list[_Column]()
+    columns: Sequence[_Column], joints: Sequence[str], reasons: list[str]
+) -> dict[int, list[_Column]]:
+    """Give each column a joint: one column, or two for the directions; tell what is uncertain."""
+    groups: dict[int, list[_Column]] = {}
+    numbers = {column.name: number_in(column.name) for column in columns}
+    from_zero = 0 in numbers.values()
     for column in columns:
-        number = number_in(column.name)
-        joint = joint_of(column.name, joints) or (number + from_zero if number is not None else None)
-        mates = found.get(joint, []) if joint else []
-        if joint is None or not 1 <= joint <= len(joints) or (mates and not _are_pair([*mates, column])):
-            free.append(column)
-        else:
-            found.setdefault(joint, []).append(column)
-    if from_zero and found:
+        number = numbers[column.name]
+        joint = joint_of(column.name, joints) or (None if number is None else number + from_zero)
+        if joint and joint <= len(joints) and (joint not in groups or _are_pair([*groups[joint], column])):
+            groups.setdefault(joint, []).append(column)
+    if groups and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
-    if found:  # a column without a joint, beside others with one, is something else
-        return {
-            joint: sorted(pair, key=lambda c: -direction(c.name)[0]) for joint, pair in found.items()
-        }, reasons
-    pairs = list[list[_Column]]()
-    for column in free:
-        mate = next((pair for pair in pairs if len(pair) == 1 and _are_pair([*pair, column])), None)
-        pairs.append([column]) if mate is None else mate.append(column)
-    if free:
-        reasons.append(
-            f"the joints of {', '.join(c.name for c in free)} are given by their order: check them"
-        )
-    ordered = [sorted(pair, key=lambda c: -direction(c.name)[0]) for pair in pairs]
-    return dict(enumerate(ordered[: len(joints)], 1)), reasons
+    if columns and not groups:  # a column without a joint, beside others with one, is something else
+        pairs = list[list[_Column]]()
+        for column in columns:
+            mate = next((pair for pair in pairs if _are_pair([*pair, column])), None)
+            pairs.append([column]) if mate is None else mate.append(column)
+        names = ", ".join(column.name for column in columns)
+        reasons.append(f"the joints of {names} are given by their order: check them")
+        groups = dict(enumerate(pairs[: len(joints)], 1))
+    return {joint: sorted(pair, key=lambda c: -direction(c.name)[0]) for joint, pair in groups.items()}
 
 
 def _are_pair(columns: Sequence[_Column]) -> bool:
@@ -202,15 +183,9 @@ def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
     """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
     parts = [np.nan_to_num(column.values) for column in columns]
-    likely = likely_range(parts[0]) if len(parts) == 1 else likely_pair(parts[0], parts[1])
+    likely = likely_range(*parts) if len(parts) == 1 else likely_pair(*parts)
     entry: dict[str, Any] = {"column": names[0] if len(names) == 1 else names}
-    if likely is None or (columns[0].unit in ("%", "pct", "percent") and likely.name != "%"):
+    if likely is None or columns[0].unit == "%" or likely.name == "%":
         return entry, f"{' and '.join(names)}: command in %"
-    if likely.name != "%":
-        entry |= {"scale": likely.scale} | ({"offset": likely.offset} if likely.offset else {})
+    entry |= {"scale": likely.scale} | ({"offset": likely.offset} if likely.offset else {})
     return entry, f"{' and '.join(names)}: command in {likely.name}"
-
-
-def _in_radians(angles: Sequence[_Column]) -> bool:
-    """Return whether angles without a unit are small enough to be in rad, all of them."""
-    return bool(angles) and all(np.nanmax(np.abs(c.values)) <= RADIANS for c in angles if c.unit == "")

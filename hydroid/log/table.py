@@ -1,9 +1,11 @@
 """What every file format is read as: a table of named columns, which yields the numbers of some of them."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,89 +33,62 @@ class Cells:
     remarks: tuple[str, ...] = ()
 
 
-class Table(Protocol):
-    """Named columns of one file.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table:
+    """Named columns of one file; each format has its subclass.
 
     Attributes:
         source: the file.
         layout: its format in a few words, such as "CSV separated by semicolons".
+        names: of the columns, in order; "" for one without.
         place: what its rows are called where a fault is reported: "line" or "row".
         header: line of the names [1-based]; None where the format stores them.
-        names: of the columns, in order; "" for one without.
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
     """
 
-    @property
-    def source(self) -> str: ...  # noqa: D102
-    @property
-    def layout(self) -> str: ...  # noqa: D102
-    @property
-    def place(self) -> str: ...  # noqa: D102
-    @property
-    def header(self) -> int | None: ...  # noqa: D102
-    @property
-    def names(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def units(self) -> Mapping[str, str]: ...  # noqa: D102
-    @property
-    def remarks(self) -> tuple[str, ...]: ...  # noqa: D102
-
-    def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
-        """Read columns; `held` names those that keep their value until the next sample, as commands do."""
-        ...
-
-    def text(self, row: int, column: str) -> str:
-        """Return what stands in a row [1-based] of a column; "" where nothing does."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class ArrayTable:
-    """Columns that are in memory, all of one length, shape (R,) each; text has the dtype object."""
-
     source: str
     layout: str
-    columns: Mapping[str, NDArray[Any]]
-    units: Mapping[str, str] = field(default_factory=dict[str, str])
-    remarks: tuple[str, ...] = ()
-    clocks: frozenset[str] = frozenset()
+    names: tuple[str, ...]
     place: str = "row"
     header: int | None = None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns, in order."""
-        return tuple(self.columns)
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    remarks: tuple[str, ...] = ()
 
     def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
-        """Read columns, as `Table` says.
+        """Read columns; `held` names those that keep their value until the next sample, as commands do.
 
         Raises:
-            LogError: a column holds text, or the columns have different lengths.
+            LogError: columns that cannot be read together.
         """
-        first = len(self.columns[columns[0]])
+        raise NotImplementedError
+
+    def text(self, row: int, column: str) -> str:
+        """Return what stands in a row [1-based] of a column that holds no number; "" where nothing does."""
+        return ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ArrayTable(Table):
+    """Columns that are in memory, shape (R,) each; text has the dtype object."""
+
+    columns: Mapping[str, NDArray[Any]]
+    clocks: frozenset[str] = frozenset()
+
+    def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
+        """Read columns, which must be numbers of one length."""
+        rows = len(self.columns[columns[0]])
         for name in columns:
-            values = self.columns[name]
-            where = f"{self.source}, column {name}"
+            values, where = self.columns[name], f"{self.source}, column {name}"
             if values.dtype.kind not in "fiub":
                 example = str(values[0])[:30] if len(values) else ""
                 raise LogError(f"holds text, such as {example!r}", where=where, hint="store it as numbers")
-            if len(values) != first:
-                what = f"holds {len(values)} values, but column {columns[0]} holds {first}"
+            if len(values) != rows:
+                what = f"holds {len(values)} values, but column {columns[0]} holds {rows}"
                 raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
         values = np.stack([self.columns[name].astype(np.float64) for name in columns], axis=1)
-        return Cells(
-            values,
-            np.arange(1, first + 1),
-            np.zeros(first, bool),
-            self.clocks.intersection(columns),
-        )
-
-    def text(self, row: int, column: str) -> str:
-        """Return a value, as `Table` says."""
-        value = self.columns[column][row - 1]
-        return "" if value != value else str(value)
+        clocks = self.clocks.intersection(columns)
+        return Cells(values, np.arange(1, rows + 1), np.zeros(rows, bool), clocks)
 
 
 def optional_package(package: str, extra: str, source: str) -> Any:
@@ -125,6 +100,19 @@ def optional_package(package: str, extra: str, source: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        name = package.partition(".")[0]
-        what = f"needs the package {name}, which is not installed"
+        what = f"needs the package {package.partition('.')[0]}, which is not installed"
         raise LogError(what, where=source, hint=f"pip install 'hydroid[{extra}]'") from None
+
+
+@contextmanager
+def readable(path: Path, kind: str) -> Generator[None]:
+    """Turn what a format's library raises on damaged bytes, errors of any kind, into one line."""
+    try:
+        yield
+    except LogError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise LogError(
+            f"cannot be read as {kind} ({reason})", where=str(path), hint="save it again"
+        ) from None

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import LogError, SettingsError
-from hydroid.log import Log, Table, check_log, guess_columns
-from hydroid.project.motion import Motion, find_motion
+from hydroid.log import JointMotion, Log, Table, check_log, driven_joints, guess_columns, motion_of
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -20,6 +19,10 @@ REVERSED = (
     "a command is reversed as if its valve were wired the other way round; where it is the angle that counts "
     "the other way (compare arm.png), set the angle's scale to -1 instead, because gravity follows the angle"
 )
+CLEARER = 0.3
+"""correlation with another joint's command above that with its own from which on it is worth a word"""
+DEAD_BAND = 10.0
+"""above which it is worth a word [%]"""
 STILL_DEG = 1.0
 """travel below which a joint without a command counts as standing still"""
 
@@ -41,7 +44,7 @@ class Layout:
     outputs: tuple[int, ...]
     reasons: tuple[str, ...]
     unused: tuple[str, ...] = ()
-    motions: Mapping[int, Motion] = field(default_factory=dict[int, Motion])
+    motions: Mapping[int, JointMotion] = field(default_factory=dict[int, JointMotion])
     followed: bool = False
 
 
@@ -72,16 +75,16 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
         hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
         raise LogError("has no column that looks like an angle", where=table.source, hint=hint)
     log = _read(table.source, section, arm, reasons)
-    motions, followed = dict[int, Motion](), False
+    motions, followed = dict[int, JointMotion](), False
     for joint, entry in entries.items() if log is not None else ():
         assert log is not None
         if entry["angle"] is None:
             continue
         reasons += _outside(log, joint, arm)
-        motions[joint] = motion = find_motion(log, joint)
-        reasons += motion.remarks(arm.joint_names, joint)
+        motions[joint] = motion = motion_of(log, joint)
+        reasons += _remarks(motion, arm.joint_names) if log.driven[joint - 1] else []
         if entry["command"] is None:
-            followed |= motion.travel_deg > STILL_DEG
+            followed |= motion.travel > STILL_DEG
         elif motion.turned:
             entry["command"] = turned(entry["command"])
     if any(motion.turned for motion in motions.values()):
@@ -89,6 +92,24 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     driven = tuple(j for j, e in entries.items() if e["command"] is not None and e["angle"] is not None)
     outputs = driven or tuple(j for j, e in entries.items() if e["angle"] is not None)
     return Layout(section, outputs, tuple(reasons), guess.unused, motions, followed)
+
+
+def _remarks(motion: JointMotion, names: Sequence[str]) -> list[str]:
+    """Return what a user should know of a driven joint."""
+    name, follows = names[motion.joint - 1], {j: motion.follows(j)[0] for j in driven_joints(motion.log)}
+    own, other = follows[motion.joint], max(follows, key=lambda joint: follows[joint])
+    if follows[other] > own + CLEARER:
+        return [
+            f"{name} follows the command of {names[other - 1]} (correlation {follows[other]:.2f}) more than "
+            f"its own ({own:.2f}): check which columns belong together"
+        ]
+    lines, (path, against) = list[str](), motion.directed
+    if motion.turned:
+        share = f"for {against:.0%} of {path:.3g} deg of travel"
+        lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")
+    if motion.dead_band > DEAD_BAND:
+        lines.append(f"{name} does not move below about {motion.dead_band:g} % of command: a dead band")
+    return lines
 
 
 def turned(command: dict[str, Any]) -> dict[str, Any]:

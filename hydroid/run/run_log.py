@@ -15,7 +15,7 @@ import numpy as np
 
 from hydroid.errors import RunError
 from hydroid.fitting.fit import Fit
-from hydroid.log import Finding, Log
+from hydroid.log import Log, LogFinding
 from hydroid.settings.fit import FitSettings
 
 LINE = logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", datefmt="%Y-%m-%dT%H:%M:%S%z")
@@ -48,7 +48,7 @@ def run_log(file: Path) -> Generator[None]:
         handler.close()
 
 
-def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[Finding]) -> None:
+def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[LogFinding]) -> None:
     """Log what runs, where, with what."""
     names = ("hydroid", "mujoco", "numpy", "numba")
     versions = ", ".join(f"{name} {version(name)}" for name in names)

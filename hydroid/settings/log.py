@@ -8,35 +8,33 @@ log:
     7: null                     # not in the log
 """
 
-from typing import Annotated, Any, Literal, TypeVar
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from hydroid.settings.load import JointNumber, NotNegative, Settings
+from hydroid.settings.load import JointNumber, Settings
+from hydroid.units import UNITS
 
 JOINT = "{joint}"
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0}
-"""in each unit of log.time"""
+Kind = Literal["command", "angle", "pressure"]
 
 
-def _as_columns(value: Any) -> Any:
-    columns = (value,) if isinstance(value, str) else value
-    if not isinstance(columns, tuple) or not all(isinstance(c, str) and c for c in columns):
-        columns = ()
-    if len(columns) not in (1, 2):
-        raise ValueError("must be a column's name, or two: the positive and the negative direction")
-    return columns
+def _as_names(value: Any) -> Any:
+    names = (value,) if isinstance(value, str) else value
+    if names is not None and not (isinstance(names, tuple) and all(isinstance(name, str) for name in names)):
+        raise ValueError("must be a column's name, or a list of two")
+    return names
 
 
-def _nonzero(value: float) -> float:
+def _nonzero(value: float | None) -> float | None:
     if value == 0:
         raise ValueError("must not be 0")
     return value
 
 
 Name = Annotated[str, Field(min_length=1)]
-Offset = Annotated[float, Field(ge=-1e12, le=1e12)]
-Scale = Annotated[Offset, BeforeValidator(_nonzero)]
+Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 
 
 class TimeColumn(Settings):
@@ -48,81 +46,86 @@ class TimeColumn(Settings):
     """unit of the cells; dates and times of day are recognised"""
 
 
-class CommandColumns(Settings):
-    """Columns that hold the commands: command [%] = scale · cell + offset."""
+class Columns(Settings):
+    """Columns of one quantity: value = scale · cell + offset. Null: as for all joints, or the default."""
 
-    column: Annotated[tuple[str, ...], BeforeValidator(_as_columns)] = (f"u{JOINT}_pct",)
-    """name in the header, with {joint} for the joint's number; or two names, for the positive and the
-    negative direction, whose values must lie in [0, 100] % and are subtracted"""
-    scale: Scale = 1.0
-    """factor on the cells"""
-    offset: Offset = 0.0
-    """is added to the scaled cells [%]"""
-
-
-class AngleColumn(Settings):
-    """Columns that hold the angles: angle [unit] = scale · cell + offset."""
-
-    column: Name = f"q{JOINT}_deg"
-    """name in the header, with {joint} for the joint's number"""
-    unit: Literal["deg", "rad"] = "deg"
-    """unit of the scaled cells"""
-    scale: Scale = 1.0
-    """factor on the cells"""
-    offset: Offset = 0.0
-    """is added to the scaled cells, in `unit`"""
+    column: Annotated[tuple[Name, ...] | None, BeforeValidator(_as_names)] = None
+    """name in the header, with {joint} for the joint's number; or two names: the positive and the negative
+    direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
+    positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
+    pB{joint}_bar]"""
+    unit: Literal["%", "deg", "rad", "bar", "Pa", "MPa"] | None = None
+    """unit of the scaled cells; default: %, deg, bar"""
+    scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
+    """factor on the cells; default: 1"""
+    offset: Number | None = None
+    """is added to the scaled cells, in `unit`; default: 0"""
 
 
-class PressureColumns(Settings):
-    """Columns that hold chamber pressures: pressure [unit] = scale · cell + offset."""
+@dataclass(frozen=True)
+class ColumnMap:
+    """The columns of one quantity of one joint, complete: value [unit] = scale · cell + offset."""
 
-    column: tuple[Name, Name] = (f"pA{JOINT}_bar", f"pB{JOINT}_bar")
-    """names in the header of chamber A, which pushes to positive angles, and chamber B"""
-    unit: Literal["bar", "Pa", "MPa"] = "bar"
-    """unit of the scaled cells"""
-    scale: Scale = 1.0
-    """factor on the cells"""
-    offset: Offset = 0.0
-    """is added to the scaled cells, in `unit`"""
+    column: tuple[str, ...]
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+DEFAULTS: dict[Kind, ColumnMap] = {
+    "command": ColumnMap((f"u{JOINT}_pct",), "%"),
+    "angle": ColumnMap((f"q{JOINT}_deg",), "deg"),
+    "pressure": ColumnMap((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), "bar"),
+}
+COLUMNS = {"command": (1, 2), "angle": (1,), "pressure": (2,)}
+"""how many columns may hold a quantity"""
+
+
+def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
+    """Refuse a unit or a number of columns that the quantity does not have."""
+    kind = str(info.field_name)
+    if columns and columns.unit and UNITS[columns.unit.lower()].quantity != kind:
+        raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
+    if columns and columns.column and len(columns.column) not in COLUMNS[kind]:
+        raise ValueError(f"{kind} needs {' or '.join(map(str, COLUMNS[kind]))} column names")
+    return columns
+
+
+OfKind = Annotated[Columns | None, AfterValidator(_checked)]
 
 
 class JointColumns(Settings):
-    """The columns of one joint, where they differ from the common ones."""
+    """The columns of one joint, where they differ from those of all joints."""
 
-    command: CommandColumns | None
+    command: OfKind = Columns()
     """as log.command; null: the log holds no command of this joint"""
-    angle: AngleColumn | None
+    angle: OfKind = Columns()
     """as log.angle; null: the log holds no angle of this joint"""
-    pressure: PressureColumns | None = None
+    pressure: OfKind = Columns()
     """as log.pressure; null: the log holds no pressures of this joint"""
 
 
-C = TypeVar("C", CommandColumns, AngleColumn, PressureColumns)
-
-
-def _names(columns: CommandColumns | AngleColumn | PressureColumns) -> tuple[str, ...]:
-    return (columns.column,) if isinstance(columns, AngleColumn) else columns.column
-
-
-def _common(columns: C | None) -> C | None:
-    """Refuse a common column that does not contain the joint's number."""
-    for name in _names(columns) if columns else ():
+def _common(columns: Columns | None) -> Columns | None:
+    for name in (columns and columns.column) or ():
         if JOINT not in name:
             raise ValueError(f"column {name!r} is meant for all joints, so its name must contain {JOINT}")
     return columns
+
+
+Common = Annotated[OfKind, AfterValidator(_common)]
 
 
 class LogSettings(Settings):
     """The layout of logs: columns, units and tolerances."""
 
     time: TimeColumn = TimeColumn()
-    command: Annotated[CommandColumns | None, AfterValidator(_common)] = CommandColumns()
+    command: Common = Columns()
     """columns of the commands; null: the log holds none"""
-    angle: Annotated[AngleColumn | None, AfterValidator(_common)] = AngleColumn()
+    angle: Common = Columns()
     """columns of the angles; null: the log holds none"""
-    pressure: Annotated[PressureColumns | None, AfterValidator(_common)] = None
+    pressure: Common = None
     """columns of the chamber pressures; null: the log holds none"""
-    joints: dict[JointNumber, JointColumns] = Field(default_factory=dict[int, JointColumns])
+    joints: dict[JointNumber, JointColumns | None] = Field(default_factory=dict[int, JointColumns | None])
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
     """sample period to which logs are resampled [s]: commands are held, angles interpolated"""
@@ -130,50 +133,20 @@ class LogSettings(Settings):
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
-    angle_margin_deg: NotNegative = 1.0
+    angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0
     """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops"""
-    shortest_s: NotNegative = 0.5
-    """duration below which a log is refused [s]"""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _lay_over(cls, values: Any) -> Any:
-        """Complete each joint from the common columns, so that written settings read back the same."""
-        joints = values.get("joints") if isinstance(values, dict) else None
-        if not isinstance(joints, dict):
-            return values
-        return {**values, "joints": {joint: _complete(values, own) for joint, own in joints.items()}}
-
-    def command_of(self, joint: int) -> CommandColumns | None:
-        """Return the columns of a joint's command, with its number in their names; None: not in the log."""
-        return _numbered(self.joints[joint].command if joint in self.joints else self.command, joint)
-
-    def angle_of(self, joint: int) -> AngleColumn | None:
-        """Return the column of a joint's angle, with its number in the name; None: not in the log."""
-        return _numbered(self.joints[joint].angle if joint in self.joints else self.angle, joint)
-
-    def pressure_of(self, joint: int) -> PressureColumns | None:
-        """Return the columns of a joint's pressures, with its number in their names; None: not in the log."""
-        return _numbered(self.joints[joint].pressure if joint in self.joints else self.pressure, joint)
+    def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
+        """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""
+        common: Columns | None = getattr(self, kind)
+        own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
+        if own is None or (common is None and not _given(own)):
+            return None
+        given = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
+        return ColumnMap(
+            **given | {"column": tuple(name.replace(JOINT, str(joint)) for name in given["column"])}
+        )
 
 
-def _numbered(columns: C | None, joint: int) -> C | None:
-    if columns is None:
-        return None
-    names = tuple(name.replace(JOINT, str(joint)) for name in _names(columns))
-    return columns.model_copy(update={"column": names[0] if isinstance(columns, AngleColumn) else names})
-
-
-def _complete(common: dict[str, Any], own: Any) -> Any:
-    """One joint's columns laid over the common ones; of pressures there are none unless they are named."""
-    if own is not None and not isinstance(own, dict):
-        return own
-    entry: dict[str, Any] = {} if own is not None else {"command": None, "angle": None, "pressure": None}
-    entry |= own or {}
-    for kind, default in (("command", {}), ("angle", {}), ("pressure", None)):
-        base = common.get(kind, default)
-        base = base.model_dump() if isinstance(base, BaseModel) else base
-        mine = entry.setdefault(kind, base)
-        if isinstance(mine, dict) and isinstance(base, dict):
-            entry[kind] = {**base, **mine}
-    return entry
+def _given(columns: Columns) -> dict[str, Any]:
+    return {name: value for name, value in columns if value is not None}

@@ -69,8 +69,8 @@ def test_the_raw_logs_lead_through_init_to_a_first_fit(tmp_path: Path, monkeypat
     joints = ["boom", "arm", "bucket", "swing"]
     project = hydroid.init("dig", FOLDER / "arm.yaml", logs, joints=joints)
     settings = hydroid.load_settings("dig/fit.yaml")
-    assert [settings.log.command_of(j).scale for j in (1, 2, 3, 4)] == [1, -1, -1, -1]
-    assert [settings.log.command_of(j).column for j in (1, 2)] == [("u4_pct",), ("u1_pct",)]
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3, 4)] == [1, -1, -1, -1]
+    assert [settings.log.columns("command", j).column for j in (1, 2)] == [("u4_pct",), ("u1_pct",)]
     assert 0.04 < settings.log.period_s < 0.06
     assert all(30 < (settings.parameters[f"dead_A_{name}"].nominal or 0.0) < 60 for name in joints)
     short = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", "--no-refinement"]

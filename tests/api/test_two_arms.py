@@ -67,7 +67,7 @@ def test_each_arm_has_its_own_columns(model: IdentifiedModel, arm: Arm, tmp_path
 def test_columns_of_single_joints_are_named_too(model: IdentifiedModel):
     changed = load_settings("fit-mech", {"log.joints": {2: {"command": {"column": ["up", "down"]}}, 4: None}})
     left = columns_of(changed.log, "left")
-    command, angle, none = left.command_of(2), left.angle_of(3), left.command_of(4)
+    command, angle, none = left.columns("command", 2), left.columns("angle", 3), left.columns("command", 4)
     assert command is not None
     assert command.column == ("left_up", "left_down")
     assert angle is not None

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.log import Finding, Log, check_log, read_log
+from hydroid.log import Log, LogFinding, check_log, read_log
 from hydroid.settings.log import LogSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs"
@@ -34,11 +34,11 @@ def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
     return path
 
 
-def read(path: Path, settings: LogSettings = SETTINGS, **options: object) -> tuple[Log, list[Finding]]:
+def read(path: Path, settings: LogSettings = SETTINGS, **options: object) -> tuple[Log, list[LogFinding]]:
     return read_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
 
 
-def faults(path: Path, settings: LogSettings = SETTINGS, **options: object) -> list[Finding]:
+def faults(path: Path, settings: LogSettings = SETTINGS, **options: object) -> list[LogFinding]:
     """Errors only."""
     log, findings = check_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
     errors = [finding for finding in findings if finding.level == "error"]

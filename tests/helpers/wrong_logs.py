@@ -137,7 +137,7 @@ WRONG = (
     Wrong(
         "a command wired the other way",
         "warning",
-        "angle of joint 2 moves against the command (for 100% of",
+        "angle of joint 2 moves against the command (for 99% of",
         lambda: of("u2", np.negative),
     ),
     Wrong(
@@ -210,7 +210,7 @@ WRONG = (
     Wrong(
         "constant command levels with gaps",
         "note",
-        "joint 2 between 40 and 60",
+        "between 40 and 60, between 60 and 80",
         lambda: [boom([40, 60, 80, -40, -60, -80])],
     ),
     Wrong(

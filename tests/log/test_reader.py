@@ -155,7 +155,7 @@ def test_a_missing_column_names_what_there_is_and_the_nearest(tmp_path: Path) ->
     (fault,) = faults(edited(tmp_path, rename))
     assert "'u2_pct' (command of joint 2, did you mean 'U2_pct'?)" in fault.what
     assert "'q1_deg' (angle of joint 1)" in fault.what
-    assert "the columns are: time_s, u1_pct, U2_pct, shoulder, q2_deg" in fault.hint
+    assert "the columns are: time_s, u1_pct, U2_pct, shoulder and q2_deg" in fault.hint
 
 
 def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: Path) -> None:

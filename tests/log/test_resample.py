@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from log_files import cells, lines, read, save
 
-from hydroid.log.resample import resample
+from hydroid.log.repair import resample
 from hydroid.settings.log import LogSettings
 
 

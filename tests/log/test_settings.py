@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from hydroid.errors import SettingsError
 from hydroid.settings.load import load, validate
-from hydroid.settings.log import CommandColumns, LogSettings
+from hydroid.settings.log import ColumnMap, LogSettings
 
 names = st.text("abcxyz_ []°", min_size=1, max_size=6)
 scales = st.floats(0.1, 10)
@@ -40,13 +40,11 @@ def test_a_joint_inherits_what_it_does_not_say() -> None:
             "joints": {2: {"command": {"offset": 1}}, 3: {"angle": {"column": "elbow"}}, 4: None},
         }
     )
-    assert settings.command_of(1) == CommandColumns(column=("up1", "down1"), scale=10)
-    assert settings.command_of(2) == CommandColumns(column=("up2", "down2"), scale=10, offset=1)
-    elbow = settings.angle_of(3)
-    assert elbow is not None
-    assert (elbow.column, elbow.unit) == ("elbow", "rad")
-    assert settings.command_of(4) is None
-    assert settings.angle_of(4) is None
+    assert settings.columns("command", 1) == ColumnMap(("up1", "down1"), "%", scale=10)
+    assert settings.columns("command", 2) == ColumnMap(("up2", "down2"), "%", scale=10, offset=1)
+    assert settings.columns("angle", 3) == ColumnMap(("elbow",), "rad")
+    assert settings.columns("command", 4) is None
+    assert settings.columns("angle", 4) is None
 
 
 def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
@@ -57,8 +55,8 @@ def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
             "joints": {2: {"command": {"column": "u"}, "angle": {"column": "q"}}},
         }
     )
-    assert settings.command_of(2) == CommandColumns(column=("u",))
-    assert settings.command_of(1) is None
+    assert settings.columns("command", 2) == ColumnMap(("u",), "%")
+    assert settings.columns("command", 1) is None
 
 
 @pytest.mark.parametrize(
@@ -66,10 +64,11 @@ def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
     [
         ("command: {column: u}", "{joint}"),
         ("angle: {column: q}", "{joint}"),
-        ("command: {column: [a, b, c]}", "two"),
+        ("command: {column: [a, b, c]}", "1 or 2 column names"),
+        ("angle: {unit: bar}", "bar is no unit of a log's angles"),
         ("command: {column: 3}", "a column's name"),
         ("command: {scale: 0}", "must not be 0"),
-        ("angle: {unit: grad}", "'deg' or 'rad'"),
+        ("angle: {unit: grad}", "'deg', 'rad'"),
         ("time: {unit: week}", "'h' or 'day'"),
         ("joints: {0: null}", "at least 1"),
         ("joints: {2: u2}", "joints.2"),
@@ -90,5 +89,5 @@ def test_a_setting_that_is_not_allowed_is_refused_by_name(text: str, said: str, 
 
 def test_an_override_reaches_one_joint() -> None:
     settings = validate({"joints": {"3": {"command": None}}}, LogSettings, "--set")
-    assert settings.command_of(3) is None
-    assert settings.angle_of(3) == LogSettings().angle_of(3)
+    assert settings.columns("command", 3) is None
+    assert settings.columns("angle", 3) == LogSettings().columns("angle", 3)

@@ -52,9 +52,9 @@ def test_the_model_has_the_files_masses_and_inertias(place: Path):
 def test_columns_units_and_scales_are_those_of_the_log(place: Path):
     settings = hydroid.load_settings(place / "mine" / "fit.yaml")
     assert settings.outputs == (1, 2, 3)
-    assert settings.log.command_of(2).column == ("valve_boom_joint_V",)
-    assert settings.log.command_of(2).scale == 10
-    assert settings.log.angle_of(3).unit == "rad"
+    assert settings.log.columns("command", 2).column == ("valve_boom_joint_V",)
+    assert settings.log.columns("command", 2).scale == 10
+    assert settings.log.columns("angle", 3).unit == "rad"
     assert settings.log.time.unit == "ms"
     page = (place / "mine" / "fit.yaml").read_text()
     assert "# - valve_boom_joint_V: command in ±10 V of boom_joint, by its unit" in page
@@ -113,7 +113,11 @@ def test_an_mjcf_and_a_mat_file_give_the_same_settings(place: Path, tmp_path: Pa
     project = hydroid.init(tmp_path / "mine", tmp_path / "robot" / "arm.xml", [tmp_path / "run.mat"])
     found = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     other = hydroid.load_settings(place / "mine" / "fit.yaml")
-    assert [found.log.angle_of(j).column for j in (1, 2, 3)] == ["q_rad[1]", "q_rad[2]", "q_rad[3]"]
+    assert [found.log.columns("angle", j).column for j in (1, 2, 3)] == [
+        ("q_rad[1]",),
+        ("q_rad[2]",),
+        ("q_rad[3]",),
+    ]
     assert set(found.parameters) == set(other.parameters)
     np.testing.assert_allclose(found.arm.masses[:3], other.arm.masses[:3])
     read = hydroid.read_logs(tmp_path / "run.mat", found), hydroid.read_logs(place / "move_0.csv", other)
@@ -178,7 +182,7 @@ def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_
     log = changed_log(place, tmp_path, lambda v: v * [1, 1, -1, 1, 1, 1, 1])
     project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
-    assert [settings.log.command_of(j).scale for j in (1, 2, 3)] == [10, -10, 10]
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, -10, 10]
     (line,) = [line for line in project.columns if "of the command is reversed" in line]
     assert line.startswith("boom_joint moves against its command (for ")
 
@@ -229,7 +233,7 @@ def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     assert project.files == ("arm.png", "fit.yaml", "next-steps.md")
     settings = hydroid.load_settings(tmp_path / "second" / "fit.yaml")
     assert settings.arm == load_arm(arm)
-    assert [settings.log.command_of(j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]
+    assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]
     with pytest.raises(SettingsError, match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom"):
         hydroid.init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])
 

@@ -166,9 +166,9 @@ def test_joints_and_links_may_be_given_by_name(tmp_path):
     path.write_text(NAMED.replace("  m: {quantity: mass, each: [boom], fixed: 5}\n", ""))
     settings = hydroid.load_settings(path, {"log.joints.arm.angle.column": "q"})
     assert settings.outputs == (1, 2)
-    assert settings.log.joints[4].command is None
-    assert settings.log.joints[2].command.column == ("lift",)
-    assert settings.log.joints[3].angle.column == "q"
+    assert settings.log.columns("command", 4) is None
+    assert settings.log.columns("command", 2).column == ("lift",)
+    assert settings.log.columns("angle", 3).column == ("q",)
     assert settings.objective.weights == {2: 2.0}
     assert settings.design.joints == (2,)
     joints = {name: p.joints for name, p in settings.parameters.items() if p.link is None}

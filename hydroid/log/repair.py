@@ -8,20 +8,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.log.checks import GAP, sample_period
-from hydroid.log.log import Finding, Floats
-from hydroid.log.signals import Recording
+from hydroid.log.columns import Recording
+from hydroid.log.finding import LogFinding
+from hydroid.log.log import Floats
 
 TURN = 2 * np.pi
+GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
 MAX_GROWTH = 2  # largest ratio of rows after and before: mostly gaps cannot be repaired
 NEAR_TURN = np.pi / 4  # largest difference of a wrap from a whole turn: the motion within one sample
 ON_GRID = 0.01  # of a period: where all samples are this near to the first one's grid, values pass unchanged
 _ROUNDING = 1e-6  # of a period
 
 
-def unwrap(recording: Recording) -> tuple[Recording, list[Finding]]:
+def sample_period(time: Floats) -> float:
+    """Return the usual step between samples [s]; NaN where there is none."""
+    steps = np.diff(time[~np.isnan(time)])
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
+
+
+def unwrap(recording: Recording) -> tuple[Recording, list[LogFinding]]:
     """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
-    values, notes = recording.values.copy(), list[Finding]()
+    values, notes = recording.values.copy(), list[LogFinding]()
     for column, signal in enumerate(recording.signals):
         if signal.kind != "angle" or np.isfinite(signal.high):
             continue
@@ -30,19 +37,18 @@ def unwrap(recording: Recording) -> tuple[Recording, list[Finding]]:
         wraps = np.abs(np.abs(steps) - TURN) < NEAR_TURN
         if wraps.any():
             values[rows[1:], column] -= TURN * np.cumsum(np.sign(steps) * wraps)
-            what = f"{signal} wraps by 360 deg and was joined"
-            notes.append(recording.finding("note", what, "", rows[1:][wraps], signal, "wrap"))
+            notes.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
     return replace(recording, values=values), notes
 
 
-def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]]:
+def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFinding]]:
     """Fill gaps: interpolate angles, hold commands, insert dropped samples.
 
     A gap is at most `longest` [s] besides the usual step between samples. Rows without a time are dropped,
     and put back if they leave a gap.
     """
     timed = ~np.isnan(recording.time)
-    lost, first = int((~timed).sum()), recording.lines[~timed][:1]
+    lost = recording.lines[~timed]
     recording = recording.take(np.flatnonzero(timed))
     period = sample_period(recording.time)
     reach = longest * (1 + 1e-9) + period
@@ -51,15 +57,15 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[Finding]
     for column, signal in enumerate(recording.signals[1:], 1):
         _bridge(recording.time, values[:, column], reach, held=signal.kind == "command")
     filled = np.isnan(recording.values) & ~np.isnan(values) & ~added[:, None]
-    recording = replace(recording, values=values)
-    cells, samples = int(filled.sum()), int(added.sum())
-    if not (cells or samples or lost):
+    mended = recording.lines[filled.any(axis=1) | added]
+    recording, lines = replace(recording, values=values), [*mended[:1], *lost[:1]]
+    if not lines:
         return recording, []
-    what = f"repaired: {_count(cells, 'missing cell')} filled, {_count(samples, 'dropped sample')} inserted"
-    what += f", {_count(lost, 'row')} without a time left out" if lost else ""
-    line = min([*recording.lines[filled.any(axis=1) | added][:1], *first])
-    hint = "angles interpolated, commands held"
-    return recording, [replace(recording.finding("warning", what, hint, kind="repair"), line=int(line))]
+    counts = {"missing cell": filled.sum(), "dropped sample": added.sum(), "row": len(lost)}
+    cells, samples, rows = (f"{n} {noun}{'' if n == 1 else 's'}" for noun, n in counts.items())
+    lost_rows = f", {rows} without a time left out" if len(lost) else ""
+    first = replace(recording, lines=np.array([min(lines)]))
+    return recording, [first.finding("warning", "repair", [0], cells=cells, samples=samples, lost=lost_rows)]
 
 
 def _insert(recording: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:
@@ -82,20 +88,16 @@ def _insert(recording: Recording, period: float, reach: float) -> tuple[Recordin
 
 def _bridge(time: Floats, values: Floats, reach: float, held: bool) -> None:
     """Fill, in place, the holes between two samples no more than `reach` [s] apart."""
-    there = ~np.isnan(values)
-    if there.all() or not there.any():
+    there = np.flatnonzero(~np.isnan(values))
+    holes = np.flatnonzero(np.isnan(values))
+    after = np.searchsorted(there, holes)
+    inside = (after > 0) & (after < len(there))
+    if not inside.any():
         return
-    rows = np.arange(len(values))
-    before = np.maximum.accumulate(np.where(there, rows, -1))
-    after = np.minimum.accumulate(np.where(there, rows, len(rows))[::-1])[::-1]
-    inside = ~there & (before >= 0) & (after < len(rows))
-    inside[inside] = time[after[inside]] - time[before[inside]] <= reach
-    filled = values[before] if held else np.interp(time, time[there], values[there])
-    values[inside] = filled[inside]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
+    near = time[after] - time[before] <= reach
+    filled = values[before] if held else np.interp(time[holes], time[there], values[there])
+    values[holes[near]] = filled[near]
 
 
 def resample(

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hydroid.log import Log
-from hydroid.project.motion import find_motion
+from hydroid.log import JointMotion, Log
 
 PERIOD = 0.02
 
@@ -25,21 +24,15 @@ def log_of(dead=0.0, lag=0.0, sign=1.0, speed=0.5):
 @pytest.mark.parametrize("lag", [0.0, 0.1, 0.4])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_sign_and_lag_are_found(lag, sign):
-    motion = find_motion(log_of(lag=lag, sign=sign), 1)
+    motion = JointMotion(log_of(lag=lag, sign=sign), 1)
     assert motion.turned == (sign < 0)
-    assert motion.lag == pytest.approx(lag, abs=0.06)
+    assert motion.follows(1)[1] == pytest.approx(lag, abs=0.06)
 
 
 @pytest.mark.parametrize("dead", [0.0, 20.0, 50.0])
 def test_a_dead_band_is_found(dead):
-    assert find_motion(log_of(dead=dead, lag=0.1), 1).dead_band == pytest.approx(dead + 5, abs=6)
+    assert JointMotion(log_of(dead=dead, lag=0.1), 1).dead_band == pytest.approx(dead + 5, abs=6)
 
 
 def test_the_speed_is_that_of_fast_motion():
-    assert 0.4 < find_motion(log_of(), 1).speed < 0.5
-
-
-def test_a_joint_without_a_command_has_no_sign():
-    log = log_of()
-    still = Log("a", log.time, 0 * log.command, log.angle, PERIOD)
-    assert find_motion(still, 1).direction is None
+    assert 0.4 < JointMotion(log_of(), 1).speed < 0.5

@@ -49,7 +49,7 @@ docs: setup  ## the reference of all settings, and the documentation as pages: b
 
 model: setup  ## the shipped arm's meshes and its MJCF model
 	$(BIN)/python meshes/make_meshes.py
-	$(BIN)/hydroid build-model
+	$(BIN)/python meshes/make_models.py
 
 wheel: setup  ## the wheel in an empty environment, run from an empty folder
 	PYTHON=$(BIN)/python sh .ci/wheel

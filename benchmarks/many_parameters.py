@@ -78,7 +78,7 @@ class Peer:
 
         arm, self._problem, self._pose = problem.settings.arm, problem, log.angle[0]
         self.rollouts = 0
-        spec = load_model(arm.model, arm)
+        spec = load_model(arm)
         for geom in list(spec.geoms):
             spec.delete(geom)
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

@@ -101,7 +101,7 @@ def make_log(present: dict[str, float], seconds: float, seed: int) -> Log:
 
 def largest_flow(truth: FitSettings, log: Log) -> float:
     """Flow from the pump that the true arm exceeds for 1 % of a log [L/min]."""
-    simulation = make_simulation(load_model(truth.arm.model, truth.arm), log, [1], truth)
+    simulation = make_simulation(load_model(truth.arm), log, [1], truth)
     assert isinstance(simulation, HydraulicSimulation)
     stage = Stage(truth)
     flow = simulation.trace(stage.candidates(stage.parameters.vector(TRUTH, "truth")[None])).flow[:, 0]

@@ -42,7 +42,7 @@ def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], 
     log, candidates = problem.logs[0], problem.stage.candidates(theta)
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
-    reduced = lock(load_model(arm.model, arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
+    reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
     reduced.model.qpos_spring[:] = log.angle[0, moving]
     batch = Batch(reduced.model, nsim=len(theta))
     for name, value in reduced.inertials(candidates.mass).items():

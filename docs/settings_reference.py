@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hydroid.settings.arm import Arm
+from hydroid.settings.arm import Arm, ArmFile
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import JointColumns
 from hydroid.settings.study import StudySettings
@@ -45,7 +45,7 @@ def reference() -> str:
         + "## A fit's file\n\n"
         + _table(FitSettings)
         + arm
-        + _table(Arm)
+        + _table(ArmFile)
         + study
         + _table(StudySettings)
     )
@@ -112,7 +112,9 @@ def _type(annotation: Any) -> str:
     if annotation is Any:
         return "value"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return "mapping" if annotation is not Arm else "text or mapping"
+        return "mapping"
+    if annotation is Arm:
+        return "text or mapping"
     plain = {float: "number", int: "whole number", str: "text", bool: "true or false", Path: "path"}
     return plain.get(annotation, "null")
 
@@ -179,7 +181,7 @@ def undescribed() -> list[str]:
     """Return the settings that have no description."""
     return [
         key
-        for kind in (FitSettings, Arm, StudySettings)
+        for kind in (FitSettings, ArmFile, StudySettings)
         for key, _, meaning in _settings(kind, "")
         if not meaning
     ]

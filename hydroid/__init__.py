@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from hydroid.api.look import plot_actuator as plot_actuator
     from hydroid.api.look import read_commands as read_commands
     from hydroid.api.look import read_logs as read_logs
-    from hydroid.api.model import build_model as build_model
     from hydroid.api.model import simulate as simulate
     from hydroid.api.motion import render as render
     from hydroid.api.motion import view as view
@@ -72,7 +71,7 @@ _NAMES = {
     "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",
     "hydroid.api.judge": "identifiability sensitivity surface validate",
     "hydroid.api.look": "Check LogCheck check load_settings plot_actuator read_commands read_logs",
-    "hydroid.api.model": "build_model simulate",
+    "hydroid.api.model": "simulate",
     "hydroid.api.motion": "render view",
     "hydroid.api.plan": "design suggest",
     "hydroid.api.quantity": "QuantityResult quantity",

@@ -9,7 +9,8 @@ import yaml
 
 from hydroid.assets import find_config
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
-from hydroid.files import copy_file, is_file, write_atomic
+from hydroid.files import is_file, write_atomic
+from hydroid.mjcf import copy_models
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
@@ -17,7 +18,7 @@ from hydroid.settings.load import load
 CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
 """the files of a folder that `load_identified` reads, beside the estimate"""
 PAIR = "model/pair.xml"
-"""where `hydroid build-model` would write the machine of two arms"""
+"""the machine of two arms"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,17 +117,15 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
-    """Write the settings and the arm to a folder whose model is MODEL, so that it can be read anywhere.
+    """Write the settings, the arm and its models to a folder, so that it can be read anywhere.
 
     Raises:
-        RunError: the folder cannot be written, or a mesh of the carrier of two arms cannot be read.
+        RunError: the folder cannot be written, or a mesh cannot be read.
     """
-    meshes, pair = (Path(MODEL).parent / "meshes").as_posix(), settings.arm.pair
-    arm: dict[str, Any] = settings.arm.model_dump(mode="json") | {"model": MODEL, "meshes": meshes}
-    if pair is not None:
-        arm["pair"]["model"] = PAIR
-        for mesh in pair.carrier:
-            copy_file(settings.arm.meshes / mesh, folder / meshes / mesh)
+    file = settings.arm.file
+    models = {MODEL: file.model} | ({PAIR: file.pair} if file.pair else {})
+    copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)
+    arm = file.model_dump(mode="json") | {"model": MODEL, "pair": PAIR if file.pair else None}
     for name, content in ((ARM, arm), (CONFIG, portable(settings))):
         write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 

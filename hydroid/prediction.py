@@ -72,7 +72,7 @@ def trace_csv(model: IdentifiedModel, log: Log) -> str:
     """Return a CSV of the driven joints' actuators, in bar, L/min, mm and N (N·m of a rotary actuator)."""
     settings, stage = model.settings, Stage(model.settings)
     outputs = [int(j) for j in np.flatnonzero(log.driven)]
-    simulation = make_simulation(load_model(settings.arm.model, settings.arm), log, outputs, settings)
+    simulation = make_simulation(load_model(settings.arm), log, outputs, settings)
     assert isinstance(simulation, HydraulicSimulation)
     observed = simulation.trace(stage.candidates(model.theta[None]))
     names, columns = ["time_s"], [log.time]
@@ -94,7 +94,7 @@ def _respond(
 ) -> Response:
     """Simulate the angles of `joints`, 1-based, and the pressures of some joints, 0-based."""
     settings, stage = model.settings, Stage(model.settings)
-    spec, outputs = load_model(settings.arm.model, settings.arm), [j - 1 for j in joints]
+    spec, outputs = load_model(settings.arm), [j - 1 for j in joints]
     simulation = make_simulation(spec, log, outputs, settings, pressures)
     response = simulation.simulate(stage.candidates(model.theta[None]))
     if not response.feasible[0]:

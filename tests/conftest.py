@@ -27,7 +27,7 @@ def arm() -> Arm:
 
 @pytest.fixture(scope="session")
 def spec(arm: Arm):
-    return load_model(arm.model, arm)
+    return load_model(arm)
 
 
 @pytest.fixture(scope="session")

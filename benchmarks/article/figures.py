@@ -178,7 +178,7 @@ def _surface(drawing: Drawing, runs: Runs, figure: Figure) -> None:
 def _arm(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     """The arm's meshes in the pose that begins the data."""
     arm = runs.problem.settings.arm
-    model = load_model(arm.model, arm).compile()
+    model = load_model(arm).compile()
     data = mujoco.MjData(model)
     data.qpos[[model.joint(name).qposadr[0] for name in arm.joint_names]] = runs.problem.logs[0].start
     mujoco.mj_kinematics(model, data)

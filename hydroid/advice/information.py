@@ -140,7 +140,7 @@ class ExperimentSimulator:
     """Simulates experiments at the present estimate theta, shape (P,), within the limits of the settings."""
 
     def __init__(self, settings: FitSettings, theta: Array) -> None:
-        self._spec = load_model(settings.arm.model, settings.arm)
+        self._spec = load_model(settings.arm)
         if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
             simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
             settings = settings.model_copy(update={"simulation": simulation})

@@ -125,7 +125,7 @@ def _trapped(problem: Problem, theta: Array, joint: int) -> Term | None:
     for log in problem.logs:
         room = abs(np.array([arm.lower[j], arm.upper[j]]) - log.start[j])
         if log.driven[j] and room.min() <= STOP_REACH:
-            spec = load_model(arm.model, arm)
+            spec = load_model(arm)
             simulation = make_simulation(spec, log, problem.outputs, problem.settings)
             assert isinstance(simulation, HydraulicSimulation)
             traced = simulation.trace(problem.stage.candidates(theta[None]))

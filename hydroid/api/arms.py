@@ -121,7 +121,7 @@ def simulate_arms(
     Raises:
         RunError: the simulation diverged, or the file cannot be written.
     """
-    from hydroid.arm.pair import SIDES
+    from hydroid.arm.machine import SIDES
     from hydroid.log import write_logs
 
     model = open_model(model)
@@ -140,12 +140,10 @@ def _by_arm(
     arm: str | None,
     read: Callable[[str | Path, FitSettings], Log],
 ) -> dict[str, Log]:
-    from hydroid.arm.machine import ALONE
-    from hydroid.arm.pair import SIDES, pair_of
+    from hydroid.arm.machine import ALONE, SIDES
 
     moving: tuple[str, ...] = (ALONE,)
     if arm is not None:
-        pair_of(settings.arm)
         moving = SIDES if arm == BOTH else (arm,)
     if arm not in (None, *SIDES, BOTH):
         hint = f"choose {', '.join(SIDES)} or {BOTH}"
@@ -163,7 +161,7 @@ def _by_arm(
 
 def _names_arms(path: Path, settings: FitSettings) -> bool:
     """Whether a file has a column of one of two arms."""
-    from hydroid.arm.pair import SIDES
+    from hydroid.arm.machine import SIDES
     from hydroid.log import open_table
 
     prefixes = tuple(f"{side}_" for side in SIDES)

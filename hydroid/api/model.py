@@ -1,4 +1,4 @@
-"""Use a model: `simulate` commands, `build_model` from meshes."""
+"""Use a model: `simulate` commands."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +9,6 @@ from hydroid.api.look import ModelSource, open_model, read_commands
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 from hydroid.log import Log, write_log
-from hydroid.settings.arm import load_arm
 
 
 def simulate(
@@ -58,36 +57,3 @@ def simulate(
     if trace is not None:
         write_atomic(Path(trace), trace_csv(model, commands))
     return result
-
-
-def build_model(
-    arm: str | Path = "hydrolek", meshes: str | Path | None = None, out: str | Path | None = None
-) -> Path:
-    """Compute centres of mass and inertias from an arm's meshes and write its MJCF.
-
-        hydroid.build_model("my-arm.yaml")
-
-    Args:
-        arm: the arm's YAML file, or the name of a shipped one.
-        meshes: folder of the meshes; by default as the arm's file says.
-        out: the MJCF to write; by default as the arm's file says, with the machine of two arms if it has one.
-
-    Returns:
-        The arm's file.
-
-    Raises:
-        SettingsError: no such arm. MeshError: a mesh is missing or has no volume.
-    """
-    settings = load_arm(arm)
-    if meshes is not None:
-        settings = settings.model_copy(update={"meshes": Path(meshes).resolve()})
-    target = Path(out or settings.model)
-    from hydroid.arm.build import write_model
-
-    write_model(settings, target)
-    if settings.pair is not None and out is None:
-        from hydroid.arm.model import load_model
-        from hydroid.arm.pair import write_pair
-
-        write_pair(load_model(target, settings), settings)
-    return target

@@ -2,7 +2,7 @@
 
 Bodies collide with the shapes that the MJCF makes collide; a mesh counts as its convex hull. Distances are
 MuJoCo's (`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against
-one that the model excludes. `hydroid build-model` excludes bodies that touch in a named pose of the arm.
+one that the model excludes; `hydroid init` excludes bodies that touch in the pose `home`.
 
 Most distances need no computing. When the joints turn by dq, no point of a body moves farther than the sum of
 |dq_j| times its greatest distance from joint j; so a known distance is a lower bound for some time

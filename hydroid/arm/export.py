@@ -15,9 +15,8 @@ import yaml
 from numpy.typing import ArrayLike
 
 from hydroid.arm.locked import Array, Frame, LockedArm, copy_joints
-from hydroid.arm.model import quiet_mujoco
-from hydroid.errors import RunError
 from hydroid.files import write_atomic
+from hydroid.mjcf import quiet_mujoco
 
 FITTED, MECHANICS, ACTUATORS, README = "fitted.xml", "mechanics.xml", "actuators.yaml", "README.txt"
 
@@ -47,7 +46,7 @@ actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm 
 """
 _LEFT_OUT = ("contact", "equality", "sensor", "keyframe", "actuator", "deformable", "size")
 _COMPILER = ("angle", "autolimits", "eulerseq", "meshdir", "texturedir", "strippath")
-_OF_A_LINK = ("body", "inertial", "joint", "freejoint")
+_OF_A_LINK = ("inertial", "joint", "freejoint")
 _BODY_FIELDS = ("pos", "quat", "ipos", "iquat", "mass", "inertia", "simple", "sameframe")
 
 
@@ -114,29 +113,40 @@ def arm_mjcf(
 def _fuse(root: ElementTree.Element, frames: tuple[Frame, ...], model: mujoco.MjModel) -> None:
     """Put the locked arm's bodies in the place of all; what hangs on the others moves to them in frames."""
     world, degrees = _section(root, "worldbody"), _section(root, "compiler").get("angle") != "radian"
-    above = {child: body for body in world.iter() for child in body.findall("body")}
-    inherited: dict[ElementTree.Element, dict[str, str]] = {world: {}}  # default class of a body's parts
+    above, bodies = {child: part for part in world.iter() for child in part}, list(world.iter("body"))
     kept = [ElementTree.Element("worldbody", world.attrib)]
     homes = [(kept[0], world)]
-    for body, frame in zip(world.iter("body"), frames[1:], strict=True):  # in the order of their numbers
-        own = body.get("childclass")
-        inherited[body] = {"childclass": own} if own else inherited[above[body]]
-        k = frame.body
+    for body, frame in zip(bodies, frames[1:], strict=True):  # in the order of their numbers
+        inherited, k = _default_class(body, above), frame.body
         if k < len(kept):
             placed = _frame(frame.position, frame.turn)
-            home = ElementTree.SubElement(kept[k], "frame", placed | inherited[body])
+            home = ElementTree.SubElement(kept[k], "frame", placed | inherited)
         else:
             named = {"name": body.get("name", "")} | _frame(model.body_pos[k], model.body_quat[k])
-            home = ElementTree.SubElement(kept[model.body_parentid[k]], "body", named | inherited[body])
+            home = ElementTree.SubElement(kept[model.body_parentid[k]], "body", named | inherited)
             mass = {"mass": _text([model.body_mass[k]]), "diaginertia": _text(model.body_inertia[k])}
             placed = _frame(model.body_ipos[k], model.body_iquat[k])
             ElementTree.SubElement(home, "inertial", placed | mass)
             home.append(_joint(body, model, k - 1, degrees))
             kept.append(home)
         homes.append((home, body))
+    for body in bodies:
+        above[body].remove(body)
     for home, body in homes:
         home.extend([part for part in body if part.tag not in _OF_A_LINK])
     root[list(root).index(world)] = kept[0]
+
+
+def _default_class(
+    body: ElementTree.Element, above: dict[ElementTree.Element, ElementTree.Element]
+) -> dict[str, str]:
+    """The default class of a body's parts: its own, or that of what it is in."""
+    part: ElementTree.Element | None = body
+    while part is not None:
+        if name := part.get("childclass"):
+            return {"childclass": name}
+        part = above.get(part)
+    return {}
 
 
 def _joint(body: ElementTree.Element, model: mujoco.MjModel, j: int, degrees: bool) -> ElementTree.Element:
@@ -170,35 +180,6 @@ def _frame(position: Array, turn: Array) -> dict[str, str]:
 
 def _text(values: Array | list[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
-
-
-def copy_model(spec: mujoco.MjSpec, folder: Path) -> None:
-    """Write `arm.xml` and its meshes, which the spec then names, to a folder that stands alone.
-
-    Raises:
-        RunError: a mesh cannot be read, or the folder cannot be written.
-    """
-    home, kept = Path(spec.modelfiledir).resolve(), dict[str, bytes]()
-    for number, mesh in enumerate(spec.meshes):
-        if not mesh.file:
-            continue  # its vertices stand in the MJCF
-        source = home / spec.meshdir / mesh.file
-        try:
-            content = source.read_bytes()
-        except OSError as error:
-            raise RunError(f"mesh cannot be read ({error.strerror})", where=str(source)) from None
-        # meshes of different folders may have one name
-        taken = kept.get(source.name, content) != content
-        mesh.file = f"{number}_{source.name}" if taken else source.name
-        kept[mesh.file] = content
-    for name, content in kept.items():
-        write_atomic(folder / "meshes" / name, content)
-    for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
-        for picture in pictures:
-            picture.file = picture.file and str(home / place / picture.file)  # these stay where they are
-    spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
-    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
-    write_atomic(folder / "arm.xml", spec.to_xml())
 
 
 def write_fitted(

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hydroid.arm.model import quiet_mujoco
 from hydroid.errors import ModelError
+from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 
 Array = NDArray[np.float64]

@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.arm.collision import CollisionChecker
-from hydroid.arm.model import load_model, mujoco_errors
-from hydroid.arm.pair import SIDES, build_pair
+from hydroid.arm.model import load_model
+from hydroid.errors import ModelError, SettingsError
+from hydroid.mjcf import mujoco_errors, read_mjcf
 from hydroid.settings.arm import Arm
 
 Array = NDArray[np.float64]
 
 ALONE = "alone"
 """the name of the arm that is not one of two"""
+SIDES = ("right", "left")
+"""the arms of a pair in the order of its joints; the names of their parts begin with these and `_`"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +58,21 @@ class Machine:
 
 
 def load_machine(arm: Arm, *, pair: bool) -> Machine:
-    """Read an arm's model, and put two of them on their carrier where a pair is wanted.
+    """Read the model of an arm alone, or that of two of them.
 
     Raises:
         SettingsError: a pair that the arm's file does not name.
-        ModelError: as `load_model`; MeshError: a part of the carrier that cannot be shown.
+        ModelError: as `read_mjcf`, or a pair whose joints are not those of two of the arm.
     """
-    spec = load_model(arm.model, arm)
-    if pair:
-        spec = build_pair(spec, arm)
-    with mujoco_errors(spec.modelname):
-        model = spec.compile()
-    return Machine(arm, model, SIDES if pair else (ALONE,))
+    if not pair:
+        return Machine(arm, load_model(arm).compile(), (ALONE,))
+    if arm.pair is None:
+        hint = "name its MJCF in the arm's file, pair: MODEL.xml"
+        raise SettingsError(f"{arm.name} stands alone", where="--arm", hint=hint)
+    spec = read_mjcf(arm.pair)
+    wanted = [f"{side}_{name}" for side in SIDES for name in arm.joint_names]
+    if [joint.name for joint in spec.joints] != wanted:
+        hint = f"the joints of two arms are {', '.join(wanted)}"
+        raise ModelError("is not the model of two of the arm", where=str(arm.pair), hint=hint)
+    with mujoco_errors(str(arm.pair)):
+        return Machine(arm, spec.compile(), SIDES)

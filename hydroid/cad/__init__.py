@@ -1,6 +1,5 @@
-"""A robot's URDF or MJCF and meshes -> links and joints of a serial arm, through MuJoCo's importer."""
+"""A robot's URDF or MJCF and meshes -> the model of a serial arm, through MuJoCo's importer."""
 
-from hydroid.cad.imported import ImportedArm, ImportedJoint, ImportedLink
-from hydroid.cad.importer import import_arm
+from hydroid.cad.importer import ImportedArm, import_arm
 
-__all__ = ["ImportedArm", "ImportedJoint", "ImportedLink", "import_arm"]
+__all__ = ["ImportedArm", "import_arm"]

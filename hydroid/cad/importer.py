@@ -1,37 +1,43 @@
-"""A URDF or MJCF -> the links and joints of a serial arm, with everything posed at joint angles 0."""
+"""A URDF or MJCF -> the model of a serial arm that hydroid can simulate, and its meshes."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import mujoco
 import numpy as np
-import trimesh
 
-from hydroid.arm.model import mujoco_errors
-from hydroid.cad.chain import Chain, choose_chain
-from hydroid.cad.imported import Array, ImportedArm, ImportedJoint, ImportedLink
-from hydroid.cad.inertia import body_mass, fused, stated_faults
-from hydroid.cad.shapes import MeshFiles, joined, primitive
+from hydroid.cad.chain import choose_chain
+from hydroid.cad.repair import MASSLESS, repair_inertias, set_inertia
+from hydroid.cad.scene import SCENE, clear_scene, exclude_contacts, place_scene
+from hydroid.cad.shapes import HIDDEN, SHOWN, ball, read_mesh, shown_stl
 from hydroid.cad.source import Source, read_source
+from hydroid.mjcf import mujoco_errors
 
-DEFAULT_RANGE = (-180.0, 180.0)
-"""of a joint without limits [deg]"""
-Part = TypeVar("Part", ImportedLink, ImportedJoint)
-LEAST_MASS = 1e-9
-"""bound that lets MuJoCo compile bodies without mass [kg]"""
+LARGEST_MESH = 50.0
+"""size beyond which meshes are taken to be in millimetres [m]"""
+MESHES = "links"
+"""folder of the meshes beside the model"""
+PAINT, BASE = (0.94, 0.53, 0.08, 1.0), (0.25, 0.27, 0.3, 1.0)
+"""colours of what the file gives none"""
 
 
-@dataclass(frozen=True)
-class _MeshPlace:
-    """A mesh of a body; a site marks where it is."""
+@dataclass(frozen=True, eq=False)
+class ImportedArm:
+    """A serial arm out of a robot's file.
 
-    site: str
-    file: str
-    scale: Array
-    visual: bool
+    Attributes:
+        name: of the robot.
+        mjcf: its model, with meshes in the folder MESHES.
+        meshes: binary STL files by their path from the model.
+        notes: what was assumed, left out or mended, a line each.
+    """
+
+    name: str
+    mjcf: str
+    meshes: dict[str, bytes]
+    notes: tuple[str, ...]
 
 
 def import_arm(path: Path, columns: Sequence[str] = (), tip: str | None = None) -> ImportedArm:
@@ -46,134 +52,131 @@ def import_arm(path: Path, columns: Sequence[str] = (), tip: str | None = None) 
         ModelError: the file cannot be read, or holds no arm.
     """
     source = read_source(path)
-    faults = stated_faults(source)
-    places = _sites_for_meshes(source)
+    spec, notes = source.spec, source.notes
+    _clear(spec, path)
+    choose_chain(spec, str(path), notes, columns, tip)
+    meshes = _convert_meshes(source)
+    _sort_shapes(spec)
     with mujoco_errors(str(path)):
-        compiler = source.spec.compiler
-        compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = True, LEAST_MASS, LEAST_MASS
-        model = source.spec.compile()
-    data = mujoco.MjData(model)
-    for joint in range(model.njnt):
-        if model.jnt_type[joint] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            data.qpos[model.jnt_qposadr[joint]] = 0.0
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    chain = choose_chain(source, model, columns, tip)
-    files = MeshFiles(source.meshes, {place.file: place.scale for place in places}, source.notes)
-    looks = tuple(joined(_looks(model, data, body, places, files)) for body in range(model.nbody))
-    posed = _Posed(source, model, data, chain, looks)
-    links = tuple(posed.link(k, faults) for k in range(len(chain.bodies)))
-    joints = tuple(posed.joint(k) for k in range(len(chain.joints)))
-    if not model.dof_damping.any():
-        source.notes.append("no joint has damping: a fit estimates it")
-    return ImportedArm(
-        name=_word(source.spec.modelname or path.stem),
-        base=posed.base(),
-        links=tuple(map(_renamed, links, _distinct([link.name for link in links]))),
-        joints=tuple(map(_renamed, joints, _distinct([joint.name for joint in joints]))),
-        notes=tuple(dict.fromkeys(source.notes)),
-    )
+        repair_inertias(spec, source.urdf, notes)
+        spec.fuse_static()
+    if not any(np.any(joint.damping) for joint in spec.joints):
+        notes.append("no joint has damping: a fit estimates it")
+    for joint in spec.joints:
+        _mend_joint(joint, notes)
+    return ImportedArm(spec.modelname, _in_scene(spec, meshes), meshes, tuple(dict.fromkeys(notes)))
 
 
-def _sites_for_meshes(source: Source) -> list[_MeshPlace]:
-    """Mark where meshes are, and take them out where MuJoCo need not integrate over them: it refuses some."""
-    spec, places = source.spec, list[_MeshPlace]()
-    files = {mesh.name: (mesh.file, np.array(mesh.scale)) for mesh in spec.meshes}
-    for number, geom in enumerate(list(spec.geoms)):
-        if geom.type != mujoco.mjtGeom.mjGEOM_MESH:
-            continue
-        site = geom.parent.add_site(name=f"hydroid mesh {number}", pos=geom.pos, quat=geom.quat)
-        for name in ("type", "axisangle", "xyaxes", "zaxis", "euler"):
-            setattr(site.alt, name, getattr(geom.alt, name))
-        if geom.frame is not None:
-            site.set_frame(geom.frame)
-        file, scale = files[geom.meshname]
-        places.append(_MeshPlace(site.name, file, scale, not geom.contype and not geom.conaffinity))
-        if source.urdf or geom.parent.explicitinertial or file not in source.meshes:
-            spec.delete(geom)
-    if all(geom.type != mujoco.mjtGeom.mjGEOM_MESH for geom in spec.geoms):
-        for mesh in list(spec.meshes):
-            spec.delete(mesh)
-    return places
-
-
-def _looks(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, places: list[_MeshPlace], files: MeshFiles
-) -> Iterator[trimesh.Trimesh]:
-    """Shapes of a body in the world's frame [m]: what is to be seen, or else what collides."""
-    found: list[tuple[bool, trimesh.Trimesh, Array, Array]] = []
-    for place in places:
-        site = model.site(place.site)
-        mesh = files.get(place.file, place.scale) if site.bodyid[0] == body else None
-        if mesh is not None:
-            found.append((place.visual, mesh, data.site_xmat[site.id], data.site_xpos[site.id]))
-    for geom in np.flatnonzero(model.geom_bodyid == body):
-        mesh = primitive(int(model.geom_type[geom]), model.geom_size[geom])
-        visual = not model.geom_contype[geom] and not model.geom_conaffinity[geom]
-        if mesh is not None:
-            found.append((visual, mesh, data.geom_xmat[geom], data.geom_xpos[geom]))
-    seen = any(visual for visual, *_ in found)
-    for visual, mesh, turn, at in found:
-        if visual or not seen:
-            pose = np.eye(4)
-            pose[:3, :3], pose[:3, 3] = turn.reshape(3, 3), at
-            yield mesh.apply_transform(pose)
-
-
-@dataclass(frozen=True, eq=False)
-class _Posed:
-    """The model at joint angles 0, and what each body looks like in the world [m]."""
-
-    source: Source
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    chain: Chain
-    looks: tuple[trimesh.Trimesh | None, ...]
-
-    def base(self) -> trimesh.Trimesh | None:
-        """Return what carries the arm."""
-        body, bodies = int(self.model.body_parentid[self.chain.bodies[0]]), list[int]()
-        while body:
-            bodies.append(body)
-            body = int(self.model.body_parentid[body])
-        return joined(look for b in bodies if (look := self.looks[b]) is not None)
-
-    def link(self, k: int, faults: dict[str, str]) -> ImportedLink:
-        """Return the chain's link k with all bodies that it carries."""
-        notes, origin = self.source.notes, self.data.xanchor[self.chain.joints[k]]
-        own = [body for body, carrier in enumerate(self.chain.carrier) if carrier == k]
-        bodies = tuple(self.model.body(body).name for body in own)
-        known = [body_mass(self.model, self.data, b, self.looks[b], faults, notes) for b in own]
-        whole = fused([mass for mass in known if mass is not None], origin, bodies[0], notes)
-        mesh = joined(look for body in own if (look := self.looks[body]) is not None)
-        if mesh is not None:
-            mesh.apply_translation(-origin)
-        return ImportedLink(_word(bodies[0]), whole.mass, whole.centre - origin, whole.tensor, mesh, bodies)
-
-    def joint(self, k: int) -> ImportedJoint:
-        """Return the chain's joint k."""
-        joint, model = self.chain.joints[k], self.model
-        before = self.data.xanchor[self.chain.joints[k - 1]] if k else np.zeros(3)
-        name = _word(model.joint(joint).name or f"{model.body(self.chain.bodies[k]).name}_joint")
-        low, high = np.degrees(model.jnt_range[joint]).round(4).tolist()
-        limited = bool(model.jnt_limited[joint]) and low < high
-        if not limited:
-            self.source.notes.append(
-                f"joint {name} has no limits: it turns without stops, unless you set range and continuous"
-            )
-        axis, at = self.data.xaxis[joint].copy(), self.data.xanchor[joint] - before
-        return ImportedJoint(name, axis, at, (low, high) if limited else DEFAULT_RANGE, not limited)
+def _clear(spec: mujoco.MjSpec, path: Path) -> None:
+    """Delete what is no part of the arm's bodies, and give these plain names."""
+    forces = (spec.actuators, spec.sensors, spec.equalities, spec.tendons)
+    for section in (*forces, spec.keys, spec.excludes, spec.pairs):
+        for part in list(section):
+            spec.delete(part)
+    clear_scene(spec)
+    spec.modelname = _word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
+    taken = {"world"}
+    for number, body in enumerate(spec.bodies[1:], start=1):
+        body.name = _distinct(_word(body.name or f"link{number}"), taken)
+    taken = set()
+    for joint in spec.joints:
+        joint.name = _distinct(_word(joint.name or f"{joint.parent.name}_joint"), taken)
+    folder = path.resolve().parent / spec.texturedir
+    for texture in spec.textures:
+        texture.file = texture.file and str(folder / texture.file)  # these stay where they are
+    spec.texturedir = ""
 
 
 def _word(name: str) -> str:
     """A plain word from any name."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII) or "arm"
-    return f"_{word}" if word[0].isdigit() else "base_" if word == "base" else word
+    return f"_{word}" if word[0].isdigit() else word
 
 
-def _distinct(names: list[str]) -> list[str]:
-    return [name if name not in names[:k] else f"{name}_{k + 1}" for k, name in enumerate(names)]
+def _distinct(name: str, taken: set[str]) -> str:
+    """A name that is not taken, which it is from now on."""
+    free = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 10_000))) if n not in taken)
+    taken.add(free)
+    return free
 
 
-def _renamed(part: Part, name: str) -> Part:
-    return replace(part, name=name)
+def _convert_meshes(source: Source) -> dict[str, bytes]:
+    """Turn the meshes into STL files in m, delete those that cannot be shown, and return the files."""
+    spec, notes, files = source.spec, source.notes, dict[str, tuple[str, bytes]]()
+    read = {name: read_mesh(path, notes) for name, path in source.meshes.items()}
+    sizes = {
+        mesh.file: float(np.max(found.extents * np.abs(mesh.scale)))
+        for mesh in spec.meshes
+        if (found := read.get(mesh.file)) is not None
+    }
+    largest = max(sizes, key=lambda name: sizes[name], default="")
+    millimetres = bool(largest) and sizes[largest] > LARGEST_MESH
+    if millimetres:
+        name = source.meshes[largest].name
+        notes.append(f"mesh {name} would be {sizes[largest]:.4g} m long: all meshes are taken to be in mm")
+    taken: set[str] = set()
+    for name, mesh in read.items():
+        content = None if mesh is None else shown_stl(mesh, source.meshes[name].name, notes)
+        if content is not None:
+            stem = _distinct(_word(source.meshes[name].stem), taken)
+            files[name] = f"{MESHES}/{stem}.stl", content
+    for mesh in list(spec.meshes):
+        shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
+        if mesh.file and (mesh.file not in files or not shapes):
+            for part in (*shapes, mesh):
+                spec.delete(part)
+        elif mesh.file:
+            mesh.file = files[mesh.file][0]
+            mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
+            if source.urdf or all(geom.parent.explicitinertial for geom in shapes):
+                mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # of no use, and never refused
+    spec.meshdir, spec.strippath, spec.assets = "", False, dict(files.values())
+    return dict(files.values())
+
+
+def _sort_shapes(spec: mujoco.MjSpec) -> None:
+    """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
+    plain = np.array([0.5, 0.5, 0.5, 1.0])
+    for body in spec.bodies:
+        visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
+        solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
+        for geom in body.geoms:
+            geom.group = SHOWN if geom in (visual or solid) else HIDDEN
+            geom.contype = geom.conaffinity = int(geom in (solid or visual))
+            if not geom.material and np.allclose(geom.rgba, plain):
+                geom.rgba = PAINT if any(_joints_above(body)) else BASE
+
+
+def _joints_above(body: mujoco.MjsBody | None) -> list[mujoco.MjsJoint]:
+    return [] if body is None else [*body.joints, *_joints_above(body.parent)]
+
+
+def _mend_joint(joint: mujoco.MjsJoint, notes: list[str]) -> None:
+    """Give the joint's link a mass, say where it has no limits, and leave to a fit what a fit finds."""
+    joint.damping = joint.stiffness = np.zeros(3)
+    joint.frictionloss = joint.armature = 0.0
+    if joint.parent.mass <= MASSLESS:
+        name = joint.parent.name
+        notes.append(f"link {name} has no mass and no shape: a steel ball of 1 kg in its joint is taken")
+        set_inertia(joint.parent, 1.0, np.array(joint.pos), ball(1.0))
+    if joint.limited == mujoco.mjtLimited.mjLIMITED_FALSE or not joint.range[0] < joint.range[1]:
+        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+        notes.append(f"joint {joint.name} has no limits: it turns without stops, unless you give it a range")
+
+
+def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
+    """Return the arm's MJCF with light, floor and cameras, and the pose nearest to 0 as `home`."""
+    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+    text = spec.to_xml().replace("<worldbody>", f"{SCENE}<worldbody>", 1)
+    with mujoco_errors(spec.modelname):
+        whole = mujoco.MjSpec.from_string(text, assets=meshes)
+        model = whole.compile()
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    home = np.clip(0.0, low, high)
+    whole.add_key(name="home", qpos=home)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    place_scene(whole, data.xanchor[0], data.xanchor[-1])
+    exclude_contacts(whole)
+    whole.compiler.savecompiled = whole.compiler.savecanonical = False
+    return whole.to_xml()

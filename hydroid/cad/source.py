@@ -1,6 +1,5 @@
-"""A URDF or MJCF file -> MuJoCo's spec of it, where its meshes are, and which joints are not moved."""
+"""A URDF or MJCF file -> MuJoCo's spec of it with hinges alone, and where its meshes are."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -8,9 +7,9 @@ from xml.etree import ElementTree
 
 import mujoco
 
-from hydroid.arm.model import mujoco_errors
 from hydroid.errors import ModelError
 from hydroid.files import is_file
+from hydroid.mjcf import mujoco_errors
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
@@ -18,27 +17,24 @@ PARENTS = 4
 """folders above the file's own in which package:// paths are looked up"""
 SEARCHED = 20_000
 """files below the file's folder among which a mesh is looked up by its name"""
-HELD = {
-    "prismatic": "slides",
-    "floating": "floats freely",
-    "planar": "moves in a plane",
-    "slide": "slides",
-    "free": "floats freely",
-    "ball": "is a ball joint",
+HELD = {"prismatic": "slides", "floating": "floats freely", "planar": "moves in a plane"}
+"""kinds of a URDF's joints that hydroid does not move, and what they do"""
+HELD_IN_MJCF = {
+    mujoco.mjtJoint.mjJNT_SLIDE: "slides",
+    mujoco.mjtJoint.mjJNT_FREE: "floats freely",
+    mujoco.mjtJoint.mjJNT_BALL: "is a ball joint",
 }
-"""kinds of joints that hydroid does not move, and what they do"""
 
 
 @dataclass
 class Source:
-    """A file as MuJoCo reads it.
+    """A file as MuJoCo reads it, without the joints that hydroid does not move.
 
     Attributes:
         path: the file.
         spec: MuJoCo's.
         urdf: whether it is a URDF.
         meshes: where each file that the spec names lies, by that name.
-        held: names of hinges that are not moved.
         notes: a line for each thing that was assumed, left out or mended.
     """
 
@@ -46,7 +42,6 @@ class Source:
     spec: mujoco.MjSpec
     urdf: bool
     meshes: dict[str, Path] = field(default_factory=dict[str, Path])
-    held: set[str] = field(default_factory=set[str])
     notes: list[str] = field(default_factory=list[str])
 
 
@@ -75,7 +70,7 @@ def read_source(path: Path) -> Source:
 
 
 def _urdf(path: Path, root: ElementTree.Element) -> Source:
-    source = Source(path, mujoco.MjSpec(), urdf=True)
+    source, mimics = Source(path, mujoco.MjSpec(), urdf=True), list[str]()
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:
@@ -87,13 +82,13 @@ def _urdf(path: Path, root: ElementTree.Element) -> Source:
         mimic = joint.find("mimic")
         if mimic is not None:
             joint.remove(mimic)
-            source.held.add(name)
+            mimics.append(name)
             source.notes.append(
                 f"joint {name} mimics {mimic.get('joint')}, which hydroid does not model: it is held at 0"
             )
         elif kind in HELD:
             joint.set("type", "fixed")  # MuJoCo refuses some of them
-            source.notes.append(f"joint {name} is {kind}: hydroid moves hinges only, so it is held at 0")
+            source.notes.append(f"joint {name} {HELD[kind]}: hydroid moves hinges only, so it is held at 0")
     _find_urdf_meshes(source, root)
     section = root.find("mujoco")
     section = ElementTree.SubElement(root, "mujoco") if section is None else section
@@ -102,6 +97,8 @@ def _urdf(path: Path, root: ElementTree.Element) -> Source:
     compiler.attrib.update(URDF_OPTIONS)
     with mujoco_errors(str(path)):
         source.spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    for name in mimics:
+        source.spec.delete(source.spec.joint(name))
     return source
 
 
@@ -138,20 +135,16 @@ def _find(given: str, folder: Path) -> tuple[Path | None, str]:
             tried += [place / rest, place / inside]
     else:
         tried = [folder / rest, Path(rest)]
-    found = next((path for path in tried if is_file(path)), None)
-    if found is None:
-        alike = (
-            [path for path in islice(folder.rglob("*"), SEARCHED) if path.name == parts[-1]] if parts else []
-        )
-        found = alike[0] if alike else None
     last = parts[-1] if parts else given
+    alike = (path for path in islice(folder.rglob("*"), SEARCHED) if parts and path.name == last)
+    found = next((path for path in tried if is_file(path)), None) or next(alike, None)
     return found, f"{tried[0]}, {tried[-1]} and {last} below {folder}"
 
 
 def _mjcf(path: Path) -> Source:
     with mujoco_errors(str(path)):
         source = Source(path, mujoco.MjSpec.from_file(str(path)), urdf=False)
-    spec = source.spec
+    spec, notes = source.spec, source.notes
     folder = path.resolve().parent / spec.meshdir
     for mesh in spec.meshes:
         if mesh.file:
@@ -159,33 +152,24 @@ def _mjcf(path: Path) -> Source:
             if found:
                 source.meshes[mesh.file] = found
             else:
-                source.notes.append(f"mesh {mesh.file} is not there; looked for {folder / mesh.file}")
-    for name, kind in _unmoved(spec):
-        source.notes.append(f"joint {name} {HELD[kind]}: hydroid moves hinges only, so it is held at 0")
+                notes.append(f"mesh {mesh.file} is not there; looked for {folder / mesh.file}")
+    followers: dict[str, str] = {}
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT:
-            source.held.add(equality.name1)
-            what = f"follows {equality.name2}" if equality.name2 else "is held by an equality"
-            source.notes.append(
-                f"joint {equality.name1} {what}, which hydroid does not model: it is held at 0"
-            )
+            leader = equality.name2
+            followers[equality.name1] = f"follows {leader}" if leader else "is held by an equality"
         else:
-            source.notes.append(
-                f"equality {equality.name or '(unnamed)'} is left out: hydroid models serial arms"
-            )
+            notes.append(f"equality {equality.name or '(unnamed)'} is left out: hydroid models serial arms")
+    for joint in list(spec.joints):
+        name = joint.name or f"of {joint.parent.name}"
+        if joint.type in HELD_IN_MJCF:
+            what = HELD_IN_MJCF[joint.type]
+            notes.append(f"joint {name} {what}: hydroid moves hinges only, so it is held at 0")
+        elif name in followers:
+            notes.append(f"joint {name} {followers[name]}, which hydroid does not model: it is held at 0")
+        else:
+            continue
+        spec.delete(joint)
     if spec.actuators:
-        source.notes.append(
-            f"its {len(spec.actuators)} actuators are left out: the hydraulics take their place"
-        )
+        notes.append(f"its {len(spec.actuators)} actuators are left out: the hydraulics take their place")
     return source
-
-
-def _unmoved(spec: mujoco.MjSpec) -> Iterator[tuple[str, str]]:
-    kinds = {
-        mujoco.mjtJoint.mjJNT_SLIDE: "slide",
-        mujoco.mjtJoint.mjJNT_FREE: "free",
-        mujoco.mjtJoint.mjJNT_BALL: "ball",
-    }
-    for joint in spec.joints:
-        if joint.type in kinds:
-            yield joint.name or f"of {joint.parent.name}", kinds[joint.type]

@@ -82,7 +82,6 @@ COMMANDS = (
     ("plan", plan.suggest, "find what the model lacks, and what to do next", "--fit runs/hyd"),
     ("plan", plan.design, "design the next experiment", "LOG.csv --fit runs/mech --duration 30"),
     ("model", model.simulate, "simulate commands, write a log", "COMMANDS.csv --fit runs/hyd --out sim.csv"),
-    ("model", model.build_model, "make an arm's MJCF model from its meshes", "--arm my-arm.yaml"),
     ("study", study.study, "run a study of your own", "my-study.yaml --seeds 10"),
 )
 """group, function, summary and example of each command"""

@@ -1,4 +1,4 @@
-"""`hydroid simulate` and `build-model`."""
+"""`hydroid simulate`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -58,23 +58,3 @@ def simulate(
         (log, *_) = simulate_arms(model, logs, target, noise_deg=noise_deg, seed=seed).values()
     content = {"out": str(target), "samples": len(log.time), "duration_s": float(log.duration)}
     show(output, lambda: content | {"trace": trace and str(trace)}, [str(target)])
-
-
-def build_model(
-    output: Output,
-    arm: Annotated[
-        str, typer.Option(help="The arm: a YAML file, or the name of a shipped arm.")
-    ] = "hydrolek",
-    meshes: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the meshes [default: as in the arm's file].")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="MODEL.xml", help="MJCF file to write [default: as in the arm's file]."),
-    ] = None,
-) -> None:
-    """Compute each link's centre of mass and inertia from its mesh and write the arm's MJCF model."""
-    from hydroid.api.model import build_model
-
-    target = build_model(arm, meshes, out)
-    show(output, lambda: {"out": str(target)}, [str(target)])

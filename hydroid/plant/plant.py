@@ -8,14 +8,15 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydroid.arm.export import arm_mjcf, copy_model, dressed_model, write_fitted
+from hydroid.arm.export import arm_mjcf, dressed_model, write_fitted
 from hydroid.arm.locked import lock
-from hydroid.arm.model import add_payload, load_model, quiet_mujoco
+from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.hydraulics.actuator import ActuatorState
 from hydroid.hydraulics.records import JOINT_STATE, drawing_values, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
+from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.problem.stage import Stage
 from hydroid.simulation.hydraulic import ArmActuators
 from hydroid.simulation.rollout import HydraulicArm, SingleArm, compile_rollout
@@ -70,7 +71,7 @@ class Plant:
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:
             what = f"must be a multiple of {self.timestep:g} s"
             raise SettingsError(what, where=f"period {self.period:g} s")
-        self._spec = load_model(arm.model, arm)
+        self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
         self._candidate = Stage(settings).candidates(identified.theta[None])
@@ -188,7 +189,6 @@ class Plant:
             RunError: the folder cannot be written.
         """
         folder, settings = Path(folder), self.identified.settings
-        copy_model(load_model(settings.arm.model, settings.arm), folder / "model")
         write_settings(folder, settings)
         summary = self.identified.summarise()
         write_estimate(folder, summary.model_copy(update={"joints": self.joints}))
@@ -204,7 +204,7 @@ class Plant:
         """
         model, candidate, arm = copy(self.model), self._candidate, self.identified.settings.arm
         model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
-        spec = load_model(folder / "arm.xml", arm)  # with the meshes' names there
+        spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
         names = [arm.joint_names[j - 1] for j in self.joints]
         motors, actuators = np.array([self._gain, self._balance]), None
         if candidate.actuators is not None:

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hydroid.arm.model import load_model, quiet_mujoco
+from hydroid.arm.model import load_model
 from hydroid.log import Log
+from hydroid.mjcf import quiet_mujoco
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.linkage import LinearActuator
@@ -96,5 +97,5 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
         "a test movement", np.array([0.0, period]), np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
     )
     alone = settings.simulation.model_copy(update={"other_joints": "locked"})
-    scenario = Scenario(load_model(arm.model, arm), arm, rest, [joint - 1], alone)
+    scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
     return Bench(settings, joint, middle, (middle - half, middle + half), period, scenario)

@@ -68,7 +68,7 @@ class Problem:
     """
 
     def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: Spread | None = None) -> None:
-        spec = load_model(settings.arm.model, settings.arm)
+        spec = load_model(settings.arm)
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
@@ -111,7 +111,7 @@ class Problem:
         """
         if not (everywhere or self.settings.free_start):
             return []
-        spec = load_model(self.settings.arm.model, self.settings.arm)  # cannot be pickled: not kept
+        spec = load_model(self.settings.arm)  # cannot be pickled: not kept
         candidates, found = self.stage.candidates(theta[None]), list[StartSlopes]()
         for i, log in enumerate(self.logs):
             joints = self._started(log)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import yaml
@@ -78,16 +77,11 @@ NO_LOG = """\
 """
 
 
-@dataclass(frozen=True)
-class Names:
-    """The settings' file as a command takes it, and the arm's file as the settings name it."""
+def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: str, arm_file: str) -> str:
+    """Return the settings of a fit of the whole chain.
 
-    file: str
-    arm: str
-
-
-def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], names: Names) -> str:
-    """Return the settings of a fit of the whole chain."""
+    `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it.
+    """
     lines, volumes = list[str](), list[float]()
     outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
     for joint in outputs:
@@ -108,8 +102,8 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], names:
             )
         )
     return FIT.format(
-        file=names.file,
-        arm=flow(names.arm),
+        file=file,
+        arm=flow(arm_file),
         outputs=flow([arm.joint_names[joint - 1] for joint in outputs]),
         log=_log(arm, layout),
         others=_others(layout),

@@ -135,9 +135,9 @@ def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
     margin = math.radians(LogSettings().angle_margin_deg)
     if low >= arm.lower[joint - 1] - margin and high <= arm.upper[joint - 1] + margin:
         return []
-    limits = " to ".join(f"{limit:g}" for limit in arm.joints[joint - 1].range)
+    limits = " to ".join(f"{limit:.6g}" for limit in arm.joints[joint - 1].range)
     return [
         f"{arm.joint_names[joint - 1]}: the angles in the log run from {math.degrees(low):.1f} to "
-        f"{math.degrees(high):.1f} deg, but the arm's file allows {limits}: give the angle an offset or a "
+        f"{math.degrees(high):.1f} deg, but the arm allows {limits}: give the angle an offset or a "
         "scale of -1, or change the range"
     ]

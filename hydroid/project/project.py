@@ -5,17 +5,16 @@ import shutil
 import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from hydroid.arm.build import write_model
-from hydroid.cad import ImportedArm, ImportedLink, import_arm
-from hydroid.cad.shapes import showable, stl
+from hydroid.cad import ImportedArm, import_arm
+from hydroid.cad.importer import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import MESHES, arm_text, template_text
-from hydroid.project.fit_files import Names, fit_text
+from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, arm_text
+from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
@@ -68,42 +67,63 @@ class Sources:
     joints: tuple[str, ...] = ()
     tip: str | None = None
 
+    @property
+    def arm_file(self) -> Path | None:
+        """The arm's YAML file, where the user has one."""
+        return self.robot if self.robot and self.robot.suffix.lower() in (".yaml", ".yml") else None
+
 
 def write_project(folder: Path, sources: Sources) -> Project:
     """Write a project to a folder, new or with other things in it.
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the given names.
-        ModelError, MeshError, LogError: the robot or the first log cannot be used.
+        ModelError, LogError: the robot or the first log cannot be used.
         RunError: the folder cannot be written.
     """
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if taken:
         raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint="name another folder")
-    logs, robot = sources.logs, sources.robot
-    table = open_table(logs[0]) if logs else None
-    own = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
-    imported = None
-    if robot is not None and not own:
-        imported = import_arm(robot, table.names if table else (), sources.tip)
+    table = open_table(sources.logs[0]) if sources.logs else None
+    imported, file, reference = None, sources.arm_file, ARM
+    if file is not None:
+        reference = Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+    elif sources.robot is not None:
+        imported = import_arm(sources.robot, table.names if table else (), sources.tip)
     with _stage(folder) as stage:
-        if imported is not None:
-            imported = _write_meshes(imported, stage / MESHES)
-        files = _ArmFiles(folder, stage, imported, robot)
-        arm = files.write()
+        arm = load_arm(file) if file is not None else _write_arm(stage, imported, sources.robot)
         layout = find_layout(table, arm, sources.joints) if table is not None else None
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
-        arm = files.write(sizes)
+        if imported is not None:
+            arm = _write_arm(stage, imported, sources.robot, arm.joint_names, sizes)
         with style():
             write_atomic(stage / PICTURE, rendered(arm_figure(arm))[0])
-        write_atomic(stage / FIT, fit_text(arm, layout, sizes, Names(str(folder / FIT), files.reference)))
+        write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
-        steps = next_steps(folder, logs)
+        steps = next_steps(folder, sources.logs)
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
         write_atomic(stage / STEPS, steps_page(arm.name, folder, steps, notes, reasons))
         written = _move(stage, folder)
     return Project(folder, written, notes, reasons, layout.unused if layout else (), steps)
+
+
+def _write_arm(
+    stage: Path,
+    imported: ImportedArm | None,
+    robot: Path | None,
+    joints: Sequence[str] = (),
+    sizes: Sequence[JointSize] = (),
+) -> Arm:
+    """Write model, meshes and the arm's file, with actuators of the given sizes, and return the arm."""
+    if imported is None or robot is None:
+        model, text, meshes = TEMPLATE_MODEL, TEMPLATE_FILE, dict[str, bytes]()
+    else:
+        title = f"{imported.name}, from {robot.name}"
+        model, text, meshes = imported.mjcf, arm_text(imported, joints, sizes, title), imported.meshes
+    for name, content in {MODEL: model, ARM: text, **meshes}.items():
+        write_atomic(stage / name, content)
+    return load_arm(stage / ARM)
 
 
 @contextmanager
@@ -118,51 +138,6 @@ def _stage(folder: Path) -> Generator[Path]:
         yield stage
     finally:
         shutil.rmtree(stage, ignore_errors=True)
-
-
-def _write_meshes(imported: ImportedArm, folder: Path) -> ImportedArm:
-    """Write the meshes that MuJoCo can show, and return the arm with those."""
-    notes, links = [*imported.notes], list[ImportedLink]()
-    for link in imported.links:
-        mesh = None if link.mesh is None else showable(link.mesh, f"link {link.name}", notes)
-        if mesh is not None:
-            write_atomic(folder / f"{link.name}.stl", stl(mesh))
-        links.append(replace(link, mesh=mesh))
-    base = None if imported.base is None else showable(imported.base, "the base", notes)
-    if base is not None:
-        write_atomic(folder / "base.stl", stl(base))
-    return replace(imported, base=base, links=tuple(links), notes=tuple(notes))
-
-
-@dataclass(frozen=True)
-class _ArmFiles:
-    """The arm's file and model: written to the stage, or those that the user has."""
-
-    folder: Path
-    stage: Path
-    imported: ImportedArm | None
-    robot: Path | None
-
-    @property
-    def reference(self) -> str:
-        """The arm's file, seen from the project."""
-        if self.imported is not None or self.robot is None:
-            return ARM
-        return Path(os.path.relpath(self.robot.resolve(), self.folder.resolve())).as_posix()
-
-    def write(self, sizes: Sequence[JointSize] = ()) -> Arm:
-        """Write both, actuators of the given sizes included, and return the arm."""
-        file = str(self.folder / ARM)
-        if self.robot is None:
-            text = template_text(file)
-        elif self.imported is not None:
-            text = arm_text(self.imported, sizes, f"{self.imported.name}, from {self.robot.name}", file)
-        else:
-            return load_arm(self.robot)
-        write_atomic(self.stage / ARM, text)
-        arm = load_arm(self.stage / ARM)
-        write_model(arm, self.stage / MODEL)
-        return arm
 
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hydroid.arm.build import build_model
-from hydroid.arm.model import mujoco_errors
+from hydroid.arm.model import load_model
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -58,14 +57,13 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     """Return the size of every joint, (J,).
 
     Args:
-        arm: with its meshes in place.
+        arm: with its model in place.
         speeds: that a log shows, by number of the joint [rad/s].
 
     Raises:
-        MeshError, ModelError: the arm's model cannot be built.
+        ModelError: the arm's model cannot be read.
     """
-    with mujoco_errors(arm.name):
-        model = build_model(arm).compile()
+    model = load_model(arm).compile()
     data = mujoco.MjData(model)
     low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
     torque = np.zeros(len(arm.joints))

@@ -16,7 +16,7 @@ Then, from the folder in which you ran `hydroid init`:
 {commands}
 ```
 
-- `arm.yaml` is the arm: correct it, then run `hydroid build-model --arm {folder}/arm.yaml`.
+- `arm.xml` is the arm's model, `arm.yaml` has its actuators: correct both.
 - `fit.yaml` are the settings of the fit: columns of the log, parameters, starts, priors.
 - A log should begin with a second without a command. Record several: fit on some, validate on another.
 """

@@ -4,13 +4,12 @@ from collections.abc import Iterator
 
 import mujoco
 import numpy as np
-import trimesh
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from hydroid.arm.build import VISUAL_GROUP, build_model
-from hydroid.cad.shapes import primitive
+from hydroid.arm.model import load_model
+from hydroid.cad.shapes import SHOWN, geom_mesh
 from hydroid.parameters import Array
 from hydroid.report import style
 from hydroid.settings.arm import Arm, Joint
@@ -27,9 +26,9 @@ def arm_figure(arm: Arm) -> Figure:
     """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest to it.
 
     Raises:
-        MeshError, ModelError: its model cannot be built.
+        ModelError: its model cannot be read.
     """
-    model = build_model(arm).compile()
+    model = load_model(arm).compile()
     data = mujoco.MjData(model)
     low, high = np.where(np.isfinite(arm.lower), arm.lower, 0), np.where(np.isfinite(arm.upper), arm.upper, 0)
     data.qpos[:] = np.clip(0.0, low, high)
@@ -41,12 +40,12 @@ def arm_figure(arm: Arm) -> Figure:
         f"{arm.name}, each joint as near to 0 as its range allows: does it look and turn like your arm?",
     )
     grid = drawing.add_gridspec(2 if linear else 1, 2, hspace=0.4, height_ratios=[1.5, 1][: 1 + bool(linear)])
-    links = list(_links(arm, model, data))
+    links = list(_links(model, data))
     for place, (across, names) in enumerate(((1, "xz"), (2, "xy"))):
         axes = drawing.add_subplot(grid[0, place])
         _view(axes, arm, links, across)
-        _skeleton(axes, arm, data, {name for name, *_ in links}, across)
-        _pivots(axes, model, data, across)
+        _skeleton(axes, arm, model, data, {name for name, *_ in links}, across)
+        _pivots(axes, arm, model, data, across)
         _axes_of_joints(axes, arm, data, across)
         axes.set_xlabel(f"{names[0]} [m]")
         axes.set_ylabel(f"{names[1]} [m]")
@@ -61,25 +60,18 @@ def arm_figure(arm: Arm) -> Figure:
     return drawing
 
 
-def _links(arm: Arm, model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[tuple[str, str, Array]]:
-    """Name, colour and triangles [m], shape (F, 3, 3), of every body that is shown."""
-    for body in range(1, model.nbody):
-        for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_group == VISUAL_GROUP)):
-            mesh = _mesh(model, int(geom))
+def _links(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[tuple[str, str, Array]]:
+    """Name, colour and triangles [m], shape (F, 3, 3), of every body shown; what is fixed is "base"."""
+    for body in range(model.nbody):
+        joint = int(model.body_jntadr[model.body_weldid[body]])
+        name, color = ("base", style.GREY) if joint < 0 else (model.body(body).name, _color(joint))
+        for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_group <= SHOWN)):
+            mesh = geom_mesh(model, int(geom))
             if mesh is None:
                 continue
             mesh = mesh if len(mesh.faces) <= MOST_FACES else mesh.convex_hull
             turned = mesh.vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-            yield model.body(body).name, style.GREY if body == 1 else _color(body - 2), turned[mesh.faces]
-
-
-def _mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
-    number = int(model.geom_dataid[geom])
-    if number < 0:
-        return primitive(int(model.geom_type[geom]), model.geom_size[geom])
-    vertices = model.mesh_vert[model.mesh_vertadr[number] :][: model.mesh_vertnum[number]]
-    faces = model.mesh_face[model.mesh_faceadr[number] :][: model.mesh_facenum[number]]
-    return trimesh.Trimesh(vertices, faces, process=False)
+            yield name, color, turned[mesh.faces]
 
 
 def _view(axes: Axes, arm: Arm, links: list[tuple[str, str, Array]], across: int) -> None:
@@ -93,13 +85,16 @@ def _view(axes: Axes, arm: Arm, links: list[tuple[str, str, Array]], across: int
         axes.add_collection(PolyCollection(faces, facecolor=color, edgecolor="none", alpha=0.45, label=label))
 
 
-def _skeleton(axes: Axes, arm: Arm, data: mujoco.MjData, drawn: set[str], across: int) -> None:
+def _skeleton(
+    axes: Axes, arm: Arm, model: mujoco.MjModel, data: mujoco.MjData, drawn: set[str], across: int
+) -> None:
     """Draw each link without a shape as a line from its joint to the next, the last to its centre of mass."""
-    if set(arm.link_names) <= drawn:
+    names = ("base", *arm.link_names[: len(arm.joints)])
+    if set(names[1:]) <= drawn:
         return
-    last = data.body(arm.link_names[len(arm.joints) - 1]).xipos
-    places = np.vstack([data.body("base").xpos, data.xanchor, last])[:, [0, 3 - across]]
-    for place, name in enumerate(("base", *arm.link_names[: len(arm.joints)])):
+    base, last = int(model.body_parentid[model.jnt_bodyid[0]]), data.xipos[model.jnt_bodyid[-1]]
+    places = np.vstack([data.xpos[base], data.xanchor, last])[:, [0, 3 - across]]
+    for place, name in enumerate(names):
         if name not in drawn:
             color = style.GREY if name == "base" else _color(place - 1)
             axes.plot(*places[place : place + 2].T, "-", color=color, linewidth=3, label=name)
@@ -127,12 +122,19 @@ def _axes_of_joints(axes: Axes, arm: Arm, data: mujoco.MjData, across: int) -> N
         axes.annotate(text, at[shown], (4, 6 + 9 * (place % 2)), textcoords="offset points", fontsize=7.5)
 
 
-def _pivots(axes: Axes, model: mujoco.MjModel, data: mujoco.MjData, across: int) -> None:
+def _pivots(axes: Axes, arm: Arm, model: mujoco.MjModel, data: mujoco.MjData, across: int) -> None:
+    """Draw each cylinder as a line between its pivots."""
     shown = [0, 3 - across]
-    for tendon in range(model.ntendon):
-        name = model.tendon(tendon).name.removesuffix("_cylinder")
-        ends = np.array([data.site(f"{name}_pivot_{end}").xpos[shown] for end in ("parent", "child")])
-        axes.plot(*ends.T, "-o", color="#000000", linewidth=3, markersize=4, solid_capstyle="round")
+    for place, joint in enumerate(arm.joints):
+        if isinstance(joint.actuator, LinearActuator) and joint.actuator.pivots is not None:
+            child = int(model.jnt_bodyid[place])
+            bodies = int(model.body_parentid[child]), child
+            ends = [
+                data.xpos[body] + data.xmat[body].reshape(3, 3) @ pivot
+                for body, pivot in zip(bodies, joint.actuator.pivots, strict=True)
+            ]
+            line = np.array(ends)[:, shown].T
+            axes.plot(*line, "-o", color="#000000", linewidth=3, markersize=4, solid_capstyle="round")
 
 
 def _lengths(axes: Axes, joints: list[Joint], arm: Arm, *, moment: bool) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
-from hydroid.cad.shapes import primitive
+from hydroid.cad.shapes import geom_mesh
 from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 
@@ -19,7 +19,7 @@ _MARGIN = 18
 
 def arm_picture(arm: Arm, pose: Array, marked: Collection[int]) -> str:
     """Return the arm in a pose [rad], shape (J,), as SVG; `marked` joints, from 1, carry their numbers."""
-    model = load_model(arm.model, arm).compile()
+    model = load_model(arm).compile()
     data = mujoco.MjData(model)
     joints = [model.joint(name) for name in arm.joint_names]
     data.qpos[[joint.qposadr[0] for joint in joints]] = pose
@@ -72,10 +72,7 @@ def side_view() -> Array:
 
 def corners(model: mujoco.MjModel, geom: int) -> Array:
     """Corners of a shape in its own frame, shape (n, 3); none of a plane."""
-    mesh = int(model.geom_dataid[geom])
-    if mesh >= 0:
-        return np.asarray(model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]], float)
-    shape = primitive(int(model.geom_type[geom]), model.geom_size[geom])
+    shape = geom_mesh(model, geom)
     return np.empty((0, 3)) if shape is None else np.asarray(shape.vertices, float)
 
 

@@ -26,7 +26,7 @@ def motion_section(
     shown = [movement for movement in movements if np.isfinite(movement.simulated).all()]
     if not shown:
         return ()
-    model, most = load_model(arm.model, arm).compile(), max(_FEWEST, MOST // len(shown))
+    model, most = load_model(arm).compile(), max(_FEWEST, MOST // len(shown))
     tabs: list[Tab] = []
     for i, movement in enumerate(shown):
         moving = moving_arm(model, arm.joint_names, movement, most)

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.arm.export import copy_model
-from hydroid.arm.model import load_model
 from hydroid.errors import RunError
 from hydroid.estimate import write_estimate
 from hydroid.files import remove_parts, write_atomic
@@ -81,7 +79,6 @@ class RunFolder:
             RunError: the folder cannot be written, or holds other files.
         """
         self._refuse_other_files()
-        copy_model(load_model(settings.arm.model, settings.arm), self.path / "model")
         write_settings(self.path, settings)
         files = {"files": own_hashes(self.path), "origin": model_hash(settings.arm), "status": "running"}
         self._describe(identity(settings, logs) | files)

@@ -22,7 +22,7 @@ DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
 FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
 """settings on which no result depends"""
-ELSEWHERE = frozenset({"model", "meshes", "pair"})
+ELSEWHERE = frozenset({"model", "pair"})
 """of an arm's settings: where its files are, and what stands beside it"""
 
 
@@ -102,7 +102,7 @@ def refuse_other_run(
         raise RunError(what, where=str(folder), hint=hint)
     if settings.arm.model.resolve() == (folder / MODEL).resolve():
         return
-    arms = (arm.model_dump(mode="json", exclude=set(ELSEWHERE)) for arm in (before.arm, settings.arm))
+    arms = (arm.file.model_dump(mode="json", exclude=set(ELSEWHERE)) for arm in (before.arm, settings.arm))
     for key, old, new in _differences(*arms):
         hint = f"continue it with its own arm, or {other}"
         raise RunError(f"holds a run of an arm with {key} = {old}, now {new}", where=str(folder), hint=hint)
@@ -119,7 +119,7 @@ def other_settings(then: FitSettings, now: FitSettings) -> list[tuple[str, Any, 
 
 def model_hash(arm: Arm) -> str:
     """Return the hash of the arm's MJCF and of its meshes."""
-    spec = load_model(arm.model, arm)
+    spec = load_model(arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
     return file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
 

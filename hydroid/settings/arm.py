@@ -1,113 +1,110 @@
-"""A serial hydraulic arm: links, joints, cylinders and named poses, from one YAML file.
+"""A hydraulic arm: an MJCF, and one YAML file with what MJCF cannot say.
 
-Units are those of a drawing (m, deg, mm, mm², cm³/rad); other packages turn them into SI.
+The MJCF has links, joints, ranges, masses and meshes; its keyframes are the named poses. The YAML has the
+actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Strict, model_validator
+from pydantic import AfterValidator, Field, Strict, ValidationInfo, model_validator
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
-from hydroid.settings.linkage import (
-    STROKE_TOLERANCE,
-    Direction,
-    LinearActuator,
-    RotaryActuator,
-    Vector,
-    four_bar,
-)
+from hydroid.settings.linkage import Cylinder, LinearActuator, RotaryActuator
 from hydroid.settings.load import Settings, load
-from hydroid.settings.parts import Base, FixedPart, Link, Name, Pair, PayloadPlace
-from hydroid.settings.pivots import place_pivots
 
 
-class Joint(Settings):
-    """A hinge; it moves the link at the same position in the list of links."""
+def _from_folder(path: Path, info: ValidationInfo) -> Path:
+    folder = (info.context or {}).get("folder")
+    return path if folder is None else (folder / path).resolve()
 
-    name: Name
-    """name of the joint"""
-    axis: Direction
-    """direction of the axis in the parent link's frame at angle 0"""
-    at: Vector
-    """position in the parent link's frame [m]"""
-    range: tuple[float, float]
-    """smallest and largest angle [deg]"""
-    continuous: bool = False
-    """true: the joint turns without stops, and `range` only limits the viewer's slider"""
-    actuator: Annotated[LinearActuator | RotaryActuator, Field(discriminator="kind")] | None = None
-    """what turns the joint; its `kind` decides which settings it has. Stage 1 needs none"""
+
+Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
+"""a path relative to the file that names it"""
+
+
+class ArmFile(Settings):
+    """The YAML file of an arm."""
+
+    model: Beside
+    """the arm's MJCF, relative to this file; its keyframes are the named poses"""
+    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = Field(
+        default_factory=dict[str, Cylinder | RotaryActuator]
+    )
+    """what turns the joints, by name; a joint that stage 2 does not drive needs none"""
+    payload: str | None = None
+    """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
+    pair: Beside | None = None
+    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT; null: the
+    arm stands alone"""
 
     @model_validator(mode="after")
-    def _possible(self) -> "Joint":
-        low, high = self.range
-        if not low < high:
-            raise ValueError(f"joint {self.name}: range must be [lower, upper] in deg with lower < upper")
-        if isinstance(self.actuator, LinearActuator):
-            _check_cylinder(self, self.actuator)
+    def _one_geometry(self) -> "ArmFile":
+        for name, one in self.actuators.items():
+            if isinstance(one, Cylinder) and one.pivots is not None and one.triangle is not None:
+                raise ValueError(f"actuators.{name}: pivots take the place of triangle: give one")
+            if isinstance(one, Cylinder) and one.four_bar is not None and one.triangle is None:
+                raise ValueError(f"actuators.{name}: four_bar needs a triangle")
         return self
 
 
-class Arm(Settings):
-    """A serial arm: `links[i]` hangs on `links[i - 1]` (the first on the base) by `joints[i]`."""
+@dataclass(frozen=True)
+class Joint:
+    """A hinge.
+
+    Attributes:
+        name: of the model's joint.
+        range: smallest and largest angle [deg].
+        continuous: whether it turns without stops, and `range` only limits what is shown and tested.
+        actuator: what turns it; None: nothing that stage 2 knows.
+    """
 
     name: str
-    """name of the arm"""
-    model: Annotated[Path, Strict(False)]
-    """the MJCF model, relative to this file"""
-    meshes: Annotated[Path, Strict(False)] = Path("meshes")
-    """folder of the STL files, relative to this file"""
-    base: Base = Base()
-    links: Annotated[tuple[Link, ...], Field(min_length=1)]
-    """the links, from the base outwards"""
-    fixed: tuple[FixedPart, ...] = ()
-    """parts bolted to links"""
+    range: tuple[float, float]
+    continuous: bool = False
+    actuator: LinearActuator | RotaryActuator | None = None
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An arm as its MJCF and its YAML file describe it.
+
+    Attributes:
+        file: the YAML's settings.
+        name: of the model.
+        joints: in the order of the model, J of them.
+        link_names: bodies that move and have mass, L of them: those of the joints in their order, then parts
+            that are fixed to them.
+        link_masses: of these [kg].
+        poses: angle of each joint by the pose's name [rad].
+    """
+
+    file: ArmFile
+    name: str
     joints: tuple[Joint, ...]
-    """the joints, from the base outwards"""
-    payload: PayloadPlace | None = None
-    """where the gripper holds a payload; null: logs have no payloads"""
-    pair: Pair | None = None
-    """two of these arms on one carrier; null: it stands alone"""
-    poses: dict[Name, tuple[float, ...]]
-    """named poses: the angle of each joint, by name [deg]"""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _pivots_as_triangles(cls, values: Any) -> Any:
-        """Turn cylinders that are given by their two pivots into triangles."""
-        return place_pivots(values) if isinstance(values, dict) else values
-
-    @model_validator(mode="after")
-    def _consistent(self) -> "Arm":
-        if len(self.joints) != len(self.links):
-            raise ValueError(f"{len(self.links)} links need as many joints, not {len(self.joints)}")
-        for what, names in (("joint", self.joint_names), ("link", ("base", *self.link_names))):
-            double = next((n for n in names if names.count(n) > 1), None)
-            if double:
-                raise ValueError(f"two {what}s are named {double}")
-        moving = [link.name for link in self.links]
-        carried = {part.name: part.carried_by for part in self.fixed}
-        for name, link in (carried | ({"payload": self.payload.carried_by} if self.payload else {})).items():
-            if link not in moving:
-                raise ValueError(f"{name} is carried by {link!r}, which is not one of: {', '.join(moving)}")
-        for name, pose in self.poses.items():
-            if len(pose) != len(self.joints):
-                raise ValueError(f"pose {name} needs {len(self.joints)} angles in deg, not {len(pose)}")
-            for joint, angle in zip(self.joints, pose, strict=True):
-                if not joint.continuous and not joint.range[0] <= angle <= joint.range[1]:
-                    raise ValueError(
-                        f"pose {name}: joint {joint.name} at {angle:g} deg is outside its range {joint.range}"
-                    )
-        return self
+    link_names: tuple[str, ...]
+    link_masses: tuple[float, ...]
+    poses: dict[str, tuple[float, ...]]
 
     @property
-    def parts(self) -> tuple[Link, ...]:
-        """Everything that has mass: the links in order, then the fixed parts."""
-        return (*self.links, *self.fixed)
+    def model(self) -> Path:
+        """The MJCF."""
+        return self.file.model
+
+    @property
+    def payload(self) -> str | None:
+        """Site of the model that holds a payload."""
+        return self.file.payload
+
+    @property
+    def pair(self) -> Path | None:
+        """The MJCF of two of these arms."""
+        return self.file.pair
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -115,14 +112,9 @@ class Arm(Settings):
         return tuple(joint.name for joint in self.joints)
 
     @property
-    def link_names(self) -> tuple[str, ...]:
-        """Names of everything that has mass, (L,)."""
-        return tuple(part.name for part in self.parts)
-
-    @property
     def masses(self) -> NDArray[np.float64]:
         """Nominal masses [kg], shape (L,)."""
-        return np.array([part.mass for part in self.parts])
+        return np.array(self.link_masses)
 
     @property
     def lower(self) -> NDArray[np.float64]:
@@ -142,54 +134,17 @@ class Arm(Settings):
         """
         if name not in self.poses:
             raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
-        return np.radians(self.poses[name])
+        return np.array(self.poses[name])
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML, found as `find_config` does; its `model` and `meshes` become absolute.
+    """Read an arm's YAML, found as `find_config` does, and its MJCF.
 
     Raises:
-        SettingsError: no such file, or a setting that is not allowed.
+        SettingsError: no such file, a setting that is not allowed, or one that the model contradicts.
+        ModelError: an MJCF that hydroid cannot simulate.
     """
+    from hydroid.settings.arm_model import make_arm  # imports MuJoCo
+
     path = find_config(name, beside, kind="arm")
-    arm = load(path, Arm)
-    folder = path.resolve().parent
-    places: dict[str, Any] = {name: (folder / getattr(arm, name)).resolve() for name in ("model", "meshes")}
-    if arm.pair is not None:
-        places["pair"] = arm.pair.model_copy(update={"model": (folder / arm.pair.model).resolve()})
-    return arm.model_copy(update=places)
-
-
-def _check_four_bar(joint: Joint, actuator: LinearActuator) -> None:
-    """Refuse a linkage that cannot be closed, or that passes a dead centre, within the joint's range."""
-    with np.errstate(all="ignore"):
-        arm = actuator.moment_arm(np.radians(np.linspace(*joint.range, 181)))
-        turned = four_bar(np.radians(np.linspace(*joint.range, 181)), actuator.four_bar)[1]
-    if not (np.isfinite(arm).all() and (turned * turned[0] > 0).all() and (arm * arm[0] > 0).all()):
-        raise ValueError(
-            f"joint {joint.name}: its four-bar linkage does not reach all of its range or has a dead centre"
-        )
-
-
-def _check_cylinder(joint: Joint, actuator: LinearActuator) -> None:
-    """Refuse a triangle that is flat within the joint's range, and a stroke too short for the range."""
-    if joint.continuous:
-        raise ValueError(f"joint {joint.name}: a continuous joint needs a rotary actuator")
-    if actuator.four_bar is not None:
-        _check_four_bar(joint, actuator)
-    first, last = sorted(actuator.sense * angle + actuator.theta0 for angle in joint.range)
-    if actuator.four_bar is None and (first <= 0 or last >= 180):
-        what = "range + theta0" if actuator.extends == "positive" else "theta0 - range"
-        raise ValueError(
-            f"joint {joint.name}: {what} runs from {first:g} to {last:g} deg, "
-            "and the cylinder has no moment arm at 0 and 180"
-        )
-    if not np.cross(joint.axis, actuator.towards).any():
-        raise ValueError(f"joint {joint.name}: `towards` must not lie along the joint's axis")
-    shortest, longest = sorted(actuator.length(np.radians(joint.range)))
-    needed = 1e3 * (longest - shortest)
-    if actuator.stroke < (1 - STROKE_TOLERANCE) * needed:
-        raise ValueError(
-            f"joint {joint.name}: a stroke of {actuator.stroke:g} mm is too short for the range, "
-            f"which needs {needed:.1f} mm"
-        )
+    return make_arm(load(path, ArmFile), str(path))

@@ -3,13 +3,21 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    InstanceOf,
+    PlainSerializer,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 
 from hydroid.parameters import ParameterSet
-from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.arm import Arm, ArmFile, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
-from hydroid.settings.load import JointNumber, Settings
+from hydroid.settings.load import JointNumber, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, parameter, prior
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SegmentSettings
@@ -19,7 +27,23 @@ from hydroid.settings.simulation import ClusterSettings, SimulationSettings
 
 def _read_arm(value: Any, info: ValidationInfo) -> Any:
     """Read the arm's file where the settings name one."""
-    return load_arm(value, (info.context or {}).get("folder")) if isinstance(value, str) else value
+    folder = (info.context or {}).get("folder")
+    if isinstance(value, str):
+        return load_arm(value, folder)
+    if not isinstance(value, dict):
+        return value
+    from hydroid.settings.arm_model import make_arm  # imports MuJoCo
+
+    return make_arm(validate(value, ArmFile, "arm", folder=folder), "arm")
+
+
+ArmSetting = Annotated[
+    InstanceOf[Arm],
+    BeforeValidator(_read_arm),
+    PlainSerializer(lambda arm: arm.file.model_dump(mode="json")),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object"}]}),
+]
+"""an arm; in a file the name of one, or an arm file's settings"""
 
 
 class FitSettings(Settings):
@@ -27,7 +51,7 @@ class FitSettings(Settings):
 
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
-    arm: Annotated[Arm, BeforeValidator(_read_arm)] = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
+    arm: ArmSetting = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
     outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""

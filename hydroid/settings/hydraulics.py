@@ -220,8 +220,8 @@ def _quantities() -> dict[str, Quantity]:
         ("area_b", "mm²", "A_B: the same of chamber B"),
         ("opening_a", "mm²", "largest opening of the valve, towards A"),
         ("opening_b", "mm²", "largest opening of the valve, towards B"),
-        ("pivot_distance_1", "m", "a: distance of one pivot of a cylinder from the joint's axis"),
-        ("pivot_distance_2", "m", "b: distance of the other pivot"),
+        ("pivot_distance_1", "m", "a: distance of a cylinder's farther pivot from the joint's axis"),
+        ("pivot_distance_2", "m", "b: distance of the nearer pivot"),
         ("pivot_angle", "deg", "theta0: angle between both pivots at joint angle 0"),
     )
     of_settings = [

@@ -7,23 +7,24 @@ its numbers are ours.)
 """
 
 import math
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator
+from numpy.typing import NDArray
 
 from hydroid.settings.load import Positive, Settings
 
 Vector = tuple[float, float, float]
+Array = NDArray[np.float64]
 
-
-def _direction(value: Vector) -> Vector:
-    if not any(value):
-        raise ValueError("a direction cannot be (0, 0, 0)")
-    return value
-
-
-Direction = Annotated[Vector, AfterValidator(_direction)]
+PIVOT_SKEW = 0.1
+"""part of a cylinder's length by which its pivots may lie apart along the joint's axis: the triangle is flat,
+and errs by half the square of it"""
+STROKE_TOLERANCE = 0.02
+"""part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
+DIGITS = 9
+"""of lengths in m and angles in deg that are read off a model: what is finer is its rounding"""
 
 
 def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:
@@ -65,10 +66,6 @@ def four_bar(angle: Any, bars: Any) -> Any:
     return psi, first, -bent / lever
 
 
-STROKE_TOLERANCE = 0.02
-"""part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
-
-
 class FourBar(Settings):
     """A rocker on the parent link, which a cylinder turns, and a coupler to the child link: a bucket's."""
 
@@ -97,50 +94,85 @@ class FourBar(Settings):
 
 
 class Pivots(Settings):
-    """The two points where a cylinder is pinned, as CAD gives them."""
+    """The points where a cylinder is pinned in the assembled arm: in the world, with all joints at 0."""
 
     parent: Vector
     """pivot on the parent link (the base for the first joint) [m]"""
     child: Vector
     """pivot on the link that the joint moves [m]"""
-    frame: Literal["link", "arm"] = "link"
-    """link: each point in the frame of its link; arm: both in the world, with all joints at angle 0"""
 
 
-class LinearActuator(Settings):
-    """A cylinder that spans a triangle with the joint."""
+class Triangle(Settings):
+    """The triangle of a cylinder's two pivots and the axis that it turns about."""
+
+    a: Positive
+    """distance of one pivot from the axis [m]"""
+    b: Positive
+    """distance of the other pivot from the axis [m]"""
+    theta0: float
+    """angle between the two pivots at angle 0 [deg]"""
+    extends: Literal["positive", "negative"] = "positive"
+    """direction in which the joint turns when the rod runs out: with negative the angle between the pivots is
+    theta0 - q, and a positive command turns the joint to negative angles"""
+
+
+class Cylinder(Settings):
+    """A cylinder."""
 
     kind: Literal["linear"]
     """linear: a cylinder"""
     pivots: Pivots | None = None
-    """both pivots as points, in place of a, b, theta0, extends, a_on, towards and offset"""
-    a: Positive
-    """distance of one pivot from the joint's axis [m]"""
-    b: Positive
-    """distance of the other pivot from the joint's axis [m]"""
-    theta0: float
-    """angle between the two pivots at joint angle 0 [deg]"""
-    extends: Literal["positive", "negative"] = "positive"
-    """direction in which the joint turns when the rod runs out: with negative the angle between the pivots is
-    theta0 - q, and a positive command turns the joint to negative angles"""
-    stroke: Positive
-    """stroke of the rod [mm]; with `pivots` it may be left out, and is what the joint's range takes"""
+    """both pivots; null: the sites JOINT_pivot_parent and JOINT_pivot_child of the model, or `triangle`"""
+    triangle: Triangle | None = None
+    """in place of pivots; with `four_bar` that at the rocker's pivot, with the rocker's angle"""
     four_bar: FourBar | None = None
-    """linkage between cylinder and joint; a, b and theta0 are then those of the triangle at the rocker's
-    pivot, with the rocker's angle for the joint's; null: the cylinder acts on the joint itself"""
+    """linkage between cylinder and joint, with its `triangle`; null: the cylinder acts on the joint itself"""
+    stroke: Positive | None = None
+    """stroke of the rod [mm]; null: what the joint's range takes"""
     area_a: Positive
     """piston area that pushes the rod out [mm²]"""
     area_b: Positive
     """annulus area on the rod side [mm²]"""
     max_opening: Positive
     """largest valve opening [mm²]"""
-    a_on: Literal["parent", "child"] = "parent"
-    """link that carries the pivot at distance a; the other link carries the pivot at distance b"""
-    towards: Direction
-    """direction from the joint to the pivot on the parent link, in its frame; the part along the axis is
-    ignored"""
-    offset: float = 0.0
-    """distance of both pivots from the joint's origin along its axis [m]"""
+
+
+class RotaryActuator(Settings):
+    """A rotary vane or piston actuator on the joint's axis."""
+
+    kind: Literal["rotary"]
+    """rotary: a vane or piston actuator on the joint's axis"""
+    displacement: Positive
+    """oil per angle [cm³/rad]"""
+    max_opening: Positive
+    """largest valve opening [mm²]"""
+
+
+@dataclass(frozen=True)
+class LinearActuator:
+    """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
+
+    Attributes:
+        a, b: distances of its pivots from the axis, the longer one first [m].
+        theta0: angle between them at angle 0 [deg].
+        extends: direction in which the joint turns when the rod runs out.
+        stroke: of the rod [mm].
+        area_a, area_b, max_opening: as the settings have them [mm²].
+        four_bar: linkage between cylinder and joint.
+        pivots: on the parent and on the moved link, in their frames [m]; None where only distances are given.
+    """
+
+    kind: ClassVar[str] = "linear"
+    a: float
+    b: float
+    theta0: float
+    extends: Literal["positive", "negative"]
+    stroke: float
+    area_a: float
+    area_b: float
+    max_opening: float
+    four_bar: FourBar | None = None
+    pivots: tuple[Vector, Vector] | None = None
 
     @property
     def sense(self) -> float:
@@ -164,12 +196,53 @@ class LinearActuator(Settings):
         return length, arm * first
 
 
-class RotaryActuator(Settings):
-    """A rotary vane or piston actuator on the joint's axis."""
+def make_cylinder(
+    settings: Cylinder, found: Triangle, limits: tuple[float, float], pivots: tuple[Vector, Vector] | None
+) -> LinearActuator:
+    """Return a cylinder that moves its joint through a range [deg].
 
-    kind: Literal["rotary"]
-    """rotary: a vane or piston actuator on the joint's axis"""
-    displacement: Positive
-    """oil per angle [cm³/rad]"""
-    max_opening: Positive
-    """largest valve opening [mm²]"""
+    Raises:
+        ValueError: a dead centre in the range, a linkage that does not reach, or a stroke that is too short.
+    """
+    sizes = settings.area_a, settings.area_b, settings.max_opening
+    far, near = max(found.a, found.b), min(found.a, found.b)
+    cylinder = LinearActuator(
+        far, near, found.theta0, found.extends, 0.0, *sizes, four_bar=settings.four_bar, pivots=pivots
+    )
+    angles = np.radians(np.linspace(*limits, 181))
+    with np.errstate(all="ignore"):
+        arm = np.asarray(cylinder.moment_arm(angles))
+        bars = np.asarray(four_bar(angles, settings.four_bar)[1]) if settings.four_bar else np.ones(1)
+    # beyond a dead centre the moment arm has another sign
+    if not ((bars * bars[0] > 0).all() and (arm * arm[0] > 0).all()):
+        what = "does not reach all of its range, or has a dead centre in it"
+        raise ValueError(f"its {'four-bar linkage' if settings.four_bar else 'cylinder'} {what}")
+    needed = 1e3 * float(np.ptp(cylinder.length(np.radians(limits))))
+    stroke = settings.stroke or round(needed, 3)
+    if stroke < (1 - STROKE_TOLERANCE) * needed:
+        what = f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm"
+        raise ValueError(what)
+    return replace(cylinder, stroke=stroke)
+
+
+def triangle_of(parent: Array, child: Array, axis: Array) -> Triangle:
+    """Return the triangle of two pivots, seen from the joint at angle 0 [m], and the joint's axis, (3,) each.
+
+    Raises:
+        ValueError: a pivot on the axis, or a cylinder that does not lie across it.
+    """
+    heights = float(parent @ axis), float(child @ axis)
+    near, far = parent - heights[0] * axis, child - heights[1] * axis
+    a, b = float(np.linalg.norm(near)), float(np.linalg.norm(far))
+    if min(a, b) < 1e-6:
+        which = "parent" if a < 1e-6 else "child"
+        raise ValueError(f"the pivot on the {which} lies on the joint's axis, so it has no moment arm")
+    length, skew = float(np.linalg.norm(near - far)), abs(heights[0] - heights[1])
+    if skew > PIVOT_SKEW * length:
+        raise ValueError(
+            f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
+            "a cylinder must lie across the axis"
+        )
+    turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
+    extends = "positive" if turn > 0 else "negative"
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=abs(turn), extends=extends)

@@ -87,7 +87,7 @@ def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | Non
         return parameter.nominal
     arm = machine.arm
     if parameter.link is not None:
-        return next((float(part.mass) for part in arm.parts if part.name == parameter.link), None)
+        return dict(zip(arm.link_names, arm.link_masses, strict=True)).get(parameter.link)
     if parameter.quantity not in TARGETS:
         return None
     joints = parameter.joints or range(1, len(arm.joints) + 1)

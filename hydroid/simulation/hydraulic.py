@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
-from hydroid.arm.model import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator, ActuatorState, Observation, swallowed
 from hydroid.hydraulics.records import JOINT_STATE, Records, coefficients, has_force_curve, linkages
+from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation.rollout import HydraulicArm, compile_rollout

@@ -12,7 +12,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from hydroid.arm.model import quiet_mujoco
+from hydroid.mjcf import quiet_mujoco
 from hydroid.simulation.scenario import Array, Candidates, Response, Scenario
 
 

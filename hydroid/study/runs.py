@@ -62,7 +62,7 @@ def _plain(settings: FitSettings) -> dict[str, Any]:
     for name in ALGORITHMS:
         if name != settings.search.algorithm:
             del values["search"][name]
-    arm = settings.arm.model_dump(mode="json", exclude=set(ELSEWHERE))
+    arm = settings.arm.file.model_dump(mode="json", exclude=set(ELSEWHERE))
     return values | {"arm": arm}
 
 

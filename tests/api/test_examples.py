@@ -14,7 +14,7 @@ NAMES = [
     for name in hydroid.__all__
     if re.search(r"^ {8}\S*.*hydroid\.", getattr(hydroid, name).__doc__ or "", re.MULTILINE)
 ]
-ELSEWHERE = {"view", "render", "build_model", "report", "convert", "init", "study"}
+ELSEWHERE = {"view", "render", "report", "convert", "init", "study"}
 """a window or a film needs OpenGL, report pages, which are not written here, the others files of one's own;
 they have tests of their own"""
 WRITES = {"fit": "a", "fit_mech": "mech", "fit_hyd": "hyd"}

@@ -37,7 +37,7 @@ def commands(readme: Path) -> list[list[str]]:
     return found
 
 
-@pytest.mark.parametrize(("name", "count"), [("boom", 4), ("urdf", 4)])
+@pytest.mark.parametrize(("name", "count"), [("boom", 3), ("urdf", 4)])
 def test_the_readmes_commands_run(name: str, count: int, copied: Path, monkeypatch: pytest.MonkeyPatch):
     if name == "urdf":
         monkeypatch.chdir(copied / "urdf")

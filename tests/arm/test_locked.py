@@ -1,19 +1,18 @@
 import mujoco
 import numpy as np
 import pytest
-import trimesh
+from arms import write_arm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mujoco.batch import Batch
 
-from hydroid.arm.build import build_model
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.errors import ModelError
-from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.arm import load_arm
 
 ARM = load_arm("hydrolek")
-SPEC = load_model(ARM.model, ARM)
+SPEC = load_model(ARM)
 FULL = SPEC.compile()
 J, L = len(ARM.joint_names), len(ARM.link_names)
 LINKS = [FULL.body(name).id for name in ARM.link_names]
@@ -149,26 +148,15 @@ def test_it_steps_like_the_whole_arm_down_to_the_stop():
 
 def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
     """Two blocks on one hinge: which axis is the longest depends on their masses."""
-    blocks = {"base": (0.1, 0.1, 0.1), "a": (0.3, 0.2, 0.1), "b": (0.1, 0.2, 0.5)}
-    for name, extents in blocks.items():
-        block = trimesh.creation.box(extents=extents)
-        (tmp_path / f"{name}.stl").write_bytes(block.export(file_type="stl"))
-    motor = {"kind": "rotary", "displacement": 5, "max_opening": 0.1}
-    arm = Arm.model_validate(
-        {
-            "name": "blocks",
-            "model": tmp_path / "blocks.xml",
-            "meshes": tmp_path,
-            "base": {"mesh": "base.stl"},
-            "links": [{"name": "a", "mesh": "a.stl", "mass": 1}],
-            "fixed": [{"name": "b", "mesh": "b.stl", "mass": 1, "carried_by": "a"}],
-            "joints": [
-                {"name": "j", "axis": [0, -1, 0], "at": [0, 0, 0], "range": [-90, 90], "actuator": motor}
-            ],
-            "poses": {},
-        }
+    blocks = {"a": (0.3, 0.2, 0.1), "b": (0.1, 0.2, 0.5)}
+    half = {name: " ".join(str(length / 2) for length in size) for name, size in blocks.items()}
+    arm = write_arm(
+        tmp_path,
+        f"""<mujoco><worldbody><body name="a"><joint name="j" axis="0 -1 0" range="-90 90"/>
+        <geom type="box" size="{half["a"]}" mass="1"/>
+        <body name="b"><geom type="box" size="{half["b"]}" mass="1"/></body></body></worldbody></mujoco>""",
     )
-    locked = lock(build_model(arm), arm, ["j"], np.zeros(1))
+    locked = lock(load_model(arm), arm, ["j"], np.zeros(1))
     masses = np.array([[1, 1], [5, 0.01], [0.01, 5], [100, 0.001]])
     batch, inertials = Batch(locked.model, nsim=4, nthread=1), locked.inertials(masses)
     for field, value in inertials.items():

@@ -8,6 +8,8 @@ import trimesh
 from robots import LIMIT, joint, link, write_robot
 
 from hydroid.cad import import_arm
+from hydroid.cad.shapes import SHOWN, geom_mesh, solid_properties
+from hydroid.cad.source import HELD
 from hydroid.errors import ModelError
 
 
@@ -18,34 +20,47 @@ def said(arm, start):
     return line
 
 
-def forward(arm, angles):
-    """Turn [matrix] and place of each link's frame, and the gravity torques, from the imported numbers."""
-    turn, at, frames = np.eye(3), np.zeros(3), []
-    for link_, joint_, angle in zip(arm.links, arm.joints, angles, strict=True):
-        at = at + turn @ joint_.at
-        quat, step = np.empty(4), np.empty(9)
-        mujoco.mju_axisAngle2Quat(quat, joint_.axis, angle)
-        mujoco.mju_quat2Mat(step, quat)
-        turn = turn @ step.reshape(3, 3)
-        frames.append((turn, at, turn @ joint_.axis, at + turn @ link_.centre, link_.mass))
-    return frames
+def compiled(arm):
+    """The imported model and its data, joints at 0."""
+    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def joints(model):
+    return [model.joint(j).name for j in range(model.njnt)]
+
+
+def extents(model, body):
+    """Size of what is seen of a body, in its frame [m]."""
+    geoms = np.flatnonzero((model.geom_bodyid == model.body(body).id) & (model.geom_group == SHOWN))
+    (mesh,) = (geom_mesh(model, int(geom)) for geom in geoms)
+    return np.sort(mesh.extents)
+
+
+def tensor(model, body):
+    """Inertia about the centre of mass in the body's frame [kg·m²]."""
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.body(body).iquat)
+    axes = turn.reshape(3, 3)
+    return axes * model.body(body).inertia @ axes.T
 
 
 def test_links_joints_and_inertias_are_those_of_the_file(tmp_path):
-    arm = import_arm(write_robot(tmp_path))
-    assert [part.name for part in arm.links] == ["house", "boom", "stick"]
-    assert [part.name for part in arm.joints] == ["swing_joint", "boom_joint", "stick_joint"]
-    for part in arm.links:
-        length, width, height = robots.SIZES[part.name]
-        square = np.array([length, width, height]) ** 2
-        assert part.mass == robots.MASSES[part.name]
-        np.testing.assert_allclose(part.centre, [length / 2, 0, 0], atol=1e-12)
-        np.testing.assert_allclose(part.tensor, np.diag(square.sum() - square) * part.mass / 12, rtol=1e-9)
-        np.testing.assert_allclose(
-            part.mesh.bounds, [[0, -width / 2, -height / 2], [length, width / 2, height / 2]]
-        )
-    assert arm.joints[1].range == pytest.approx(np.degrees([-0.5, 1.2]))
-    np.testing.assert_allclose(arm.base.extents, [2, 1.5, 0.5])
+    model, _ = compiled(import_arm(write_robot(tmp_path)))
+    assert [model.body(b).name for b in range(1, 4)] == ["house", "boom", "stick"]
+    assert joints(model) == ["swing_joint", "boom_joint", "stick_joint"]
+    for name, size in robots.SIZES.items():
+        square = np.array(size) ** 2
+        assert model.body(name).mass[0] == robots.MASSES[name]
+        np.testing.assert_allclose(model.body(name).ipos, [size[0] / 2, 0, 0], atol=1e-12)
+        expected = np.diag(square.sum() - square) * robots.MASSES[name] / 12
+        np.testing.assert_allclose(tensor(model, name), expected, atol=1e-9)
+        np.testing.assert_allclose(extents(model, name), np.sort(size), rtol=1e-6)
+    assert model.jnt_range[1] == pytest.approx([-0.5, 1.2])
+    assert model.key("home").qpos == pytest.approx([0, 0, -0.2])
 
 
 def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
@@ -60,24 +75,18 @@ def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
         "more": tool + joint("weld", "stick", "tool", kind="fixed", at="1.5 0 0", turn="1 0 0", limit=""),
     }  # fmt: skip
     path = write_robot(tmp_path, **changes)
-    arm = import_arm(path)
-    assert arm.links[2].mass == 120.0
+    found, here = compiled(import_arm(path))
+    assert found.body("stick").mass[0] == 120.0
     text = path.read_text().replace("package://digger/meshes/", str(tmp_path / "digger/meshes") + "/")
     text = text.replace("</robot>", '<mujoco><compiler strippath="false"/></mujoco></robot>')
     model = mujoco.MjSpec.from_string(text).compile()
-    data = mujoco.MjData(model)
+    there = mujoco.MjData(model)
     for angles in np.random.default_rng(1).uniform(-1, 1, (5, 3)):
-        data.qpos[:] = angles
-        mujoco.mj_forward(model, data)
-        frames = forward(arm, angles)
-        for k, (_, at, axis, _, _) in enumerate(frames):
-            np.testing.assert_allclose(at, data.xanchor[k], atol=1e-9)
-            np.testing.assert_allclose(axis, data.xaxis[k], atol=1e-9)
-        weight = [
-            9.81 * axis @ sum(m * np.cross(c - at, [0, 0, 1]) for *_, c, m in frames[k:])
-            for k, (_, at, axis, _, _) in enumerate(frames)
-        ]
-        np.testing.assert_allclose(data.qfrc_bias, weight, atol=1e-6)
+        here.qpos[:] = there.qpos[:] = angles
+        mujoco.mj_forward(found, here)
+        mujoco.mj_forward(model, there)
+        for name in ("xanchor", "xaxis", "qfrc_bias", "M"):
+            np.testing.assert_allclose(getattr(here, name), getattr(there, name), atol=1e-6)
 
 
 def test_the_base_link_is_the_fixed_base(tmp_path):
@@ -88,24 +97,24 @@ def test_a_joint_that_mimics_another_is_held(tmp_path):
     limit = LIMIT.format(-1, 1) + '<mimic joint="boom_joint" multiplier="-1"/>'
     arm = import_arm(write_robot(tmp_path, stick_joint=joint("stick_joint", "boom", "stick", limit=limit)))
     said(arm, "joint stick_joint mimics boom_joint, which hydroid does not model: it is held at 0")
-    assert [part.mass for part in arm.links] == [800.0, 290.0]
+    model, _ = compiled(arm)
+    assert model.body_mass.tolist() == [0.0, 800.0, 290.0]
 
 
 @pytest.mark.parametrize("kind", ["prismatic", "floating"])
 def test_a_joint_that_is_no_hinge_is_held(tmp_path, kind):
     more = joint("stick_joint", "boom", "stick", kind=kind)
     arm = import_arm(write_robot(tmp_path, stick_joint=more))
-    said(arm, f"joint stick_joint is {kind}: hydroid moves hinges only, so it is held at 0")
-    assert len(arm.joints) == 2
+    said(arm, f"joint stick_joint {HELD[kind]}: hydroid moves hinges only, so it is held at 0")
+    assert compiled(arm)[0].njnt == 2
 
 
 @pytest.mark.parametrize(("kind", "limit"), [("continuous", ""), ("revolute", LIMIT.format(0, 0))])
 def test_a_joint_without_limits_turns_without_stops(tmp_path, kind, limit):
     more = joint("swing_joint", "track", "house", kind=kind, axis="0 0 1", limit=limit)
     arm = import_arm(write_robot(tmp_path, swing_joint=more))
-    said(arm, "joint swing_joint has no limits: it turns without stops, unless you set range and continuous")
-    assert arm.joints[0].continuous
-    assert arm.joints[0].range == (-180, 180)
+    said(arm, "joint swing_joint has no limits: it turns without stops, unless you give it a range")
+    assert compiled(arm)[0].jnt_limited.tolist() == [False, True, True]
 
 
 def test_a_missing_mesh_says_where_it_was_looked_for(tmp_path):
@@ -113,15 +122,16 @@ def test_a_missing_mesh_says_where_it_was_looked_for(tmp_path):
     line = said(arm, "mesh package://other/meshes/lost.stl is not there; looked for ")
     assert f"{tmp_path}/digger/urdf/other/meshes/lost.stl" in line
     assert "lost.stl below" in line
-    assert arm.links[1].mesh is None
-    assert arm.links[1].mass == 200
+    model, _ = compiled(arm)
+    assert model.body("boom").geomnum[0] == 0
+    assert model.body("boom").mass[0] == 200
 
 
 @pytest.mark.parametrize(
     "mesh", ["package://digger/meshes/boom.stl", "../meshes/boom.stl", "package://x/meshes/boom.stl"]
 )
 def test_meshes_are_found_from_the_urdfs_folder_and_its_parents(tmp_path, mesh):
-    assert import_arm(write_robot(tmp_path, boom=link("boom", mesh=mesh))).links[1].mesh is not None
+    assert "links/boom.stl" in import_arm(write_robot(tmp_path, boom=link("boom", mesh=mesh))).meshes
 
 
 MESH = '<mesh filename="../meshes/boom.stl"/>'
@@ -148,11 +158,12 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     text, message, mass = FAULTS[fault]
     arm = import_arm(write_robot(tmp_path, boom=text))
     assert message in said(arm, "link boom: ")
-    boom = arm.links[1]
-    assert boom.mass == pytest.approx(mass)
+    model, _ = compiled(arm)
+    assert model.body("boom").mass[0] == pytest.approx(mass)
     square = np.array(robots.SIZES["boom"]) ** 2
-    np.testing.assert_allclose(boom.tensor, np.diag(square.sum() - square) * mass / 12, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(boom.centre, [1, 0, 0], atol=1e-9)
+    expected = np.diag(square.sum() - square) * mass / 12
+    np.testing.assert_allclose(tensor(model, "boom"), expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 
 def test_an_open_mesh_counts_by_its_hull(tmp_path):
@@ -171,13 +182,14 @@ def test_meshes_in_millimetres_are_scaled(tmp_path):
     arm = import_arm(write_robot(tmp_path, scale=1000.0))
     line = said(arm, "mesh boom.stl would be 2000 m long: all meshes are taken to be in mm")
     assert "house" not in line
-    np.testing.assert_allclose([part.mesh.extents[0] for part in arm.links], [1, 2, 1.5])
+    model, _ = compiled(arm)
+    assert [extents(model, name).max() for name in robots.SIZES] == pytest.approx([1, 2, 1.5])
 
 
 def test_the_files_own_scale_is_used(tmp_path):
     boom = robots.PARTS["boom"].replace('.stl"', '.stl" scale="0.5 0.5 0.5"')
     arm = import_arm(write_robot(tmp_path, boom=boom))
-    np.testing.assert_allclose(arm.links[1].mesh.extents[0], 1.0)
+    assert extents(compiled(arm)[0], "boom").max() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("kind", ["obj", "stl_ascii", "ply"])
@@ -188,7 +200,7 @@ def test_other_mesh_files_are_converted(tmp_path, kind):
     target = tmp_path / "digger/meshes" / name
     target.write_bytes(content if isinstance(content, bytes) else content.encode())
     arm = import_arm(write_robot(tmp_path, boom=link("boom", mesh=f"../meshes/{name}")))
-    np.testing.assert_allclose(arm.links[1].mesh.extents, robots.SIZES["boom"], rtol=1e-6)
+    np.testing.assert_allclose(extents(compiled(arm)[0], "boom"), np.sort(robots.SIZES["boom"]), rtol=1e-6)
 
 
 def test_a_mesh_that_cannot_be_read_is_said(tmp_path):
@@ -197,7 +209,7 @@ def test_a_mesh_that_cannot_be_read_is_said(tmp_path):
     (tmp_path / "digger/meshes/boom.dae").write_text("<COLLADA/>")
     arm = import_arm(tmp_path / "digger/urdf/digger.urdf")
     assert "pip install pycollada" in said(arm, "mesh boom.dae cannot be read")
-    assert arm.links[1].mass == 200.0
+    assert compiled(arm)[0].body("boom").mass[0] == 200.0
 
 
 FORK = (
@@ -212,18 +224,18 @@ def test_of_several_branches_the_longest_is_taken_and_said(tmp_path):
     arm = import_arm(write_robot(tmp_path, more=FORK))
     line = said(arm, "of 2 branches the arm is swing_joint - boom_joint - hammer_joint - chisel_joint")
     assert "(the longest branch); held at 0: stick_joint. Choose another with --tip: stick, chisel" in line
-    assert arm.links[1].mass == 290.0
+    assert compiled(arm)[0].body("boom").mass[0] == 290.0
 
 
 def test_the_branch_that_the_log_names_is_taken(tmp_path):
     arm = import_arm(write_robot(tmp_path, more=FORK), columns=["t", "u_stick_V", "phi stick"])
     assert "(named in the log); held at 0: hammer_joint, chisel_joint" in said(arm, "of 2 branches")
-    assert [part.name for part in arm.joints] == ["swing_joint", "boom_joint", "stick_joint"]
+    assert joints(compiled(arm)[0]) == ["swing_joint", "boom_joint", "stick_joint"]
 
 
 def test_a_tip_may_be_asked_for(tmp_path):
     path = write_robot(tmp_path, more=FORK)
-    assert len(import_arm(path, tip="boom").joints) == 2
+    assert compiled(import_arm(path, tip="boom"))[0].njnt == 2
     with pytest.raises(ModelError, match=r"no joint moves a link 'bom'; tips: stick, chisel"):
         import_arm(path, tip="bom")
 
@@ -259,14 +271,12 @@ def test_an_mjcf_is_read_too(tmp_path):
     assert arm.name == "my_arm"
     said(arm, "its 1 actuators are left out: the hydraulics take their place")
     said(arm, "joint of slide slides: hydroid moves hinges only, so it is held at 0")
-    boom, stick = arm.links
-    assert boom.mass == pytest.approx(0.12 * 500)
-    np.testing.assert_allclose(boom.centre, [0, 1, 0], atol=1e-6)  # turned by 90 deg about z, from its joint
-    np.testing.assert_allclose(boom.mesh.extents, [0.2, 2.0, 0.3], atol=1e-6)
-    np.testing.assert_allclose(arm.joints[0].at, [0.5, 0, 1.6], atol=1e-9)
-    np.testing.assert_allclose(arm.joints[1].at, [0, 2, 0], atol=1e-9)
-    assert stick.mass == pytest.approx(55)
-    assert arm.joints[1].range == (-90, 0)
+    model, data = compiled(arm)
+    assert model.body("boom").mass[0] == pytest.approx(0.12 * 500)
+    assert model.body("stick").mass[0] == pytest.approx(55)
+    np.testing.assert_allclose(data.body("boom").xipos, [0.5, 1, 1.6], atol=1e-6)
+    np.testing.assert_allclose(data.xanchor, [[0.5, 0, 1.6], [0.5, 2, 1.6]], atol=1e-9)
+    assert np.degrees(model.jnt_range[1]) == pytest.approx([-90, 0])
 
 
 @pytest.mark.parametrize(
@@ -288,3 +298,21 @@ def test_a_file_that_is_no_arm_is_refused_in_one_line(tmp_path, text, message):
     assert "\n" not in str(caught.value)
     with pytest.raises(ModelError, match="no such robot"):
         import_arm(tmp_path / "none.urdf")
+
+
+def test_a_closed_mesh_has_the_inertia_of_two_prisms():
+    outer, inner, height, sides = 0.125, 0.0625, 0.5, 32
+    mesh = trimesh.creation.annulus(r_min=inner, r_max=outer, height=height, sections=sides)
+    volume, centre, inertia, what = solid_properties(mesh)
+
+    def prism(radius):
+        """Area of a regular polygon, and its second moment about a diameter."""
+        area = 0.5 * sides * radius**2 * np.sin(2 * np.pi / sides)
+        side = 2 * radius * np.sin(np.pi / sides)
+        return np.array([area, area / 24 * (6 * radius**2 - side**2)])
+
+    area, second = prism(outer) - prism(inner)
+    across = second / area + height**2 / 12
+    assert (volume, what) == (pytest.approx(area * height), "mesh")
+    np.testing.assert_allclose(centre, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diag(inertia), [across, across, 2 * second / area], rtol=1e-6)

@@ -156,8 +156,7 @@ def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, tmp_path: Path):
         (["simulate", "{log}", "--params", "p.yaml", "--out", "o.csv"], "'M6' is missing"),
         (["simulate", "{log}", "--params", "no.yaml", "--out", "o.csv"], "no.yaml"),
         (["check", "broken.csv"], "broken.csv"),
-        (["build-model", "--arm", "nothing"], "nothing"),
-        (["build-model", "--meshes", ".", "--out", "m.xml"], "base.stl"),
+        (["init", "new", "--arm", "nothing.xml"], "nothing"),
         (["nonsense"], "nonsense"),
     ],
 )
@@ -171,15 +170,6 @@ def test_what_the_user_can_mend_is_one_line_and_exit_2(short: Path, tmp_path: Pa
     if done.stderr.startswith("hydroid:"):
         assert len(done.stderr.splitlines()) == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == before  # nothing half-written
-
-
-def test_build_model_writes_what_is_shipped(tmp_path: Path):
-    hydroid("build-model", "--out", "deep/hydrolek.xml", cwd=tmp_path)
-    import mujoco
-
-    mine = mujoco.MjModel.from_xml_path(str(tmp_path / "deep" / "hydrolek.xml"))
-    shipped = mujoco.MjModel.from_xml_path(str(ROOT / "models" / "hydrolek.xml"))
-    assert (mine.body_inertia == shipped.body_inertia).all()
 
 
 def test_help_answers_within_twice_the_import_of_typer():

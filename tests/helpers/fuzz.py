@@ -180,30 +180,36 @@ def overrides() -> tuple[bytes, ...]:
 
 @cache
 def arms() -> tuple[bytes, ...]:
-    """An arm of two boxes."""
-    cylinder = {"kind": "linear", "a": 0.25, "b": 0.065, "theta0": 90, "stroke": 100, "area_a": 800}
-    cylinder |= {"area_b": 600, "max_opening": 0.35, "towards": [-1, 0, 0]}
+    """The YAML of the arm of two boxes."""
+    cylinder = {"kind": "linear", "stroke": 250, "area_a": 800, "area_b": 600, "max_opening": 0.35}
+    ends = {"parent": [-0.25, 0, 0.1], "child": [0.05, 0, 0.2]}
     rotary = {"kind": "rotary", "displacement": 10, "max_opening": 0.2}
-    joint = {"axis": [0, -1, 0], "at": [0, 0, 0.1], "range": [-50, 50]}
-    links = [{"name": n, "mesh": "rod.stl", "mass": 2.0} for n in ("upper", "fore")]
-    arm = {"name": "two", "model": "two.xml", "meshes": ".", "base": {"mesh": "base.stl"}, "links": links}
-    arm |= {"joints": [{"name": n, **joint, "actuator": a} for n, a in (("s", cylinder), ("e", rotary))]}
-    return (yaml.safe_dump(arm | {"poses": {"home": [0, 0]}}, sort_keys=False).encode(),)
+    arm = {"model": "arm.xml", "actuators": {"s": cylinder | {"pivots": ends}, "e": rotary}}
+    return (yaml.safe_dump(arm, sort_keys=False).encode(),)
+
+
+TWO = """<mujoco model="two"><asset><mesh name="rod" file="rod.stl" inertia="exact"/></asset><worldbody>
+<body name="upper" pos="0 0 0.1"><joint name="s" axis="0 -1 0" range="-50 50"/>
+<geom type="mesh" mesh="rod" mass="2"/><body name="fore" pos="0 0 0.1">
+<joint name="e" axis="0 -1 0" range="-50 50"/><geom type="mesh" mesh="rod" mass="2"/>
+</body></body></worldbody></mujoco>"""
 
 
 @cache
-def boxes() -> dict[str, bytes]:
-    """Meshes of the arm of two boxes."""
-    base, rod = trimesh.creation.box((0.2, 0.2, 0.1)), trimesh.creation.box((0.5, 0.06, 0.04))
-    return {"base.stl": base.export(file_type="stl"), "rod.stl": rod.export(file_type="stl")}
+def rod() -> bytes:
+    """The mesh of the arm of two boxes."""
+    content = trimesh.creation.box((0.5, 0.06, 0.04)).export(file_type="stl")
+    assert isinstance(content, bytes)
+    return content
 
 
-def build(room: Path, data: bytes) -> Sequence[str]:
-    """Return the command that builds the arm's model from its YAML and its meshes."""
-    for name, content in {**boxes(), "arm.yaml": arms()[0]}.items():
+def start(room: Path, data: bytes) -> Sequence[str]:
+    """Return the command that starts a project with the room's arm."""
+    for name, content in {"rod.stl": rod(), "arm.yaml": arms()[0], "arm.xml": TWO.encode()}.items():
         if not (room / "arm" / name).exists():
             (room / "arm" / name).write_bytes(content)
-    return ("build-model", "--arm", str(room / "arm" / "arm.yaml"), "--out", str(room / "built.xml"))
+    shutil.rmtree(room / "mine", ignore_errors=True)
+    return ("init", str(room / "mine"), "--arm", str(room / "arm" / "arm.yaml"))
 
 
 def models() -> tuple[bytes, ...]:
@@ -218,12 +224,9 @@ def simulate(room: Path, data: bytes) -> Sequence[str]:
     values = room / "values.yaml"
     given = values if values.exists() else ROOT / "examples" / "article" / "truth.yaml"
     arm = yaml.safe_load((ROOT / "configs" / "hydrolek.yaml").read_text())
-    arm |= {
-        "model": str(
-            room / "model.xml" if (room / "model.xml").exists() else ROOT / "models" / "hydrolek.xml"
-        )
-    }
-    (room / "arm.yaml").write_text(yaml.safe_dump(arm | {"meshes": str(ROOT / "meshes")}))
+    model = room / "model.xml" if (room / "model.xml").exists() else ROOT / "models" / "hydrolek.xml"
+    arm |= {"model": str(model), "pair": None}
+    (room / "arm.yaml").write_text(yaml.safe_dump(arm))
     own = f"--set=arm={room / 'arm.yaml'}"
     return (
         "simulate",
@@ -291,8 +294,8 @@ KINDS = {
             "set",
             lambda room, data: ("check", _log(room), "--set", data.decode("utf-8", "replace")),
         ),
-        Kind("arm", arms, "arm/arm.yaml", build, True),
-        Kind("mesh", lambda: (boxes()["rod.stl"],), "arm/rod.stl", build),
+        Kind("arm", arms, "arm/arm.yaml", start, True),
+        Kind("mesh", lambda: (rod(),), "arm/rod.stl", start),
         Kind(
             "values",
             lambda: ((ROOT / "examples/article/truth.yaml").read_bytes(),),

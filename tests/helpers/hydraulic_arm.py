@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from hydroid.arm.model import quiet_mujoco
 from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.records import Records, linkages
 from hydroid.hydraulics.solenoid import curve_exists
+from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 

@@ -77,7 +77,7 @@ def test_a_log_says_in_which_pressures_it_rested():
     log = duties(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5
-    spec, stage = load_model(settings.arm.model, settings.arm), Stage(settings)
+    spec, stage = load_model(settings.arm), Stage(settings)
     for measured, wanted in ((None, (40e5, 50e5)), (pressure, (12e5, 3e5))):
         simulation = make_simulation(spec, replace(log, pressure=measured), [1], settings, [1])
         response = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, 40.0]])))
@@ -90,7 +90,7 @@ def test_a_joint_away_from_its_stops_is_held_by_its_oil():
         {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
     )
     log, stage = duties(settings.arm.pose("study"), {2: [50, -50]}), Stage(settings)
-    simulation = make_simulation(load_model(settings.arm.model, settings.arm), log, [1], settings)
+    simulation = make_simulation(load_model(settings.arm), log, [1], settings)
     angle = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
     np.testing.assert_array_equal(angle[0], angle[1])
 

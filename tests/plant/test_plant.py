@@ -57,7 +57,7 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
 def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
     """The angles that the population simulation gives [rad], shape (T, K)."""
     settings = fitted.settings
-    spec = load_model(settings.arm.model, settings.arm)
+    spec = load_model(settings.arm)
     simulation = make_simulation(spec, log, [j - 1 for j in joints], settings)
     return simulation.simulate(Stage(settings).candidates(fitted.theta[None])).angle[0]
 
@@ -162,7 +162,7 @@ def test_pressures_are_those_of_the_simulation():
     fitted = model("hyd")
     log = log_of(fitted.settings, [2], 1.0)
     settings = fitted.settings
-    spec = load_model(settings.arm.model, settings.arm)
+    spec = load_model(settings.arm)
     simulation = make_simulation(spec, log, [1], settings, [1])
     expected = simulation.simulate(Stage(settings).candidates(fitted.theta[None])).pressure
     assert expected is not None
@@ -200,7 +200,7 @@ def test_a_saved_plant_is_the_same_plant(stage, tmp_path):
         np.testing.assert_array_equal(again.step(command), plant.step(command))
     arm = plant.identified.settings.arm
     assert arm.pair is not None
-    meshes = {*(part.mesh for part in (*arm.parts, arm.base)), *arm.pair.carrier}
+    meshes = {path.name for path in (arm.model.parent.parent / "meshes").glob("*.stl")}
     assert {mesh.name for mesh in (tmp_path / "moved" / "model" / "meshes").iterdir()} == meshes
 
 
@@ -231,7 +231,7 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     plant = Plant(model("hyd"))
     plant.save(tmp_path)
     names = {path.name for path in (tmp_path / "model").iterdir()}
-    assert names == {"arm.xml", "meshes", "mechanics.xml", "actuators.yaml", "README.txt"}
+    assert names == {"arm.xml", "pair.xml", "meshes", "mechanics.xml", "actuators.yaml", "README.txt"}
     assert "MuJoCo alone cannot step this arm" in (tmp_path / "model" / "README.txt").read_text()
     bare = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "mechanics.xml"))
     assert bare.nu == 0
@@ -314,7 +314,8 @@ def test_a_saved_plant_keeps_its_pair(tmp_path: Path):
     plant = Plant(model())
     plant.save(tmp_path / "saved")
     arm = load_plant(tmp_path / "saved").identified.settings.arm
-    assert arm.meshes.is_relative_to(tmp_path)
+    assert arm.pair is not None
+    assert arm.pair.is_relative_to(tmp_path)
     there, here = (
         load_machine(arm, pair=True).model,
         load_machine(plant.identified.settings.arm, pair=True).model,

@@ -164,11 +164,9 @@ def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(s
     one = model()
     joints = list(one.settings.arm.joints)
     cylinder = joints[1].actuator
-    turned = cylinder.model_copy(
-        update={"extends": "negative", "theta0": 180 - cylinder.theta0, "area_a": 750.0, "area_b": 1000.0}
-    )
-    joints[1] = joints[1].model_copy(update={"actuator": turned})
-    arm = one.settings.arm.model_copy(update={"joints": tuple(joints)})
+    turned = replace(cylinder, extends="negative", theta0=180 - cylinder.theta0, area_a=750.0, area_b=1000.0)
+    joints[1] = replace(joints[1], actuator=turned)
+    arm = replace(one.settings.arm, joints=tuple(joints))
     settings = one.settings.model_copy(update={"arm": arm})
     found = measured(*shoulder_bench(replace(one, settings=settings)))
     assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)

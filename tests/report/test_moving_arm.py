@@ -20,7 +20,7 @@ ERROR = 0.05 * np.sin(3 * LOG.time)[:, None] * [1, 0]
 
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
-    return load_model(ARM.model, ARM).compile()
+    return load_model(ARM).compile()
 
 
 def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:

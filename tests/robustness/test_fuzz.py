@@ -166,7 +166,7 @@ def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
     for arguments in (
         ("check", "none.csv"),
         ("validate", "a.csv", "--fit", "none"),
-        ("build-model", "--arm", "x"),
+        ("init", "mine", "--arm", "x.xml"),
     ):
         refusal = run(arguments)
         assert refusal is not None

@@ -60,9 +60,8 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     file = written(tmp_path)
     cells = cell_settings(load_study(file), file)
     (task, *_) = make_tasks(cells, [1], read_logs([tmp_path / "short.csv"], cells["mean"]), {})
-    arm, pair = task.settings.arm, task.settings.arm.pair
-    assert pair is not None
-    moved = arm.model_copy(update={"pair": pair.model_copy(update={"model": tmp_path / "other.xml"})})
+    arm = task.settings.arm
+    moved = replace(arm, file=arm.file.model_copy(update={"pair": tmp_path / "other.xml"}))
     other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
     assert other.key() == task.key()
 

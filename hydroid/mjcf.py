@@ -1,0 +1,90 @@
+"""MuJoCo's XML of an arm: read, held to what hydroid simulates, copied; MuJoCo's errors as one line."""
+
+import warnings
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import mujoco
+
+from hydroid.errors import ModelError, RunError
+from hydroid.files import is_file, write_atomic
+
+
+def read_mjcf(path: Path) -> mujoco.MjSpec:
+    """Read an MJCF whose joints are hinges, each alone on its body.
+
+    Raises:
+        ModelError: missing or refused by MuJoCo; no joint, another kind of joint, a joint or its body without
+            a name; an equality constraint.
+    """
+    where = str(path)
+    if not is_file(path):
+        raise ModelError("no such model", where=where, hint="give the arm's MJCF; `hydroid init` writes one")
+    with mujoco_errors(where):
+        spec = mujoco.MjSpec.from_file(where)
+    if not spec.joints:
+        raise ModelError("has no joint", where=where)
+    for joint in spec.joints:
+        if not joint.name or not joint.parent.name:
+            what = f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name"
+            raise ModelError(what, where=where)
+        if joint.type != mujoco.mjtJoint.mjJNT_HINGE or len(joint.parent.joints) > 1:
+            raise ModelError(f"joint {joint.name!r} must be a hinge, alone on its body", where=where)
+    if spec.equalities:
+        raise ModelError("has equality constraints, which hydroid does not simulate", where=where)
+    return spec
+
+
+def copy_models(models: Mapping[str, Path], folder: Path) -> None:
+    """Write MJCFs by their new names, with their meshes, to a folder that stands alone.
+
+    Raises:
+        RunError: a mesh cannot be read, or the folder cannot be written.
+    """
+    kept: dict[str, bytes] = {}
+    for name, path in models.items():
+        spec, home = read_mjcf(path), path.resolve().parent
+        for mesh in spec.meshes:
+            if not mesh.file:
+                continue  # its vertices stand in the MJCF
+            source = home / spec.meshdir / mesh.file
+            try:
+                content = source.read_bytes()
+            except OSError as error:
+                raise RunError(f"mesh cannot be read ({error.strerror})", where=str(source)) from None
+            # meshes of different folders may have one name
+            taken = kept.get(source.name, content) != content
+            mesh.file = f"{len(kept)}_{source.name}" if taken else source.name
+            kept[mesh.file] = content
+            write_atomic(folder / "meshes" / mesh.file, content)
+        for pictures, place in ((spec.textures, spec.texturedir), (spec.hfields, spec.meshdir)):
+            for picture in pictures:
+                picture.file = picture.file and str(home / place / picture.file)  # these stay where they are
+        spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
+        spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+        write_atomic(folder / name, spec.to_xml())
+
+
+@contextmanager
+def mujoco_errors(where: str) -> Generator[None]:
+    """Turn MuJoCo's errors into one line; `quiet_mujoco` beside."""
+    try:
+        with quiet_mujoco():
+            yield
+    except (ValueError, mujoco.FatalError) as error:
+        raise ModelError(f"MuJoCo refuses it ({' '.join(str(error).split())})", where=where) from None
+
+
+@contextmanager
+def quiet_mujoco() -> Generator[None]:
+    """Keep MuJoCo from printing a warning for every diverged candidate, and from writing MUJOCO_LOG.TXT."""
+    before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    silent.logto_console = silent.logto_file = False
+    mujoco.MjLogConfig.set(silent)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # MuJoCo's own, of the same things
+            yield
+    finally:
+        mujoco.MjLogConfig.set(before)

@@ -1,0 +1,216 @@
+"""What an MJCF and a YAML file say of an arm, and the triangles of its cylinders."""
+
+import mujoco
+import numpy as np
+import pytest
+from arms import BOOM, CHILD, CYLINDER, PARENT, write_arm
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hydroid.arm.model import add_payload, load_model
+from hydroid.errors import HydroidError
+from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.linkage import triangle
+
+SHIPPED = load_arm("hydrolek")
+LINEAR = [joint for joint in SHIPPED.joints if joint.actuator.kind == "linear"]
+TRIANGLES = {
+    "hydrolek": {
+        "azimuth": (0.25, 0.065, 90.0), "shoulder": (0.30, 0.08, 70.0), "elbow": (0.30, 0.08, 160.0),
+        "wrist": (0.20, 0.043, 90.0), "gripper": (0.15, 0.06, 60.0),
+    },
+    "examples/excavator/arm.yaml": {
+        "boom": (2.0, 0.75, 75.0), "arm": (2.2, 0.65, 105.0), "bucket": (1.2, 0.42, 30.0),
+    },
+}  # fmt: skip
+"""a, b [m] and theta0 [deg] from which the sites of the shipped models were made"""
+
+
+def test_the_shipped_arm_is_the_articles():
+    assert len(SHIPPED.joints) == 7
+    assert SHIPPED.link_names[-2:] == ("jaw_left", "jaw_right")
+    assert SHIPPED.masses.sum() == pytest.approx(45.0)
+    assert SHIPPED.masses[6:].sum() == pytest.approx(2.5)
+    np.testing.assert_allclose(np.degrees(SHIPPED.pose("study")), [0, 10, -60, 0, 0, 0, 20])
+    for name in SHIPPED.poses:
+        assert np.all(SHIPPED.lower <= SHIPPED.pose(name))
+        assert np.all(SHIPPED.pose(name) <= SHIPPED.upper)
+    assert np.isinf(SHIPPED.upper[5])
+    assert SHIPPED.joints[1].range == (-30.0, 90.0)
+
+
+@pytest.mark.parametrize("file", TRIANGLES)
+def test_triangles_are_those_that_the_sites_were_made_from_to_the_last_bit(file):
+    found = {j.name: j.actuator for j in load_arm(file).joints if j.actuator.kind == "linear"}
+    assert {name: (one.a, one.b, one.theta0) for name, one in found.items()} == TRIANGLES[file]
+
+
+@st.composite
+def triangles(draw):
+    """Sides a, b and the angle between them, at which the triangle is not flat."""
+    return draw(st.floats(0.02, 1.0)), draw(st.floats(0.02, 1.0)), draw(st.floats(0.15, 3.0))
+
+
+@given(triangles())
+def test_length_is_the_third_side_and_the_moment_arm_its_derivative(case):
+    a, b, theta = case
+    length, arm, slope = triangle(theta, a, b, 0.0)
+    line = b * np.exp(1j * theta) - a
+    assert length == pytest.approx(abs(line), rel=1e-9)
+    # the moment arm is the joint's distance from the cylinder's line
+    assert arm == pytest.approx((a * line).imag / abs(line), rel=1e-7)
+    step = 1e-30  # complex step: no subtraction, so no rounding
+    ahead = triangle(theta + step * 1j, a, b, 0.0)
+    assert arm == pytest.approx(ahead[0].imag / step, rel=1e-9)
+    assert slope == pytest.approx(ahead[1].imag / step, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("joint", LINEAR, ids=lambda joint: joint.name)
+def test_the_rod_runs_out_steadily_from_one_stop_to_the_other(joint):
+    length = joint.actuator.length(np.radians(np.linspace(*joint.range, 200)))
+    assert np.all(np.diff(length) > 0)
+    assert 0.8 * joint.actuator.stroke < 1e3 * np.ptp(length) < 1.02 * joint.actuator.stroke
+
+
+def test_in_every_pose_a_cylinder_is_as_long_as_its_pivots_are_apart():
+    model = load_model(SHIPPED).compile()
+    data, rng = mujoco.MjData(model), np.random.default_rng(1)
+    for _ in range(5):
+        data.qpos[:] = rng.uniform(np.maximum(SHIPPED.lower, -np.pi), np.minimum(SHIPPED.upper, np.pi))
+        mujoco.mj_forward(model, data)
+        jacobian = np.zeros((model.ntendon, model.nv))
+        rows = model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind
+        mujoco.mju_sparse2dense(jacobian, data.ten_J, *rows)
+        for joint in LINEAR:
+            column, tendon = model.joint(joint.name).id, model.tendon(f"{joint.name}_cylinder").id
+            angle = data.qpos[column]
+            assert data.ten_length[tendon] == pytest.approx(joint.actuator.length(angle), abs=1e-9)
+            expected = joint.actuator.moment_arm(angle) * (np.arange(model.nv) == column)
+            np.testing.assert_allclose(jacobian[tendon], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("above", [1.0, -1.0])
+def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
+    """The distance of the two points, carried by their links, is its length; sites say the same."""
+    z = 2.0 + above * np.array([0.4, 0.5])
+    ends = {"parent": [*PARENT[:2], float(z[0])], "child": [*CHILD[:2], float(z[1])]}
+    arm = write_arm(tmp_path, actuators={"tilt": CYLINDER | {"pivots": ends}})
+    cylinder = arm.joints[1].actuator
+    here, there = np.array(cylinder.pivots)
+    np.testing.assert_allclose(here, np.array(ends["parent"]) - [0.2, 0, 2], atol=1e-9)
+    np.testing.assert_allclose(there, np.array(ends["child"]) - [6.2, 0, 2], atol=1e-9)
+    model, ends = load_model(arm).compile(), {"boom": here, "bar": there}
+    data = mujoco.MjData(model)
+    for angle in (-0.9, 0.0, 0.7):
+        data.qpos[:] = 0.3, angle
+        mujoco.mj_forward(model, data)
+        places = [
+            data.body(b).xpos + data.body(b).xmat.reshape(3, 3) @ p
+            for b, p in (("boom", here), ("bar", there))
+        ]
+        assert np.linalg.norm(places[1] - places[0]) == pytest.approx(cylinder.length(angle), abs=1e-9)
+    assert (cylinder.length(0.1) > cylinder.length(0.0)) == (cylinder.sense > 0) == (above < 0)
+    assert cylinder.stroke == pytest.approx(1e3 * np.ptp(cylinder.length(np.radians([-60, 60]))), abs=1e-3)
+    sites = BOOM.replace(
+        '<body name="hook"', f'<site name="tilt_pivot_parent" pos="{text(here)}"/><body name="hook"'
+    )
+    sites = sites.replace(
+        '<joint name="tilt"', f'<site name="tilt_pivot_child" pos="{text(there)}"/><joint name="tilt"'
+    )
+    assert write_arm(tmp_path, sites, actuators={"tilt": CYLINDER}).joints == arm.joints
+
+
+def text(values):
+    return " ".join(map(repr, values.tolist()))
+
+
+def test_any_mjcf_of_hinges_is_an_arm(tmp_path):
+    """Masses may come from shapes; without a keyframe `home` is where MuJoCo starts."""
+    arm = write_arm(tmp_path)
+    assert (arm.name, arm.joint_names, arm.link_names) == ("boom", ("lift", "tilt"), ("boom", "bar", "hook"))
+    np.testing.assert_allclose(arm.masses, [1500, 90, 20])
+    assert arm.poses == {"home": (0.0, 0.0)}
+    assert arm.joints[0].actuator is None
+    free = write_arm(tmp_path, BOOM.replace('range="-20 60"', ""))
+    assert (free.joints[0].continuous, free.joints[0].range) == (True, (-180.0, 180.0))
+    assert np.isinf(free.lower[0])
+
+
+def test_a_payload_hangs_on_its_site(tmp_path):
+    model = BOOM.replace("</worldbody>", "</worldbody>").replace(
+        '<body name="bar"', '<frame pos="1 0 0"><site name="grip" pos="0 0 2"/></frame><body name="bar"'
+    )
+    arm = write_arm(tmp_path, model, payload="grip")
+    loaded = add_payload(load_model(arm), arm, 70.0).compile()
+    assert loaded.body("payload").mass[0] == 70.0
+    np.testing.assert_allclose(loaded.body("payload").pos, [1, 0, 2])
+    with pytest.raises(HydroidError, match=r"no place for a payload; name the site"):
+        add_payload(load_model(arm), write_arm(tmp_path), 1.0)
+
+
+def cylinder(**changes) -> dict[str, object]:
+    ends = {"parent": PARENT, "child": CHILD} | changes.pop("pivots", {})
+    return {"actuators": {"tilt": CYLINDER | {"pivots": ends} | changes}}
+
+
+FOUR_BAR = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}
+WRONG_SETTINGS = [
+    ({"actuators": {"knee": CYLINDER}}, "actuators.knee: no such joint; the model's joints: lift, tilt"),
+    ({"actuators": {"tilt": CYLINDER}}, "joint tilt: the model has no site tilt_pivot_parent"),
+    ({"actuators": {"tilt": {"kind": "hydraulic"}}}, "kind"),
+    ({"payload": "hand"}, "payload: the model has no site 'hand'"),
+    ({"links": []}, "unknown setting 'links'"),
+    (cylinder(stroke=10), "a stroke of 10 mm is too short for the range, which needs"),
+    (cylinder(pivots={"parent": [6.2, 0.2, 2.0]}), "tilt: the pivot on the parent lies on"),
+    (cylinder(pivots={"parent": [4.2, 0.9, 2.4]}), "must lie across the axis"),
+    (cylinder(pivots={"parent": [4.2, 0, 2.0], "child": [6.5, 0, 2.0]}), "has a dead centre"),
+    (cylinder(pivots={"parent": [4, 0, "x"]}), "pivots.parent.2: must be a number"),
+    (cylinder(triangle={"a": 1, "b": 0.5, "theta0": 90}), "pivots take the place of triangle"),
+    (cylinder(four_bar=FOUR_BAR), "four_bar needs a triangle"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("settings", "message"), WRONG_SETTINGS)
+def test_settings_that_do_not_fit_the_model_are_refused_in_one_line(tmp_path, settings, message):
+    with pytest.raises(HydroidError, match=message) as caught:
+        write_arm(tmp_path, **settings)
+    assert str(caught.value).startswith(str(tmp_path))
+    assert "\n" not in str(caught.value)
+
+
+WRONG_MODELS = [
+    ("</mujoco>", "", "MuJoCo refuses it"),
+    ('<joint name="tilt"', '<joint type="slide" name="tilt"', "'tilt' must be a hinge"),
+    ('<joint name="tilt"', '<joint name="extra"/><joint name="tilt"', "must be a hinge, alone on its body"),
+    ('<joint name="tilt"', "<joint", "both need a name"),
+    ('<body name="bar"', "<body", "both need a name"),
+    ("</mujoco>", '<equality><joint joint1="lift" joint2="tilt"/></equality></mujoco>', "equality"),
+    ("</mujoco>", '<asset><texture name="t" type="2d" file="no.png"/></asset></mujoco>', "no.png"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message"), WRONG_MODELS)
+def test_a_model_that_hydroid_cannot_simulate_is_refused_in_one_line(tmp_path, old, new, message):
+    assert old in BOOM
+    with pytest.raises(HydroidError, match=message) as caught:
+        load_model(write_arm(tmp_path, BOOM.replace(old, new)))
+    assert str(caught.value).startswith(str(tmp_path / "arm.xml"))
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_not_there_is_answered_with_what_is(tmp_path):
+    with pytest.raises(HydroidError, match=r"no pose 'stduy'.*home, study, rig"):
+        SHIPPED.pose("stduy")
+    (tmp_path / "arm.yaml").write_text("model: none.xml")
+    with pytest.raises(HydroidError, match=r"none\.xml: no such model; .*hydroid init"):
+        load_arm(tmp_path / "arm.yaml")
+
+
+def test_a_cylinder_on_a_joint_without_limits_is_refused(tmp_path):
+    with pytest.raises(HydroidError, match="tilt: a joint without limits needs a rotary actuator"):
+        write_arm(tmp_path, BOOM.replace('range="-60 60"', ""), **cylinder())
+
+
+def test_equal_files_are_equal_arms():
+    assert isinstance(SHIPPED, Arm)
+    assert load_arm("hydrolek") == SHIPPED

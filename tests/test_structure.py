@@ -10,7 +10,18 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 # a package may import packages of a lower layer, and itself
 LAYERS = [
     {"errors"},
-    {"assets", "files", "findings", "log_words", "mjcf", "parameters", "progress", "settings", "units", "words"},
+    {
+        "assets",
+        "files",
+        "findings",
+        "log_words",
+        "mjcf",
+        "parameters",
+        "progress",
+        "settings",
+        "units",
+        "words",
+    },
     {"estimate"},
     {"identified_model"},
     {"log", "arm", "hydraulics"},

@@ -1,6 +1,4 @@
-"""Runs of a search on a function, and their state through files, for the tests of the algorithms."""
-
-import json
+"""Runs of a search on a function, for the tests of the algorithms."""
 
 import numpy as np
 
@@ -24,17 +22,6 @@ def advance(algorithm, function, population, rng, generations):
         offspring = evaluate(algorithm, algorithm.ask(population, rng), function)
         population = algorithm.tell(population, offspring)
     return population
-
-
-def through_files(folder, population, rng):
-    """The state of a run, written as npz and JSON and read back."""
-    np.savez(folder / "population.npz", chromosomes=population.chromosomes, objectives=population.objectives)
-    (folder / "rng.json").write_text(json.dumps(rng.bit_generator.state))
-    with np.load(folder / "population.npz", allow_pickle=False) as stored:
-        again = Population(stored["chromosomes"], stored["objectives"])
-    fresh = np.random.default_rng()
-    fresh.bit_generator.state = json.loads((folder / "rng.json").read_text())
-    return again, fresh
 
 
 def same(a, b):

@@ -106,8 +106,12 @@ class CurveEstimate(Settings):
 
 def _finding(value: Any) -> Any:
     """Return a finding from a mapping: files have no tuples."""
+    if not isinstance(value, dict):
+        return value
+    given: dict[str, Any] = dict(value)
     try:
-        return Finding(**value | {"subjects": tuple(value["subjects"])}) if isinstance(value, dict) else value
+        given["subjects"] = tuple(given["subjects"])
+        return Finding(**given)
     except (KeyError, TypeError):
         raise ValueError("is no finding") from None
 

@@ -97,7 +97,7 @@ def residual_table(content: Content, settings: FitSettings, logs: Sequence[str])
     keys = "rms_deg", "correlation_s", "at_stop_s"
     rows: list[tuple[Cell, ...]] = []
     for residual in content["residuals"]:
-        place = logs[residual["log"]], settings.arm.joint_names[residual["joint"] - 1]
+        place = logs[int(residual["log"])], settings.arm.joint_names[int(residual["joint"]) - 1]
         rows.append((*place, *(residual[key] for key in keys)))
     header = ("log", "joint", "rms [deg]", "correlation time [s]", "at a stop [s]")
     return Table("Residuals", header, tuple(rows))

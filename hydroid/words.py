@@ -37,9 +37,6 @@ WORDS: dict[str, Words] = {
         "Allow more iterations (refinement.iterations), or try another seed.",
     ),
     "diverged": Words("The simulation of the estimate '{0}' diverged. It is not used."),
-    "norm raised": Words(
-        "The refinement lowered the rms error but raised the {norm}, which the search minimised."
-    ),
     "at zero": Words("{names} {is} 0, the least possible value: the logs show no such effect."),
     "at bound": Words(
         "{names} {is} at the {side} bound. The error would fall further beyond it.",

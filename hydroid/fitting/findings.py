@@ -13,19 +13,17 @@ from hydroid.posterior.flags import Flag, ParameterStatus, Source
 from hydroid.posterior.patterns import DirectionKind
 from hydroid.problem.problem import Problem
 
-_NORMS = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}
 _MOST_DIRECTIONS = 6
 _LOST_ABOVE = 1.0
 """half of a 95 % interval, relative to the value, above which a quantity counts as open"""
 
 
-def fit_findings(problem: Problem, fit: Fit) -> tuple[Finding, ...]:
+def fit_findings(fit: Fit) -> tuple[Finding, ...]:
     """Return what is to be said about a fit's way to its estimate."""
     return (
         *_endings(fit),
         *_strains(fit),
         *(Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable),
-        *_objective(problem, fit),
         *_open_quantities(fit),
     )
 
@@ -110,11 +108,6 @@ def _strains(fit: Fit) -> Iterator[Finding]:
         side = "above" if strain.score > 0 else "below"
         numbers = {"score": abs(strain.score), "side": side}
         yield Finding("strained prior", "warning", (strain.prior,), numbers)
-
-
-def _objective(problem: Problem, fit: Fit) -> Iterator[Finding]:
-    if fit.refinement is not None and fit.best.overall > fit.searched.overall:
-        yield Finding("norm raised", "note", (), {"norm": _NORMS[problem.settings.objective.norm]})
 
 
 def _open_quantities(fit: Fit) -> Iterator[Finding]:

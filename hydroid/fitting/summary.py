@@ -28,7 +28,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         "seed": problem.settings.search.seed,
         "simulations": int(fit.history[-1, 2]),
         "diverged": int(fit.history[-1, 3]),
-        "findings": (*fit_findings(problem, fit), *known.findings),
+        "findings": (*fit_findings(fit), *known.findings),
         "strained_priors": {strain.prior: strain.score for strain in fit.strains},
         "estimates": {
             e.name: NamedEstimate(

@@ -25,25 +25,13 @@ from hydroid.report.page import PAGE, Light, Page, Plot, Section, Step, Tab, Ver
 from hydroid.report.parameters_report import parameter_section
 from hydroid.report.phrases import ALGORITHMS, norm_label, prior_phrase
 from hydroid.report.predictions import motion, prediction_section, response_data
-from hydroid.report.quantities_report import BEST_WITHIN, curves_csv, quantity_section
+from hydroid.report.quantities_report import BEST_WITHIN, best_known, curves_csv, quantity_section
 from hydroid.report.suggestion_report import MOST_STEPS, step, suggestion_sections
 from hydroid.report.table import Table, numbers_csv
 from hydroid.report.uncertainty_report import determined_sections
 from hydroid.run.record import Record
 from hydroid.words import number, sentence
 
-_OPEN = (
-    "quantities open",
-    "no effect",
-    "not identifiable",
-    "prior only",
-    "weakly identifiable",
-    "common scale",
-    "combination",
-    "more combinations",
-    "interval rough",
-)
-"""kinds of findings that stand under what is not known"""
 _FILES = (
     "config.yaml, arm.yaml and model/ (the fitted arm), estimate.yaml, result.npz, tables/, responses/ (all "
     "series in full), history.csv, pareto.csv, run.json (hashes), run.log"
@@ -53,7 +41,6 @@ _FILES = (
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, result = record.settings, record.summary, record.result
-    findings = [f for f in summary.findings if f.kind not in _OPEN]
     folded = (*(advice_sections(record)), *determined_sections(summary, result.noise, _names(record)))
     search = (_search(record), _front(record))
     sections = (
@@ -72,8 +59,16 @@ def fit_page(record: Record) -> Page:
         k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")
     }
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
-    warnings = tuple(sentence(finding) for finding in findings)
-    return Page("report", title, verdict.prediction, sections, warnings, versions, _data(record), verdict)
+    return Page(
+        "report",
+        title,
+        verdict.prediction,
+        sections,
+        tuple(fit_lines(summary)),
+        versions,
+        _data(record),
+        verdict,
+    )
 
 
 def fit_verdict(record: Record) -> Verdict:
@@ -107,9 +102,16 @@ def known_phrase(summary: FitSummary) -> str:
     return f"The logs fix {fixed} of the machine's properties, such as speeds and dead bands. {parameters}"
 
 
+def fit_warnings(summary: FitSummary) -> tuple[str, ...]:
+    """Return what must be read before any use of the estimate."""
+    return tuple(sentence(f) for f in summary.findings if f.level != "note")
+
+
 def fit_lines(summary: FitSummary) -> list[str]:
-    """Return what a terminal prints under the tables: the findings that must be read before any use."""
-    return [sentence(f) for f in summary.findings if f.level != "note"]
+    """Return what a terminal prints under the table of parameters."""
+    error = "diverges" if summary.rms_deg is None else f"has an rms error of {number(summary.rms_deg)} deg"
+    first = f"The estimate '{summary.final}' {error} on the fitted logs."
+    return [first, *best_known(summary.quantities), *fit_warnings(summary)]
 
 
 def steps(record: Record) -> tuple[Step, ...]:
@@ -159,7 +161,7 @@ def _validated(unseen: Sequence[Prediction], folder: str) -> Light:
 
 
 def _unknown(summary: FitSummary) -> Section:
-    points = tuple(sentence(f) for f in summary.findings if f.kind in _OPEN)
+    points = tuple(sentence(f) for f in summary.findings if f.level == "note")
     return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
 
 

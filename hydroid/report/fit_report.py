@@ -64,7 +64,7 @@ def fit_page(record: Record) -> Page:
         title,
         verdict.prediction,
         sections,
-        tuple(fit_lines(summary)),
+        fit_warnings(summary),
         versions,
         _data(record),
         verdict,

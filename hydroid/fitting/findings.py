@@ -67,8 +67,8 @@ def _flags(names: Sequence[str], statuses: Sequence[ParameterStatus]) -> Iterato
         Source.PRIOR: "prior only",
         Flag.WEAK: "weakly identifiable",
     }
-    which = {
-        name: s.source if s.source is Source.PRIOR else s.flag
+    which: dict[str, Flag | Source] = {
+        name: s.source if s.source is Source.PRIOR and s.flag is not Flag.NO_EFFECT else s.flag
         for name, s in zip(names, statuses, strict=True)
     }
     for flag, kind in kinds.items():

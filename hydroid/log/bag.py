@@ -156,7 +156,7 @@ def _numbers(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[s
         parts = {name: value}
         if isinstance(value, np.ndarray | list):
             named = isinstance(labels, list) and len(labels) == len(value)
-            keys = labels if named else range(1, len(value) + 1)
+            keys: Any = labels if named else range(1, len(value) + 1)
             parts = {f"{name}[{key}]": part for key, part in zip(keys, value[:MAX_ARRAY], strict=False)}
         for key, part in parts.items():
             if isinstance(part, bool | int | float | np.number | np.bool_):

@@ -69,7 +69,7 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
     if len(time) < 2 or duration < SHORTEST:
         samples = "1 sample" if len(time) == 1 else f"{len(time)} samples"
         numbers |= {"duration": duration, "samples": samples, "remedy": remedy}
-        yield recording.finding("error", "too short", **numbers)
+        yield recording.finding("error", "too short", (), None, **numbers)
     elif period > SLOWEST * settings.period_s:
         yield recording.finding("error", "too slow", (), signal, remedy=remedy, **numbers)
     else:

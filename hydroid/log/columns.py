@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Recording:
         kind: str,
         rows: Sequence[int] | NDArray[np.int64] = (),
         signal: Signal | None = None,
-        **numbers: float | str,
+        **numbers: Any,
     ) -> LogFinding:
         """Make a finding about a signal at the first of `rows`; its number `rows` counts the others."""
         more = ""

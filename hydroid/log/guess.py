@@ -118,7 +118,8 @@ def _columns(table: Table) -> list[_Column]:
     columns = list[_Column]()
     for name, values in read.items():
         if len(values) == usual and np.isfinite(values).any():
-            unit, kind, why = units[name], kinds[name], "by its unit" if units[name] else "by its name"
+            unit, kind = units[name], kinds[name]
+            why = "by its unit" if unit else "by its name"
             if kind == "" and np.ptp(values[np.isfinite(values)]) > 0:
                 kind, why = _kind_by_motion(values), "by how its numbers change"
             columns.append(_Column(name, kind, unit.name if unit else "", values, why, name in clocks))

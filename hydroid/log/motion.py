@@ -190,11 +190,11 @@ class JointMotion:
         command's effect. A log that is too short, or in which nothing changes, leaves all of it.
         """
         first, last = (round(lag / self.log.period) for lag in LAGS)
-        lag = np.arange(first, last + 1) * self.log.period
+        lag: Floats = np.arange(first, last + 1).astype(np.float64) * self.log.period
         command, used = self._command, slice(last, len(self.angle) + first)
         counts = ~self._at_stop[used]
         if counts.sum() < last or np.ptp(self.command) == 0 or not np.ptp(self.angle) > 0:
-            return lag, np.ones_like(lag), np.zeros_like(lag)
+            return lag, np.ones(len(lag)), np.zeros(len(lag))
         angle = smooth(self.angle, SMOOTHING / self.log.period)[used]
         basis = np.linalg.qr(counts[:, None] * np.stack([np.ones_like(angle), angle], axis=1))[0]
         wanted = counts * self._speed[used]
@@ -203,7 +203,7 @@ class JointMotion:
         own = power - sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
         product, total = np.correlate(command, wanted, "valid"), wanted @ wanted
         enough = (own > _ROUNDING * power) & (total > 0)
-        explained = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
+        explained: Floats = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
         return lag, (1 - explained)[::-1], np.sign(product)[::-1]
 
 

@@ -1,7 +1,7 @@
 """What the names and units of columns say about them."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from hydroid.units import Unit, unit_of
@@ -19,8 +19,13 @@ WORDS: dict[str, Kind] = {
     "q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll": "angle",
 }
 """words that tell the kind of a column"""
-KINDS: dict[str, Kind] = {"time": "time", "angle": "angle", "ambiguous": ""}
-KINDS |= dict.fromkeys(("command", "voltage", "current"), "command")
+KINDS: dict[str, Kind] = {
+    "time": "time",
+    "angle": "angle",
+    "command": "command",
+    "voltage": "command",
+    "current": "command",
+}
 """kind of a column by what its unit measures; of all other units it is "other\""""
 SAME = (
     "arm stick dipper",
@@ -58,8 +63,11 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
-    kinds = (kind for word in reversed(there) for known, kind in WORDS.items() if word in known.split())
-    return next(kinds, "")
+    kinds: Iterator[Kind] = (
+        kind for word in reversed(there) for known, kind in WORDS.items() if word in known.split()
+    )
+    nothing: Kind = ""
+    return next(kinds, nothing)
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:

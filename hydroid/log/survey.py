@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from hydroid.findings import Level
 from hydroid.log.finding import LogFinding, Place
 from hydroid.log.log import Floats, Log
 from hydroid.log.motion import JointMotion, motion_of
@@ -103,7 +104,8 @@ class Contradictions:
         """Commands that look early or late."""
         lags = {j: m.lag for j, m in self.motions.items() if m.lag is not None and m.shifted}
         findings = list[LogFinding]()
-        for kind, level, sign in (("early", "note", 1), ("late", "warning", -1)):
+        signs: tuple[tuple[str, Level, int], ...] = (("early", "note", 1), ("late", "warning", -1))
+        for kind, level, sign in signs:
             if joints := [j for j, lag in lags.items() if sign * lag > 0]:
                 lag = float(np.median([lags[j] for j in joints]))
                 numbers = {"lag": abs(lag), "delay": self.settings.delay_s + lag}

@@ -142,7 +142,7 @@ class LogSettings(Settings):
         own: Columns | None = getattr(self.joints.get(joint, JointColumns()), kind, None)
         if own is None or (common is None and not _given(own)):
             return None
-        given = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
+        given: dict[str, Any] = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
         return ColumnMap(
             **given | {"column": tuple(name.replace(JOINT, str(joint)) for name in given["column"])}
         )

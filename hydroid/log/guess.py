@@ -118,7 +118,8 @@ def _columns(table: Table) -> list[_Column]:
     columns = list[_Column]()
     for name, values in read.items():
         if len(values) == usual and np.isfinite(values).any():
-            unit, kind = units[name], kinds[name]
+            unit = units[name]
+            kind: Kind = kinds[name]
             why = "by its unit" if unit else "by its name"
             if kind == "" and np.ptp(values[np.isfinite(values)]) > 0:
                 kind, why = _kind_by_motion(values), "by how its numbers change"

@@ -1,7 +1,7 @@
 """What the names and units of columns say about them."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 from hydroid.units import Unit, unit_of
@@ -63,11 +63,11 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
-    kinds: Iterator[Kind] = (
-        kind for word in reversed(there) for known, kind in WORDS.items() if word in known.split()
-    )
-    nothing: Kind = ""
-    return next(kinds, nothing)
+    for word in reversed(there):
+        for known, kind in WORDS.items():
+            if word in known.split():
+                return kind
+    return ""
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:

@@ -143,9 +143,8 @@ class LogSettings(Settings):
         if own is None or (common is None and not _given(own)):
             return None
         given: dict[str, Any] = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
-        return ColumnMap(
-            **given | {"column": tuple(name.replace(JOINT, str(joint)) for name in given["column"])}
-        )
+        names = tuple(name.replace(JOINT, str(joint)) for name in given["column"])
+        return ColumnMap(names, given["unit"], given["scale"], given["offset"])
 
 
 def _given(columns: Columns) -> dict[str, Any]:

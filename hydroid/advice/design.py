@@ -5,23 +5,19 @@ changes of the best. The design is local: motions and sensitivities are simulate
 Where that is far from the truth, design again after the next fit.
 """
 
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hydroid.advice.commands import RandomExperiments
-from hydroid.advice.information import (
-    ExperimentSimulator,
-    Precision,
-    Trial,
-    log_information,
-    prior_information,
-)
+from hydroid.advice.information import PRIOR_SD, ExperimentSimulator, Trial, forecast
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.jacobian import estimate_box, prior_slopes, white_posterior
+from hydroid.posterior.posterior import Posterior
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem
 from hydroid.problem.stage import Stage
@@ -30,6 +26,8 @@ from hydroid.settings.fit import FitSettings
 
 ELITE = 4
 """number of best experiments that are kept and changed"""
+DRAWN = 6
+"""of so many experiments one is drawn at random; the others are changes of the best"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +37,18 @@ class Design:
     Attributes:
         best: the experiment.
         random: those drawn at random that keep the limits.
-        precision: how precisely the parameters are known without it.
-        names: of the free parameters.
+        known: what is known without it.
+        directions: orthonormal basis of the directions that such experiments improve on PRIOR_SD, (p, d). The
+            others stay at it, and must not hide them.
+        names: of the p parameters.
         period: of the commands [s].
         tried: number of experiments simulated with all their sensitivities.
     """
 
     best: Trial
     random: tuple[Trial, ...]
-    precision: Precision
+    known: Posterior
+    directions: Array
     names: tuple[str, ...]
     period: float
     tried: int
@@ -64,14 +65,23 @@ class Design:
         return self.best.log
 
     @property
+    def after(self) -> Posterior:
+        """What is known after the experiment."""
+        return self.known.add(self.best.gained)
+
+    @property
     def random_deviations(self) -> Array:
-        """Relative standard deviation of each free parameter after a random experiment, the median; (F,)."""
-        return np.median([self.precision.deviations(t.information) for t in self.random], axis=0)
+        """Relative standard deviation of each parameter after a random experiment, the median; (p,)."""
+        return np.median([self.known.add(t.gained).deviations for t in self.random], axis=0)
 
     @property
     def random_weakest(self) -> float:
         """Relative standard deviation of the weakest direction after a random experiment, the median."""
-        return float(np.median([self.precision.weakest(t.information)[0] for t in self.random]))
+        return float(np.median([self.weakest(self.known.add(t.gained))[0] for t in self.random]))
+
+    def weakest(self, known: Posterior) -> tuple[float, Array]:
+        """Relative standard deviation and unit vector (p,) of the least known of `directions`."""
+        return weakest(known, self.directions)
 
 
 def design(
@@ -80,8 +90,7 @@ def design(
     """Choose start pose, joints and commands of an experiment.
 
     Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment unless
-    `time_limit_s` ends the search.
+    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
 
     Args:
         settings: the model, the free parameters, the priors, and `design`.
@@ -93,47 +102,57 @@ def design(
     Raises:
         SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
     """
-    limits, parameters = settings.design, Stage(settings).parameters
+    effort, parameters = settings.design.effort, Stage(settings).parameters
     rng = np.random.default_rng(seed)
-    experiments, simulator = RandomExperiments(settings, rng), ExperimentSimulator(settings, theta)
-    end = time.monotonic() + limits.time_limit_s
-    known = prior_information(Priors(settings.priors, parameters), parameters, theta)
     if logs:
-        known = known + log_information(Problem(settings, logs), theta)
+        fitted = uncertainty(Problem(settings, logs), theta).posterior
+    else:
+        box = estimate_box(parameters, theta)
+        fitted = white_posterior(box, prior_slopes(Priors(settings.priors, parameters), box))
+    known = forecast(fitted)
+    experiments, simulator = RandomExperiments(settings, rng), ExperimentSimulator(settings, known)
     random: list[Trial] = []
-    drawn = 0
-    for drawn in _until(end, limits.candidates):
+    first = max(2, effort // DRAWN)
+    for drawn in range(1, first + 1):
         trial = simulator.trial(experiments.draw())
         random += [trial] if trial is not None else []
-        progress("random experiments", drawn, limits.candidates)
+        progress("random experiments", drawn, effort)
     if not random:
         raise SettingsError(
-            f"none of {drawn} random experiments keeps the limits in simulation",
+            f"none of {first} random experiments keeps the limits in simulation",
             where="design",
             hint="allow more speed, less margin or clearance, a smaller command, or other poses",
         )
-    precision = Precision.of(known, np.mean([t.information for t in random], axis=0))
+    directions = _improved(fitted, np.mean([t.gained.T @ t.gained for t in random], axis=0))
 
     def score(trial: Trial) -> float:
-        return precision.score(trial.information, limits.criterion)
+        after = known.add(trial.gained)
+        if settings.design.criterion == "D":
+            return float(np.sum(np.log(np.diag(after.root))))  # half the log determinant
+        return -weakest(after, directions)[0]
 
     elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:ELITE]
-    changed = 0
-    for changed in _until(end, limits.improvements):
+    for tried in range(first + 1, effort + 1):
         parent = elite[min(rng.integers(len(elite)), rng.integers(len(elite)))][2]
         child = simulator.trial(experiments.change(parent.experiment))
         if child is not None and score(child) > elite[-1][0]:
-            elite = sorted([*elite[:-1], (score(child), len(random) + changed, child)], reverse=True)
-        weakest, _ = precision.weakest(elite[0][2].information)
-        progress(f"improving: weakest {100 * weakest:.3g} %", changed, limits.improvements)
-    names = tuple(p.name for p in parameters.parameters if p.fixed is None)
-    tried = len(random) + changed
-    return Design(elite[0][2], tuple(random), precision, names, settings.log.period_s, tried)
+            elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
+        least, _ = weakest(known.add(elite[0][2].gained), directions)
+        progress(f"improving: weakest {100 * least:.3g} %", tried, effort)
+    names = tuple(n for n, each in zip(parameters.names, known.box.varied, strict=True) if each)
+    period = settings.log.period_s
+    return Design(elite[0][2], tuple(random), known, directions, names, period, max(effort, first))
 
 
-def _until(end: float, count: int) -> Iterator[int]:
-    """Count from 1 to `count`, at least once, until the clock [s] passes `end`."""
-    for k in range(1, count + 1):
-        if k > 1 and time.monotonic() > end:
-            return
-        yield k
+def weakest(known: Posterior, directions: Array) -> tuple[float, Array]:
+    """Relative standard deviation and unit vector, (p,), of the least known of some directions, (p, d)."""
+    values, vectors = np.linalg.eigh(directions.T @ known.covariance @ directions)
+    return float(np.sqrt(values[-1])), directions @ vectors[:, -1]
+
+
+def _improved(fitted: Posterior, typical: Array) -> Array:
+    """Directions that experiments with a mean information, (p, p), improve on PRIOR_SD; at least one."""
+    values, vectors = np.linalg.eigh(fitted.root.T @ fitted.root + typical)
+    improved = values > 1 / PRIOR_SD**2
+    improved[-1] = True
+    return vectors[:, improved]

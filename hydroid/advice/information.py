@@ -1,17 +1,15 @@
-"""What an experiment measures: its motion within the limits, its Fisher information, the precision after it.
-
-Information is in relative changes of the free parameters, x = d theta / theta: units do not matter, and a
-standard deviation of 0.1 means 10 %.
+"""What measurements add to what is known, and what an experiment within the limits would measure.
 
 Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
 """
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import solve_triangular
 
 from hydroid.advice.commands import (
     Experiment,
@@ -24,25 +22,48 @@ from hydroid.advice.commands import (
 from hydroid.arm.machine import load_machine
 from hydroid.arm.model import load_model
 from hydroid.log import Log
-from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.jacobian import FINE_STEP, jacobian, relative_scale, score_slopes
-from hydroid.posterior.noise import Noise, channel_noise
-from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem, make_simulation
+from hydroid.parameters import Array
+from hydroid.posterior.noise import Noise
+from hydroid.posterior.posterior import Posterior
+from hydroid.problem.problem import make_simulation
 from hydroid.problem.stage import Stage
+from hydroid.search.axes import differentiate
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
 PRIOR_SD = 1.0
-"""relative standard deviation of every parameter before any log or prior (ours)"""
+"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
+so weak that a direction which stays unknown would outweigh all that an experiment can do"""
+STEP = 0.1
+"""step of an experiment's derivatives in standard deviations, to one side; central ones agree to 0.1 %"""
 MAX_REPAIRS = 60
 """changes after which an experiment that still breaks a limit is given up"""
+ROUNDING = 1e-12
 
 
-def information(slopes: Array, noise: Noise) -> Array:
-    """Fisher information in one channel, (F, F), from its derivatives per relative change, shape (F, T)."""
-    white = noise.whitened(slopes)
-    return white @ white.T
+def forecast(known: Posterior) -> Posterior:
+    """Return what is known if every parameter is known to PRIOR_SD at least."""
+    return known.add(np.eye(len(known.root)) / PRIOR_SD)
+
+
+def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
+    """Return rows N of the information N' N that a least-squares fit gains from signals, shape (p, p).
+
+    It is (J J') (J S J')^-1 (J J'), the inverse covariance of plain least squares. That is less than the
+    Fisher information unless the noise is white.
+
+    Args:
+        signals: derivatives per relative change, (p, T), and the noise.
+    """
+    bread, scatter = (
+        np.sum(parts, axis=0)
+        for parts in zip(
+            *((slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals), strict=True
+        )
+    )
+    floor = ROUNDING * np.trace(scatter) + np.finfo(float).tiny
+    lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
+    return np.asarray(solve_triangular(lower, bread, lower=True), dtype=float)
 
 
 def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise:
@@ -52,115 +73,41 @@ def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise
     return Noise(samples, level, reflection, "settings")
 
 
-def log_information(problem: Problem, theta: Array) -> Array:
-    """Information of logs about the free parameters, for the noise that they show, shape (F, F)."""
-    at, objective = jacobian(problem, theta), problem.settings.objective
-    slopes = np.nan_to_num(at.slopes[problem.parameters.free])
-    parts = [
-        information(slopes[:, c.rows], channel_noise(c, at.residual[c.rows], objective))
-        for c in problem.channels
-    ]
-    return np.sum(parts, axis=0)
-
-
-def prior_information(priors: Priors, parameters: ParameterSet, theta: Array) -> Array:
-    """Information of the priors about the free parameters, shape (F, F)."""
-    slopes = score_slopes(priors, theta, relative_scale(parameters, theta))[parameters.free]
-    return slopes @ slopes.T
-
-
-@dataclass(frozen=True, eq=False)
-class Precision:
-    """How precisely the parameters are known, with and without one more experiment.
-
-    Every parameter has a weak prior of PRIOR_SD. A direction without any information then stays at 100 %,
-    and the covariance stays finite. Such a direction must not hide the others, so the E criterion looks at
-    `directions` only.
-
-    Attributes:
-        known: information of earlier logs and of the priors in the settings, shape (F, F).
-        directions: orthonormal basis of the directions that such experiments improve on PRIOR_SD, (F, d).
-    """
-
-    known: Array
-    directions: Array
-
-    @staticmethod
-    def of(known: Array, typical: Array) -> "Precision":
-        """Return the precision for experiments whose mean information is `typical`, shape (F, F)."""
-        values, vectors = np.linalg.eigh(known + typical)
-        improved = values > 1 / PRIOR_SD**2
-        improved[-1] = True  # at least one direction to compare experiments by
-        return Precision(known, vectors[:, improved])
-
-    def deviations(self, information: Array | float = 0.0) -> Array:
-        """Relative standard deviation of each free parameter, (F,), after an experiment's information."""
-        return np.sqrt(np.diag(self._covariance(information)))
-
-    def spread(self, slopes: Array, information: Array | float = 0.0) -> Array:
-        """Standard deviation of functions with derivatives (k, F) per relative change, shape (k,)."""
-        return np.sqrt(np.sum((slopes @ self._covariance(information)) * slopes, axis=1))
-
-    def weakest(self, information: Array | float = 0.0) -> tuple[float, Array]:
-        """Relative standard deviation and unit vector (F,) of the least known of `directions`."""
-        basis = self.directions
-        values, vectors = np.linalg.eigh(basis.T @ self._covariance(information) @ basis)
-        return float(np.sqrt(values[-1])), basis @ vectors[:, -1]
-
-    def score(self, information: Array, criterion: str) -> float:
-        """Merit, higher is better: minus the log of the weakest deviation (E), half a log determinant (D)."""
-        if criterion == "E":
-            return -float(np.log(self.weakest(information)[0]))
-        return 0.5 * float(np.linalg.slogdet(self._total(information))[1])
-
-    def _total(self, information: Array | float) -> Array:
-        return self.known + information + np.eye(len(self.known)) / PRIOR_SD**2
-
-    def _covariance(self, information: Array | float) -> Array:
-        total = self._total(information)
-        # constraints leave a matrix of very unequal scales: unit diagonal first
-        scale = 1 / np.sqrt(np.diag(total))
-        inverse = cho_solve(cho_factor(total * np.outer(scale, scale)), np.eye(len(total)))
-        return inverse * np.outer(scale, scale)
-
-
 class Trial(NamedTuple):
     """A simulated experiment that keeps the limits.
 
-    experiment: its commands. information: about relative changes of the free parameters, shape (F, F).
-    log: its commands with the simulated angles.
+    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its commands
+    with the simulated angles.
     """
 
     experiment: Experiment
-    information: Array
+    gained: Array
     log: Log
 
 
 class ExperimentSimulator:
-    """Simulates experiments at the present estimate theta, shape (P,), within the limits of the settings."""
+    """Simulates experiments at an estimate within the limits of the settings."""
 
-    def __init__(self, settings: FitSettings, theta: Array) -> None:
+    def __init__(self, settings: FitSettings, known: Posterior) -> None:
         self._spec = load_model(settings.arm)
         if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
             simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
             settings = settings.model_copy(update={"simulation": simulation})
         self._settings, self._outputs = settings, [j - 1 for j in settings.outputs]
-        self._period = settings.log.period_s
+        self._period, self._stage = settings.log.period_s, Stage(settings)
         self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)
         arm, self._machine = settings.arm, None
         if settings.design.clearance_m is not None:
             self._machine = load_machine(arm, pair=arm.pair is not None)
-        stage = Stage(settings)
-        # one-sided differences take a quarter of the simulations of `jacobian` and agree to 0.1 %
-        moved = theta + FINE_STEP * np.diag(relative_scale(stage.parameters, theta))[stage.parameters.free]
-        self._candidates = stage.candidates(np.vstack([theta, moved]))
+        self._box, self._axes = known.box, known.axes(STEP).one_sided
 
     def trial(self, experiment: Experiment) -> Trial | None:
         """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
         if (kept := self.within_limits(experiment)) is None:
             return None
-        gained = self.information(kept[0])
-        return None if gained is None else Trial(kept[0], gained, kept[1])
+        experiment, log = kept
+        gained = self.information(experiment, log.angle)
+        return None if gained is None else Trial(experiment, gained, log)
 
     def within_limits(self, experiment: Experiment) -> tuple[Experiment, Log] | None:
         """Reverse or reduce levels until the experiment keeps the limits; return it and its predicted log.
@@ -169,13 +116,13 @@ class ExperimentSimulator:
         """
         changes: Counter[tuple[int, int]] = Counter()
         for _ in range(MAX_REPAIRS):
-            angle = self._simulate(experiment, 1)
-            if angle is None:
+            (angle,) = self._simulate(experiment, self._box.at[None])
+            if not np.isfinite(angle).all():
                 return None
-            first = violation(angle[0], self._period, self._settings.arm, self._settings.design)
-            first = first or self._too_near(angle[0])
+            first = violation(angle, self._period, self._settings.arm, self._settings.design)
+            first = first or self._too_near(angle)
             if first is None:
-                return experiment, replace(experiment.log(self._settings), angle=angle[0])
+                return experiment, replace(experiment.log(self._settings), angle=angle)
             if first.sample == 0:
                 return None  # the start pose itself
             experiment = repaired(experiment, first, changes)
@@ -190,23 +137,27 @@ class ExperimentSimulator:
         found = machine.checker.first_below(machine.joined({machine.sides[0]: angle}, rest), margin)
         return None if found is None else meeting(angle, found[0])
 
-    def information(self, experiment: Experiment) -> Array | None:
-        """Return the information of an experiment as it is, shape (F, F); None where it diverges."""
-        rows = self._simulate(experiment, len(self._candidates))
-        if rows is None:
-            return None
-        slopes = (rows[1:] - rows[0])[:, :, self._outputs] / FINE_STEP
-        return np.sum([information(slopes[:, :, k], self._noise) for k in range(len(self._outputs))], axis=0)
+    def information(self, experiment: Experiment, angle: Array) -> Array | None:
+        """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""
 
-    def _simulate(self, experiment: Experiment, count: int) -> Array | None:
-        """All joints' angles [rad], (count, T, J), of the first candidates; None where one diverged."""
+        def outputs(theta: Array) -> Array:
+            return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
+
+        value = angle[:, self._outputs].ravel()
+        slopes = differentiate(outputs, self._box, self._axes, value)
+        if not np.isfinite(slopes).all():
+            return None
+        each = slopes.reshape(len(slopes), -1, len(self._outputs))
+        return measured((each[:, :, k], self._noise) for k in range(len(self._outputs)))
+
+    def _simulate(self, experiment: Experiment, theta: Array) -> Array:
+        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN where one diverged."""
         log = experiment.log(self._settings)
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
-        response = simulation.simulate(self._candidates[:count])
-        if not response.feasible.all():
-            return None
-        angle = np.tile(log.angle, (count, 1, 1))
+        response = simulation.simulate(self._stage.candidates(theta))
+        angle = np.tile(log.angle, (len(theta), 1, 1))
         angle[:, :, moving] = response.angle
+        angle[~response.feasible] = np.nan
         return angle

@@ -24,7 +24,7 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty, decompose
+from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.noise import Noise, channel_noise
 from hydroid.problem.problem import Problem
 
@@ -59,8 +59,8 @@ class Explained:
     """What a fit has explained, and the noise that it has left.
 
     Attributes:
-        effects: of the free parameters, orthonormal rows of residuals with the priors behind, (k, R + M).
-        residual: of the fit with the priors' weighted scores behind, shape (R + M,).
+        effects: of the free parameters, orthonormal rows of residuals with all priors behind, (k, R + M + p).
+        residual: of the fit with the priors' weighted scores behind, shape (R + M + p,).
         noise_of: the noise of each channel, from a row of residuals, shape (R,).
         rows: of each channel.
         prior_weight: standard deviation of a prior's row.
@@ -74,20 +74,17 @@ class Explained:
 
     @staticmethod
     def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
-        """Return it for an estimate. A parameter at a bound counts as held."""
-        at, channels = uncertainty.jacobian, problem.channels
-        inside = uncertainty.free & [status.at_bound is None for status in uncertainty.status]
-        values, effects = np.empty(0), np.empty((0, at.residual.size + len(problem.priors)))
-        if inside.any():
-            _, values, effects = decompose(inside, at)
+        """Return it for an estimate. Parameters at bounds are held."""
+        at, channels, linear = uncertainty.jacobian, problem.channels, uncertainty.linear
+        weak = np.zeros(int(linear.varied.sum()))  # the estimate does not depend on the weak priors
         scores = at.prior_weight * problem.priors.scores(uncertainty.theta[None])[0]
 
         def noise_of(residual: Array) -> list[Noise]:
             return [channel_noise(c, residual[c.rows], problem.settings.objective) for c in channels]
 
-        residual = np.concatenate([at.residual, scores])
+        residual = np.concatenate([at.residual, scores, weak])
         rows = [channel.rows for channel in channels]
-        return Explained(effects[values > 0], residual, noise_of, rows, at.prior_weight)
+        return Explained(linear.effects, residual, noise_of, rows, at.prior_weight)
 
     def score(self, change: Array, after: Array | None = None) -> Score:
         """Return the score of a change of the residuals, shape (R,).
@@ -108,7 +105,7 @@ class Explained:
         return Score(gain / deviation, gain / length, saved, length / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
-        """Variance of the product of a row, (R + M,), with the residuals, and its degrees of freedom."""
+        """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
         samples = sum(part.stop - part.start for part in self.rows)
         variance, spectra = self.prior_weight**2 * float(np.sum(row[samples:] ** 2)), list[Array]()
         for process, part in zip(noise, self.rows, strict=True):

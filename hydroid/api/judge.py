@@ -101,7 +101,7 @@ def identifiability(
         RunError: the simulation diverged, or the folder cannot be written.
     """
     from hydroid.fitting.refinement import refine
-    from hydroid.posterior import intervals
+    from hydroid.posterior import profile as profiles
     from hydroid.problem.problem import Problem
     from hydroid.report.uncertainty_report import uncertainty_page
     from hydroid.settings.search import RefinementSettings
@@ -111,7 +111,7 @@ def identifiability(
     if not np.isfinite(problem.residuals(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=model.source)
     study = _analysed(problem, model.theta, model.source, profile, progress)
-    better = intervals.better_optimum(problem, study.uncertainty, study.profiles, None)
+    better = profiles.better_optimum(problem, study.uncertainty, study.profiles)
     if better is not None:
         refinement = model.settings.refinement or RefinementSettings()
         unit = refine(problem, better, refinement, lambda simulated, rms: None).point
@@ -127,14 +127,15 @@ def _analysed(
     problem: "Problem", theta: "Array", source: str, profile: Sequence[str], progress: Progress
 ) -> "UncertaintyStudy":
     """Return the study of an estimate, with the profiles that are asked for."""
-    from hydroid.posterior import covariance, directions, intervals
+    from hydroid.posterior import covariance, directions
+    from hydroid.posterior import profile as profiling
     from hydroid.report.uncertainty_report import UncertaintyStudy
 
     uncertainty = covariance.uncertainty(problem, theta)
-    profiles: list[intervals.Profile] = []
+    profiles: list[profiling.Profile] = []
     for done, name in enumerate(profile):
         progress("profiles", done, len(profile))
-        profiles.append(intervals.profile(problem, uncertainty, name))
+        profiles.append(profiling.profile(problem, uncertainty, name))
     found = directions.identifiability(problem, uncertainty)
     return UncertaintyStudy(problem, source, uncertainty, found, tuple(profiles))
 

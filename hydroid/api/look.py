@@ -185,15 +185,15 @@ def plot_actuator(model: ModelSource, joint: int = 2, out: str | Path = "runs/ac
     """
     model = open_model(model)
     require_hydraulics(model)
-    from hydroid.posterior.delta import stored_precision
+    from hydroid.posterior.posterior import stored_posterior
     from hydroid.problem.stage import Stage
     from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
     from hydroid.report.page_file import write_page
 
     stage, arm = Stage(model.settings), model.settings.arm
     actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)
-    if (precision := stored_precision(model)) is not None:
-        known = KnownActuator(precision, lambda theta: joint_records(arm, stage.candidates(theta), joint))
+    if (posterior := stored_posterior(model)) is not None:
+        known = KnownActuator(posterior, lambda theta: joint_records(arm, stage.candidates(theta), joint))
         actuator = replace(actuator, known=known)
     return write_page(actuator_page(actuator), Path(out))
 

@@ -55,16 +55,16 @@ def quantity(
         RunError: the folder has no covariance of these parameters, or a simulation diverged.
     """
     from hydroid.plant import Plant
-    from hydroid.posterior.delta import required_precision
+    from hydroid.posterior.posterior import required_posterior
 
     opened = open_model(model)
-    precision = required_precision(opened)
+    known = required_posterior(opened)
     shape = np.shape(function(Plant(opened)))
 
     def values(theta: "Array") -> "Array":
         plants = (Plant(replace(opened, theta=row)) for row in theta)
         return np.stack([np.ravel(np.asarray(function(plant), float)) for plant in plants])
 
-    found = precision.propagate(values, positive)
+    found = known.propagate(values, positive)
     ends = found.interval.reshape(*shape, 2)
     return QuantityResult(found.value.reshape(shape), found.sd.reshape(shape), ends, unit)

@@ -8,9 +8,8 @@ from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import FEW, ByLog
 from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.directions import Identifiability
+from hydroid.posterior.directions import DirectionKind, Identifiability
 from hydroid.posterior.flags import Flag, ParameterStatus, Source
-from hydroid.posterior.patterns import DirectionKind
 from hydroid.problem.problem import Problem
 
 _MOST_DIRECTIONS = 6
@@ -104,10 +103,9 @@ def _endings(fit: Fit) -> Iterator[Finding]:
 
 
 def _strains(fit: Fit) -> Iterator[Finding]:
-    for strain in fit.strains:
-        side = "above" if strain.score > 0 else "below"
-        numbers = {"score": abs(strain.score), "side": side}
-        yield Finding("strained prior", "warning", (strain.prior,), numbers)
+    for prior, score in fit.strains.items():
+        side = "above" if score > 0 else "below"
+        yield Finding("strained prior", "warning", (prior,), {"score": abs(score), "side": side})
 
 
 def _open_quantities(fit: Fit) -> Iterator[Finding]:

@@ -16,7 +16,6 @@ from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty, uncertainty
 from hydroid.posterior.directions import Identifiability, identifiability
 from hydroid.posterior.quantities import Quantities, quantities
-from hydroid.posterior.sources import Strain, strains
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search import compromise
@@ -24,6 +23,9 @@ from hydroid.search.descent import Descent
 from hydroid.search.pareto import non_dominated
 
 _log = logging.getLogger(__name__)
+
+STRAINED_ABOVE = 2.0
+"""standard deviations from its prior beyond which an estimate strains it"""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Fit:
 
     estimates: by name; `final` names the one to use. front: the non-dominated candidates, shape (n, P), and
     their objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave.
-    uncertainty, identifiability, quantities: of the final estimate. strains: priors far from it. seconds:
+    uncertainty, identifiability, quantities: of the final estimate. strains: standard
+    deviations between it and the priors that are far from it, by name. seconds:
     wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
@@ -65,7 +68,7 @@ class Fit:
     uncertainty: Uncertainty
     identifiability: Identifiability
     quantities: Quantities
-    strains: tuple[Strain, ...]
+    strains: Mapping[str, float]
     seconds: Mapping[str, float]
 
     @property
@@ -165,13 +168,20 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         about,
         directions,
         determined,
-        strains(last, about.theta, about.jacobian),
+        _strained(last, about.theta),
         {
             "search": search_ended - began,
             "refinement": refined - search_ended,
             "uncertainty": time.perf_counter() - refined,
         },
     )
+
+
+def _strained(problem: Problem, theta: Array) -> dict[str, float]:
+    """Standard deviations between theta, (P,), and the priors that it strains, the farthest first."""
+    scores = problem.priors.scores(theta[None])[0].tolist()
+    by_distance = sorted(zip(problem.priors.names, scores, strict=True), key=lambda pair: -abs(pair[1]))
+    return {name: score for name, score in by_distance if abs(score) > STRAINED_ABOVE}
 
 
 def _refined(problem: Problem) -> list[tuple[str, Problem]]:

@@ -5,11 +5,9 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
-from hydroid.posterior.by_log import ByLog, by_log
+from hydroid.posterior.by_log import ByLog, by_log, left_out_errors
 from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.delta import precision
 from hydroid.posterior.directions import Identifiability
-from hydroid.posterior.left_out import left_out_errors
 from hydroid.problem.problem import Problem
 
 
@@ -29,7 +27,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         "simulations": int(fit.history[-1, 2]),
         "diverged": int(fit.history[-1, 3]),
         "findings": (*fit_findings(fit), *known.findings),
-        "strained_priors": {strain.prior: strain.score for strain in fit.strains},
+        "strained_priors": dict(fit.strains),
         "estimates": {
             e.name: NamedEstimate(
                 values=problem.parameters.mapping(e.theta),
@@ -51,7 +49,7 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
         stage=problem.settings.stage,
         estimate=parameter_estimates(problem, known, logs),
         findings=parameter_findings(problem, known, logs, directions),
-        covariance=precision(problem.parameters, known).covariance(),
+        covariance=known.posterior.stored(problem.parameters),
         noise_deg=noise_levels(problem, known),
         left_out_deg={
             f"q{joint}": tuple(np.degrees(errors).tolist())

@@ -153,11 +153,12 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
 
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
     """Return what the estimates of a fit make of its own logs, the final estimate first."""
-    known, slopes = fit.quantities.precision, fit.uncertainty.jacobian.slopes[fit.uncertainty.free]
+    known = fit.uncertainty.posterior
+    slopes = fit.uncertainty.jacobian.slopes[known.box.varied]
     bands: dict[int, dict[int, Band]] = {}
     for channel, noise in zip(problem.channels, fit.uncertainty.noise, strict=True):
         if channel.quantity == "angle":
-            sd = known.deviation(np.nan_to_num(slopes[:, channel.rows])) / channel.weight
+            sd = known.sd(np.nan_to_num(slopes[:, channel.rows])) / channel.weight
             level = noise.level / channel.weight
             error = channel.measured - fit.best.responses[channel.log][:, channel.column]
             half = known.quantile * np.hypot(sd, level)

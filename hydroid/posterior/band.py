@@ -11,16 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
-from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import COVERAGE
-from hydroid.posterior.delta import stored_precision
 from hydroid.posterior.open_start import start_deviations
+from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, stored_posterior
 from hydroid.problem.problem import Problem
+from hydroid.search.axes import differentiate
 
 MOST_OUTSIDE = 0.1
 """part of the samples outside the band, above which the model is at fault; 5 % are expected"""
@@ -69,29 +68,33 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
 
     Empty where the model's values are not those of a fit, which alone knows its covariance and noise.
     """
-    precision, outputs = stored_precision(model), model.settings.outputs
-    if precision is None or model.summary is None:
+    known, outputs = stored_posterior(model), model.settings.outputs
+    if known is None or model.summary is None:
         return {}
     levels, left_out = model.summary.noise_deg, model.summary.left_out_deg
     if any(f"q{joint}" not in levels for joint in outputs):
         return {}
     problem = Problem(model.settings, [log])
-    angles = precision.propagate(
-        lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1), positive=False
+    slopes = differentiate(
+        lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1),
+        known.box,
+        known.axes(STEP),
     )
     noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
     start = start_effects(problem, model.theta, noises)
-    parts = precision.parts(angles.slopes).reshape(-1, *response.shape)
+    parts = known.parts(slopes).reshape(-1, *response.shape)
+    slopes = slopes.reshape(parts.shape)
     bands: dict[int, Band] = {}
-    for column, (joint, deviation) in enumerate(
-        zip(outputs, angles.sd.reshape(response.shape).T, strict=True)
-    ):
+    for column, joint in enumerate(outputs):
+        variance = np.sum(parts[:, :, column] ** 2, axis=0)
+        if np.mean(variance) > np.mean(np.sum(slopes[:, :, column] ** 2, axis=0)):
+            variance = np.full_like(variance, np.inf)  # no better than from parameters known to 100 % each
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
         begun = np.sum(start[joint] ** 2, axis=0)
-        right, unseen = deviation**2 + noise**2, np.radians(left_out.get(f"q{joint}", ()))
+        right, unseen = variance + noise**2, np.radians(left_out.get(f"q{joint}", ()))
         wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
-        widened = wrong * float(student.ppf(_END, unseen.size or 1) / normal.ppf(_END)) ** 2
-        half = np.sqrt(precision.quantile**2 * (right + begun) + float(normal.ppf(_END)) ** 2 * widened)
+        widened = wrong * float(student.ppf(_END, unseen.size or 1) / NORMAL) ** 2
+        half = np.sqrt(known.quantile**2 * (right + begun) + NORMAL**2 * widened)
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
         expected = float(np.mean(right + begun)) + wrong
         few = np.vstack([parts[:, :, column], start[joint]])

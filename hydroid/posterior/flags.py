@@ -35,31 +35,38 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class ParameterStatus:
-    """How well one parameter is known."""
+    """How well one parameter is known.
+
+    Attributes:
+        flag: what the logs alone determine.
+        at_bound: the bound that it lies at.
+        doubt: relative change of the standard deviation in the last round of derivatives, where it is large.
+        diverges: whether its effect is unknown because simulations diverge where it is changed.
+        share: part of the information that the logs gave: 1 - posterior / prior variance.
+        known: whether logs and priors together determine it.
+    """
 
     flag: Flag
     at_bound: Side | None = None
     doubt: float | None = None
-    """relative change of the standard deviation in the last round of derivatives, where it is large"""
     diverges: bool = False
-    """whether its effect is unknown because simulations diverge where it is changed"""
     share: float = 1.0
-    """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
+    known: bool = True
 
     @property
     def source(self) -> Source | None:
         """Where the information comes from; None where there is none, or the parameter is fixed."""
-        if self.flag is Flag.FIXED:
+        if self.flag is Flag.FIXED or not self.known:
             return None
         if self.share > MOSTLY:
-            return None if self.flag in (Flag.UNIDENTIFIABLE, Flag.NO_EFFECT) else Source.DATA
+            return Source.DATA
         return Source.BOTH if self.share >= 1 - MOSTLY else Source.PRIOR
 
 
 def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
     """Return the flag of a relative standard deviation, of which the logs gave a share of the information.
 
-    NaN counts as infinite. The logs alone leave a variance of the posterior's divided by their share.
+    The logs alone leave a variance of the posterior's divided by their share. NaN counts as infinite.
     """
     alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
     if not alone <= UNIDENTIFIABLE_ABOVE:

@@ -2,7 +2,12 @@
 
 A residual at 100 Hz is rarely white: sensor filters, quantisation and errors of the model leave deviations
 that last for many samples. An autoregressive (AR) process describes them. It is fitted by Burg's method
-(J. P. Burg, "Maximum entropy spectral analysis", 1967), its order by the lowest AIC (H. Akaike, 1974).
+(J. P. Burg, "Maximum entropy spectral analysis", 1967). Processes of all orders are averaged with Akaike's
+weights (K. P. Burnham and D. R. Anderson, 2002): the one order of the lowest AIC would jump from one to
+another, and a refinement whose priors it weighs would settle at one of several weights.
+
+A variance that follows from an estimated process is uncertain because the process is. Its logarithm is about
+normal, with a variance from the process's own information (P. Whittle, 1953): see `neighbours`.
 """
 
 from collections.abc import Sequence
@@ -11,6 +16,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter, lfiltic
 
@@ -24,6 +30,10 @@ ABSORBED_ROUNDS = 4
 """rounds in which the noise that a fit has absorbed is estimated"""
 MAX_ABSORBED = 0.5
 """part of the noise; a fit that has absorbed more leaves too little to correct the level with"""
+NEGLIGIBLE = 0.05
+"""Akaike weight of all higher orders together, below which they are left out"""
+STEP = 1e-4
+"""of the differences by a process's numbers, in hyperbolic arc tangents of its reflection coefficients"""
 MIN_LEVEL = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest noise level that a residual can show [rad, Pa]: no potentiometer or gauge is better (ours)"""
 
@@ -64,18 +74,20 @@ class Noise:
         polynomial, variance = self._predictors()[-1]
         return variance / np.abs(np.fft.rfft(polynomial, 2 * self.samples)) ** 2
 
+    @property
+    def power(self) -> Array:
+        """Variance of each column of `transformed`, shape (F,).
+
+        The covariance matrix S is a part of a circulant one, which the Fourier transform makes diagonal.
+        """
+        lags, size = self.autocovariance, next_fast_len(2 * self.samples, real=True)
+        filler = np.zeros(size - 2 * self.samples + 1)
+        return np.tile(np.fft.rfft(np.concatenate([lags, filler, lags[:0:-1]])).real, 2)
+
     def covariance_of(self, rows: Array) -> Array:
         """Return rows S rows', shape (n, n), where rows is (n, T) and S the noise's covariance matrix."""
-        return covariances([self], rows)[0]
-
-    def whitened(self, rows: Array) -> Array:
-        """Return L^-1 rows' of S = L L', shape (n, T), which makes this noise white with unit variance."""
-        predictors = self._predictors()
-        polynomial, variance = predictors[-1]
-        white = lfilter(polynomial, [1.0], rows, axis=1) / np.sqrt(variance)
-        for m, (shorter, shorter_variance) in enumerate(predictors[:-1][: self.samples]):
-            white[:, m] = rows[:, m::-1] @ shorter / np.sqrt(shorter_variance)
-        return white
+        waves = transformed(rows)
+        return (waves * self.power) @ waves.T
 
     @property
     def effective_sample_size(self) -> float:
@@ -102,17 +114,14 @@ def prior_weight(channels: Sequence[Channel], residual: Array, objective: Object
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
-    level times the root of the number of samples per effective sample. The AR process has its full order:
-    the order of the lowest AIC jumps, and a refinement would then settle at one of several weights.
+    level times the root of the number of samples per effective sample.
     """
-    noise = [channel_noise(c, residual[c.rows], objective, by_aic=False) for c in channels]
+    noise = [channel_noise(c, residual[c.rows], objective) for c in channels]
     square = sum(n.samples * n.level**2 for n in noise)
     return float(np.sqrt(square / sum(n.effective_sample_size for n in noise)))
 
 
-def channel_noise(
-    channel: Channel, residual: Array, objective: ObjectiveSettings, by_aic: bool = True
-) -> Noise:
+def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
     """Return a channel's noise: white as the settings give it, else from its residual, shape (T,).
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
@@ -128,36 +137,53 @@ def channel_noise(
         return Noise(samples, level * channel.weight, np.empty(0), "settings")
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
     if lacking <= 0:
-        return fit_noise(residual, by_aic=by_aic)
+        return fit_noise(residual)
     impulse = np.zeros(samples)  # its products are those expected of white noise
     impulse[samples // 2] = np.sqrt(lacking)
-    return replace(fit_noise(np.vstack([residual, impulse]), by_aic=by_aic), source="smallest")
+    return replace(fit_noise(np.vstack([residual, impulse])), source="smallest")
 
 
-def covariances(processes: Sequence[Noise], rows: Array) -> Array:
-    """Return rows S rows' of each process's S, shape (m, n, n), where rows is (n, T).
+def transformed(rows: Array) -> Array:
+    """Real and imaginary parts of the Fourier transform of rows, (n, T) -> (n, F).
 
-    S is a part of a circulant matrix of 2 T rows, which the discrete Fourier transform makes diagonal.
+    With them, rows S rows' is a sum of products weighed by `Noise.power`.
     """
-    samples = rows.shape[1]
-    if not any(len(process.reflection) for process in processes):
-        square = rows @ rows.T
-        return np.array([process.level**2 * square for process in processes])
-    spectrum = np.fft.rfft(rows, 2 * samples)
-    spectrum[:, 1:-1] *= np.sqrt(2)  # frequencies that stand for their negative ones as well
-    out = np.empty((len(processes), len(rows), len(rows)))
-    for square, process in zip(out, processes, strict=True):
-        lags = process.autocovariance
-        power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real
-        square[:] = ((spectrum * power) @ spectrum.conj().T).real / (2 * samples)
-    return out
+    size = next_fast_len(2 * rows.shape[1], real=True)
+    waves = np.fft.rfft(rows, size) / np.sqrt(size)
+    waves[:, 1 : (size + 1) // 2] *= np.sqrt(2)  # frequencies that stand for their negative ones as well
+    return np.hstack([waves.real, waves.imag])
 
 
-def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER, by_aic: bool = True) -> Noise:
-    """Fit an AR process of order 0 to `max_order` to a residual of zero mean, shape (T,).
+def neighbours(noise: Noise) -> list[Noise]:
+    """Return processes that differ from one by independent standard errors, STEP of each.
 
-    by_aic: the order has the lowest AIC; otherwise it is the highest.
-    Of several rows, (n, T), the products are added.
+    A process that the settings give is not uncertain.
+    """
+    if noise.source == "settings":
+        return []
+    order, innovation = len(noise.reflection), noise.level**2 * float(np.prod(1 - noise.reflection**2))
+
+    def at(shift: Array) -> Noise:
+        reflection = np.tanh(np.arctanh(noise.reflection) + shift)
+        level = float(np.sqrt(innovation / np.prod(1 - reflection**2)))
+        return replace(noise, level=level, reflection=reflection)
+
+    # standard error of the logarithm of the innovations' variance: sqrt(2 / T)
+    others = [replace(noise, level=noise.level * float(np.exp(STEP * np.sqrt(0.5 / noise.samples))))]
+    if order:
+        spectrum = np.log(noise.spectrum)
+        slopes = np.array([np.log(at(STEP * each).spectrum) - spectrum for each in np.eye(order)]) / STEP
+        information = noise.samples / 2 * slopes @ slopes.T / slopes.shape[1]
+        values, vectors = np.linalg.eigh(information)
+        others += [at(STEP * v / np.sqrt(x)) for x, v in zip(values, vectors.T, strict=True) if x > 0]
+    return others
+
+
+def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
+    """Fit an average of AR processes of order 0 to `max_order` to a residual of zero mean, shape (T,).
+
+    A process of order m has no reflection coefficients beyond k_m: the average of k_j is k_j times the weight
+    of all orders from j. Of several rows, (n, T), the products are added.
     """
     forward = backward = rows = np.atleast_2d(rows)
     samples = rows.shape[1]
@@ -173,8 +199,10 @@ def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER, by_aic: bool = True) -
         forward, backward = forward + k * backward, backward + k * forward
         reflection.append(k)
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
-    order = int(np.argmin(criterion)) if by_aic else len(reflection)
-    return Noise(samples, level, np.array(reflection[:order]))
+    weight = np.exp(-0.5 * (np.array(criterion) - min(criterion)))
+    share = np.cumsum((weight / weight.sum())[::-1])[::-1][1:]
+    order = int(np.sum(share > NEGLIGIBLE))
+    return Noise(samples, level, share[:order] * np.array(reflection[:order]))
 
 
 def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
@@ -185,7 +213,7 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
     of all channels. The covariance of the residual is (1 - U'U) S (1 - U'U). The autocovariances of `noise`
     are raised by the difference to S, in a few rounds because S is not known beforehand.
     """
-    samples, order = noise.samples, len(noise.reflection)
+    samples, order, spread_out = noise.samples, len(noise.reflection), spread @ effects
     left, whole = noise.autocovariance[: order + 1], noise
     for _ in range(ABSORBED_ROUNDS):
         smooth = np.asarray(matmul_toeplitz(whole.autocovariance, effects.T), dtype=np.float64).T
@@ -193,7 +221,7 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
             [
                 np.sum(effects[:, : samples - k] * smooth[:, k:])
                 + np.sum(smooth[:, : samples - k] * effects[:, k:])
-                - np.sum((spread @ effects[:, : samples - k]) * effects[:, k:])
+                - np.sum(spread_out[:, : samples - k] * effects[:, k:])
                 for k in range(order + 1)
             ]
         )

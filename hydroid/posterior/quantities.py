@@ -10,7 +10,7 @@ from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.column import SIGNS, Column, Measure, Measured
 from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.delta import Known, Precision, precision
+from hydroid.posterior.posterior import Known
 from hydroid.posterior.speeds import SpeedTests
 from hydroid.posterior.statics import gain_model, gravity, oil
 from hydroid.problem.problem import Problem
@@ -25,18 +25,16 @@ class Quantities:
     """What follows from an estimate: single quantities and curves by name, and what they were computed from.
 
     Quantities that no free parameter changes are left out: the settings give them, not the logs.
-    slopes: relative changes of the single quantities per relative change of the free parameters, shape (p,).
+    slopes: relative changes of the single quantities per relative change of the parameters that vary, (p,).
     """
 
     scalars: dict[str, QuantityEstimate]
     curves: dict[str, CurveEstimate]
-    precision: Precision
     slopes: dict[str, Array]
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     """Return the quantities of every compared joint at a fit's estimate."""
-    known = precision(problem.parameters, uncertainty)
     estimate = problem.stage.candidates(uncertainty.theta[None])
     scalars: dict[str, QuantityEstimate] = {}
     curves: dict[str, CurveEstimate] = {}
@@ -55,7 +53,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         )
         names = [c.name for c in columns]
         positive = np.array([c.positive for c in columns])
-        result = known.propagate(values, positive, concerned)
+        result = uncertainty.posterior.propagate(values, positive, concerned)
         single = [i for i, c in enumerate(columns) if not c.along]
         scalars |= {names[i]: _scalar(joint, columns[i], result, i) for i in single if _told(result, i)}
         slopes |= {
@@ -67,7 +65,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
             points = [i for i, n in enumerate(names) if n == name and np.isfinite(result.value[i])]
             if any(_told(result, i) for i in points):
                 curves[name] = _curve(joint, columns, result, sorted(points, key=lambda i: columns[i].at))
-    return Quantities(scalars, curves, known, slopes)
+    return Quantities(scalars, curves, slopes)
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Measure:

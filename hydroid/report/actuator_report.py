@@ -12,7 +12,7 @@ from hydroid.hydraulics.records import coefficients, linkages, without_actuator
 from hydroid.hydraulics.solenoid import coil_current, coil_force, curve_exists, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
-from hydroid.posterior.delta import Precision
+from hydroid.posterior.posterior import Posterior
 from hydroid.report import style
 from hydroid.report.chart import Chart, Color, Mark, Panel
 from hydroid.report.page import Page, Plot, Section
@@ -44,9 +44,9 @@ class JointActuator:
 
 @dataclass(frozen=True, eq=False)
 class KnownActuator:
-    """The precision of a fit, and the joint's COEFFICIENTS for candidates, (n, P) -> (n,)."""
+    """The posterior of a fit, and the joint's COEFFICIENTS for candidates, (n, P) -> (n,)."""
 
-    precision: Precision
+    posterior: Posterior
     records: Callable[[Array], Any]
 
     def band(self, function: Callable[[Any], Array]) -> Array:
@@ -55,7 +55,7 @@ class KnownActuator:
         def curves(theta: Array) -> Array:
             return np.stack([function(record) for record in self.records(theta)])
 
-        return style.finite(self.precision.propagate(curves, positive=False).interval)
+        return style.finite(self.posterior.propagate(curves, positive=False).interval)
 
 
 def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> JointActuator:

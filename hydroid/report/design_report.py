@@ -43,9 +43,8 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
     limits = np.column_stack([arm.lower + margin, arm.upper - margin])
     moving = "Commands and the motion that the present estimate predicts."
     precise = "Predicted relative standard deviations, assuming ±100 % on each parameter before any log."
-    best = design.best.information
-    weakest = f"{100 * design.precision.weakest(best)[0]:.2g}"
-    known = int(np.sum(design.precision.deviations(best) <= WEAK_ABOVE))
+    weakest = f"{100 * design.weakest(design.after)[0]:.2g}"
+    known = int(np.sum(design.after.deviations <= WEAK_ABOVE))
     lead = (
         f"The designed experiment determines {known} of {len(design.names)} parameters to "
         f"{100 * WEAK_ABOVE:.0f} %; the weakest combination to {weakest} %."
@@ -92,15 +91,14 @@ def design_table(settings: DesignSettings, design: Design, theta: Mapping[str, f
 
 
 def _design_note(settings: DesignSettings, design: Design) -> str:
-    information = design.best.information
-    before, _ = design.precision.weakest()
-    weakest, direction = design.precision.weakest(information)
+    before, _ = design.weakest(design.known)
+    weakest, direction = design.weakest(design.after)
     order = [
         i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= _SHOWN * np.abs(direction).max()
     ]
     sign = np.sign(direction[order[0]])
     parts = " ".join(f"{sign * direction[i]:+.2f} {design.names[i]}" for i in order).replace("-", "−")
-    total, some = len(design.names), design.precision.directions.shape[1]
+    total, some = len(design.names), design.directions.shape[1]
     lost = "" if some == total else f" (of the {some} of {total} that random experiments depend on)"
     time = settings.noise_correlation_s
     correlation = f" with a correlation time of {time:g} s" if time else ", white"
@@ -114,8 +112,7 @@ def _design_note(settings: DesignSettings, design: Design) -> str:
 
 def _deviations(design: Design) -> tuple[Array, Array, Array]:
     """Return standard deviations before, after a random and after the designed experiment, each (F,)."""
-    known = design.precision
-    return known.deviations(), design.random_deviations, known.deviations(design.best.information)
+    return design.known.deviations, design.random_deviations, design.after.deviations
 
 
 def motion(log: Log, names: tuple[str, ...], limits: Array) -> Chart:

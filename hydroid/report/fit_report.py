@@ -16,7 +16,7 @@ from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
-from hydroid.posterior.delta import stored_precision
+from hydroid.posterior.posterior import stored_posterior
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.problem.stage import Stage
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
@@ -172,19 +172,19 @@ def _actuators(record: Record) -> tuple[Section, ...]:
         return ()
     stage, arm = Stage(settings), settings.arm
     theta = settings.parameter_set().vector(summary.values, record.folder)
-    precision = stored_precision(IdentifiedModel(settings, theta, record.folder, summary))
+    known = stored_posterior(IdentifiedModel(settings, theta, record.folder, summary))
     tabs: list[Tab] = []
     for joint in settings.outputs:
         try:
             actuator = joint_actuator(arm, stage.candidates(theta[None]), joint, "the estimate")
         except SettingsError:
             continue  # no force-stroke curve runs through its two points: it diverged
-        if precision is not None:
+        if known is not None:
 
             def records(values: Array, joint: int = joint) -> object:
                 return joint_records(arm, stage.candidates(values), joint)
 
-            actuator = replace(actuator, known=KnownActuator(precision, records))
+            actuator = replace(actuator, known=KnownActuator(known, records))
         plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}", where=PAGE)
         tabs.append(Tab(actuator.title, (plot,)))
     return (Section("The actuator", tabs=tuple(tabs)),) if tabs else ()

@@ -12,7 +12,7 @@ from hydroid.fitting.summary import account
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.posterior.intervals import THRESHOLD, Profile
+from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.problem.problem import Problem
 from hydroid.report.chart import Chart, Mark, Panel
 from hydroid.report.page import Page, Plot, Section, Verdict, log_names

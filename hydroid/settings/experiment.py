@@ -38,12 +38,8 @@ class DesignSettings(Settings):
     """standard deviation of the angles' noise [deg]"""
     noise_correlation_s: NotNegative = 0.0
     """time in which the noise's autocorrelation falls to 1/e (first order) [s]; 0: white noise"""
-    candidates: Annotated[int, Field(ge=2, le=100_000)] = 40
-    """number of random experiments that the search begins with"""
-    improvements: Annotated[int, Field(ge=0, le=1_000_000)] = 200
-    """number of changes to the best experiment that are then tried"""
-    time_limit_s: Positive = 600.0
-    """time after which the search ends [s]; if it ends so, the result depends on the machine's speed"""
+    effort: Annotated[int, Field(ge=2, le=1_000_000)] = 240
+    """number of experiments that are tried: one in six at random, the others changes of the best"""
 
     @model_validator(mode="after")
     def _ordered(self) -> "DesignSettings":

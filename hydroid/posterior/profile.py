@@ -1,4 +1,4 @@
-"""Intervals without the linear approximation: profile likelihood, and residual block bootstrap."""
+"""Intervals without the linear approximation: profile likelihood."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import COVERAGE, Uncertainty, at_bounds, decompose
+from hydroid.posterior.covariance import Uncertainty, at_bounds, linearise
 from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.posterior import COVERAGE
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress, no_progress
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
@@ -27,14 +27,7 @@ ZOOMS = 4
 """times that steps are made smaller because the interval ends within the first two"""
 BETTER_BELOW = -0.1
 """deviance below which a profile has reached a better optimum; above it, only rounding"""
-BETTER_BY = 1e-3
-"""part of the cost by which a refit must be better than the estimate; below it, only rounding"""
 QUICK = RefinementSettings(iterations=50, gain_tolerance=1e-6)
-BOOTSTRAP_STEPS = 4
-"""Gauss-Newton steps of a refit"""
-BATCH = 50
-"""refits that are simulated together"""
-
 Residuals = Callable[[Array], Array]
 """(n, P) -> (n, R + M): residuals with the priors' weighted scores behind them, as in a refinement"""
 
@@ -108,40 +101,9 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     return Profile(name, values, deviance, interval, points[int(np.argmin(deviance))][1], bounded)
 
 
-def bootstrap(
-    problem: Problem, uncertainty: Uncertainty, count: int, seed: int, progress: Progress = no_progress
-) -> Array:
-    """Redraw the residual in blocks and refit, `count` times; return the estimates, shape (count, P).
-
-    Blocks are ten correlation times long. They are drawn with wrap-around from the log's residuals, the same
-    for all channels of a log (H. R. Künsch, 1989), and scaled up by the noise that the fit absorbed. A refit
-    takes Gauss-Newton steps with the derivatives of the estimate, along the directions that are measured.
-    """
-    rng, rows = np.random.default_rng(seed), uncertainty.jacobian.residual
-    pseudo, residuals = _pseudo_inverse(uncertainty), _with_priors(problem, uncertainty)
-    base, free = residuals(uncertainty.theta[None])[0], uncertainty.free
-    lower, upper = problem.parameters.lower[free], problem.parameters.upper[free]
-    estimates = np.tile(uncertainty.theta, (count, 1))
-    for first in range(0, count, BATCH):
-        progress("refits", first, count)
-        batch = estimates[first : first + BATCH]  # a view: filled in place
-        shift = np.zeros((len(batch), base.size))
-        shift[:, : rows.size] = _redrawn(problem, uncertainty, len(batch), rng) - rows
-        for _ in range(BOOTSTRAP_STEPS):
-            step = -((residuals(batch) + shift) @ pseudo) * uncertainty.jacobian.scale[free]
-            batch[:, free] = np.clip(batch[:, free] + np.nan_to_num(step), lower, upper)
-    return estimates
-
-
-def better_optimum(
-    problem: Problem, uncertainty: Uncertainty, profiles: Sequence[Profile], refits: Array | None
-) -> Array | None:
-    """Return the best of all parameters that profiles and refits reached, shape (P,); None: the estimate."""
+def better_optimum(problem: Problem, uncertainty: Uncertainty, profiles: Sequence[Profile]) -> Array | None:
+    """Return the best of all parameters that profiles reached, shape (P,); None: the estimate."""
     lowest = [p.lowest for p in profiles if p.better_optimum]
-    if refits is not None:
-        cost = np.sum(_with_priors(problem, uncertainty)(np.vstack([uncertainty.theta, refits])) ** 2, axis=1)
-        best = int(np.argmin(np.where(np.isfinite(cost), cost, np.inf)))
-        lowest += [refits[best - 1]] if cost[best] < (1 - BETTER_BY) * cost[0] else []
     if not lowest:
         return None
     cost = np.sum(_with_priors(problem, uncertainty)(np.array(lowest)) ** 2, axis=1)
@@ -171,24 +133,6 @@ def _walk(
     return points
 
 
-def _redrawn(problem: Problem, uncertainty: Uncertainty, count: int, rng: np.random.Generator) -> Array:
-    """Residuals put together from blocks of the log's own, shape (count, R)."""
-    residual = uncertainty.jacobian.residual
-    drawn = np.empty((count, residual.size))
-    for log in dict.fromkeys(channel.log for channel in problem.channels):
-        pairs = [p for p in zip(problem.channels, uncertainty.noise, strict=True) if p[0].log == log]
-        samples = len(pairs[0][0].measured)
-        longest = 10 * max(noise.correlation_time for _, noise in pairs)
-        block = int(min(max(np.ceil(samples ** (1 / 3)), longest), max(samples // 10, 1)))
-        starts = rng.integers(samples, size=(count, -(-samples // block)))
-        index = ((starts[:, :, None] + np.arange(block)).reshape(count, -1) % samples)[:, :samples]
-        for channel, noise in pairs:
-            own = residual[channel.rows]
-            level = float(np.sqrt(np.mean(own**2)))
-            drawn[:, channel.rows] = (own - own.mean())[index] * (noise.level / level if level > 0 else 0.0)
-    return drawn
-
-
 def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
     weight, problem = uncertainty.jacobian.prior_weight, with_open_start(problem, uncertainty.theta)
     return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
@@ -213,19 +157,12 @@ def _fit_others(
     return full(result.point[None])[0], 2 * result.cost
 
 
-def _pseudo_inverse(uncertainty: Uncertainty) -> Array:
-    """Relative changes that best explain residuals with the priors' scores, shape (R + M, p)."""
-    directions, values, effects = decompose(uncertainty.free, uncertainty.jacobian)
-    measured = values > 0
-    return effects[measured].T @ (directions[:, measured] / values[measured]).T
-
-
 def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
-    """Rise of the sum of squares that is one unit of deviance of parameter i."""
-    bread = np.sum(_pseudo_inverse(uncertainty) ** 2, axis=0)  # diagonal of (J J')^-1
-    relative = uncertainty.relative[uncertainty.free]
-    known = np.isfinite(relative) & (bread > 0)
-    column = int(np.sum(uncertainty.free[:i]))
+    """Rise of the sum of squares that is one unit of deviance of parameter i: its variance over (J J')^-1."""
+    free = uncertainty.free
+    bread = np.sum(linearise(free, uncertainty.jacobian).changes ** 2, axis=1)
+    relative = uncertainty.relative[free]
+    known, column = np.isfinite(relative), int(np.sum(free[:i]))
     if known[column]:
         return float(relative[column] ** 2 / bread[column])
     if known.any():

@@ -1,0 +1,206 @@
+"""What is known of the parameters: one Gaussian posterior, and what follows from it by the delta method.
+
+It is about relative changes v of the parameters that vary, with C^-1 = G' G: a change is |G v| standard
+deviations long. A weak prior on every parameter (`WEAK_PRIOR`) makes G regular. A direction that nothing
+measures keeps the prior's standard deviation, which no result can be mistaken for.
+
+Let g be the derivatives of a quantity per relative change. To first order its variance is
+g' C g = |G^-T g|² (G. W. Oehlert, *A note on the delta method*, 1992).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.stats import norm as normal
+
+from hydroid.errors import RunError
+from hydroid.estimate import Covariance
+from hydroid.identified_model import IdentifiedModel
+from hydroid.parameters import Array, ParameterSet
+from hydroid.posterior.flags import UNIDENTIFIABLE_ABOVE
+from hydroid.search.axes import Axes, Box, covariance_axes, differentiate
+
+COVERAGE = 0.95
+"""probability with which an interval covers the true value"""
+NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
+"""half the interval of a normal estimate of known variance, in standard deviations"""
+WEAK_PRIOR = 10.0
+"""relative standard deviation of every parameter before any log and any stated prior (ours)"""
+STEP = 0.1
+"""step of the differences in standard deviations: wide enough for the small jumps that events make"""
+GIVEN_BELOW = 1e-3
+"""relative change per relative change of any free parameter, below which the settings give a quantity"""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Some quantities at an estimate.
+
+    Attributes:
+        value: shape (m,); NaN where it does not exist.
+        sd: standard deviation, shape (m,): infinite where not determined, NaN where unknown.
+        interval: of 95 %, shape (m, 2); infinite where not determined.
+        given: quantities that no parameter changes, shape (m,).
+        slopes: derivatives per relative change of the p parameters that vary, shape (p, m).
+    """
+
+    value: Array
+    sd: Array
+    interval: Array
+    given: NDArray[np.bool_]
+    slopes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What is known of p parameters that vary together at an estimate.
+
+    Attributes:
+        box: the estimate, its bounds, the scale of relative changes, and which of the P parameters vary.
+        root: G, upper triangular and regular, shape (p, p).
+        quantile: half a 95 % interval, in standard deviations.
+    """
+
+    box: Box
+    root: Array
+    quantile: float = NORMAL
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of relative changes, shape (p, p)."""
+        inverse = solve_triangular(self.root, np.eye(len(self.root)))
+        return inverse @ inverse.T
+
+    @property
+    def deviations(self) -> Array:
+        """Relative standard deviation of each parameter that varies, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def parts(self, slopes: Array) -> Array:
+        """What each of p independent directions does to quantities, (p, m), from derivatives, (p, m).
+
+        The sum of their squares is the variance.
+        """
+        return np.asarray(solve_triangular(self.root, slopes, trans="T"), dtype=float)
+
+    def sd(self, slopes: Array) -> Array:
+        """Standard deviations of quantities, shape (m,), from derivatives per relative change, (p, m)."""
+        return np.linalg.norm(self.parts(slopes), axis=0)
+
+    def add(self, rows: Array) -> "Posterior":
+        """Return it with further information N = rows' rows, for example measurements over their noise.
+
+        Args:
+            rows: derivatives per relative change over the standard deviation, shape (k, p).
+        """
+        return replace(self, root=regular(np.vstack([self.root, rows])))
+
+    def axes(self, step: float) -> Axes:
+        """Return steps of so many standard deviations along the axes of the covariance."""
+        return covariance_axes(self.box, self.root, step)
+
+    def of(self, chosen: NDArray[np.bool_]) -> "Posterior":
+        """Return what is known of some of the parameters, shape (P,), whatever the others are."""
+        varied = self.box.varied & chosen
+        inside = chosen[self.box.varied]
+        root = np.linalg.cholesky(np.linalg.inv(self.covariance[np.ix_(inside, inside)])).T
+        return Posterior(replace(self.box, varied=varied), root, self.quantile)
+
+    def propagate(
+        self,
+        function: Callable[[Array], Array],
+        positive: NDArray[np.bool_] | bool,
+        concerned: NDArray[np.bool_] | None = None,
+    ) -> Known:
+        """Return the quantities that a function of the parameters, (n, P) -> (n, m), gives at the estimate.
+
+        Args:
+            function: is called with the estimate, and with all points of the differences at once.
+            positive: which quantities cannot be negative, shape (m,).
+            concerned: parameters on which any of them can depend, shape (P,); None: all.
+        """
+        varied = self.box.varied
+        inside = np.ones(varied.sum(), dtype=bool) if concerned is None else concerned[varied]
+        value = function(self.box.at[None])[0]
+        slopes = np.zeros((len(inside), len(value)))
+        if inside.any():
+            own = self if concerned is None else self.of(concerned)
+            slopes[inside] = differentiate(function, own.box, own.axes(STEP), value)
+        return self.known(value, slopes, positive)
+
+    def known(self, value: Array, slopes: Array, positive: NDArray[np.bool_] | bool) -> Known:
+        """Return quantities, (m,), with intervals from their derivatives, (p, m).
+
+        The interval of a `positive` quantity, (m,), is multiplicative. A quantity is not determined where
+        parameters known to 100 % each would determine it as well, or where the standard deviation of a
+        positive one exceeds the value: a first-order interval then means nothing.
+        """
+        finite = np.isfinite(slopes).all(axis=0)
+        sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
+        half = self.quantile * sd
+        interval = np.stack([value - half, value + half], axis=1)
+        logarithmic = positive & (value > 0)
+        with np.errstate(over="ignore"):
+            factor = np.exp(half[logarithmic] / value[logarithmic])
+        interval[logarithmic] = np.stack([value[logarithmic] / factor, value[logarithmic] * factor], axis=1)
+        lost = self.undetermined(slopes, sd) | (logarithmic & (half > UNIDENTIFIABLE_ABOVE * NORMAL * value))
+        sd[lost] = np.inf
+        interval[lost] = -np.inf, np.inf
+        interval[lost & positive] = 0.0, np.inf
+        return Known(value, sd, interval, np.all(abs(slopes) <= GIVEN_BELOW * abs(value), axis=0), slopes)
+
+    def undetermined(self, slopes: Array, sd: Array) -> NDArray[np.bool_]:
+        """Which quantities, (m,), parameters known to 100 % each would determine as well."""
+        return sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
+
+    def stored(self, parameters: ParameterSet) -> Covariance:
+        """Return what a file keeps of it."""
+        varied = self.box.varied
+        names = tuple(n for n, each in zip(parameters.names, varied, strict=True) if each)
+        root = tuple(tuple(row) for row in self.root.tolist())
+        scale = tuple(self.box.scale[varied].tolist())
+        return Covariance(parameters=names, scale=scale, root=root, quantile=self.quantile)
+
+
+def regular(rows: Array) -> Array:
+    """Return the upper triangle G, (p, p), of G' G = rows' rows, from rows of full rank, shape (k, p)."""
+    triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=float)
+    return triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, None]
+
+
+def stored_posterior(model: IdentifiedModel) -> Posterior | None:
+    """Return the posterior that a fit kept; None where there is none for these parameters.
+
+    Parameters that the settings no longer free, or whose values changed, are not the fit's.
+    """
+    covariance = None if model.summary is None else model.summary.covariance
+    if model.summary is None or covariance is None:
+        return None
+    parameters, fitted = model.settings.parameter_set(), model.summary.estimate
+    free = {n for n, each in zip(parameters.names, parameters.free, strict=True) if each}
+    held = {n for n in free if n in fitted and fitted[n].at_bound}
+    if not free - held <= set(covariance.parameters) <= free:
+        return None
+    if any(n not in fitted or model.values[n] != fitted[n].value for n in free):
+        return None
+    scale, varied = np.zeros(len(model.theta)), np.isin(parameters.names, covariance.parameters)
+    scale[varied] = covariance.scale
+    box = Box(model.theta, parameters.lower, parameters.upper, scale, varied)
+    return Posterior(box, np.array(covariance.root), covariance.quantile)
+
+
+def required_posterior(model: IdentifiedModel) -> Posterior:
+    """Return the posterior that a fit kept.
+
+    Raises:
+        RunError: there is none for these parameters.
+    """
+    found = stored_posterior(model)
+    if found is None:
+        hint = "name the folder of a fit, with the settings that it used"
+        raise RunError("holds no covariance of these parameters", where=model.source, hint=hint)
+    return found

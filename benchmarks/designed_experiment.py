@@ -1,6 +1,6 @@
 """A designed experiment against random ones of the same length and limits.
 
-    python benchmarks/designed_experiment.py [--random 20] [--improvements 200] [--fits 50] [--duration 30]
+    python benchmarks/designed_experiment.py [--random 20] [--effort 220] [--fits 50] [--duration 30]
         [--without rest slew clearance] [--seed 1]
 
 `--without` switches limits off; with `--fits 0` nothing is refitted.
@@ -28,10 +28,11 @@ import numpy as np
 from hydroid import load_settings
 from hydroid.advice.commands import RandomExperiments, violation
 from hydroid.advice.design import design
-from hydroid.advice.information import ExperimentSimulator, prior_information
+from hydroid.advice.information import ExperimentSimulator
 from hydroid.estimate import read_values
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
+from hydroid.posterior.jacobian import estimate_box, prior_slopes, white_posterior
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
@@ -55,9 +56,7 @@ def make_settings(values: dict, arguments: argparse.Namespace):
             "duration_s": arguments.duration,
             "poses": "any",
             "noise_deg": NOISE_DEG,
-            "candidates": arguments.random,
-            "improvements": arguments.improvements,
-            "time_limit_s": 7200,
+            "effort": arguments.effort,
         },
     }
     for limit in arguments.without:
@@ -99,7 +98,7 @@ def refit(arm, settings, log: Log, truth: np.ndarray, count: int) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--random", type=int, default=20)
-    parser.add_argument("--improvements", type=int, default=200)
+    parser.add_argument("--effort", type=int, default=220)
     parser.add_argument("--fits", type=int, default=50)
     parser.add_argument("--duration", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=SEED, help="of the designer and the random experiments")
@@ -113,16 +112,18 @@ def main() -> None:
     began = time.perf_counter()
     found = design(settings, estimate, [], arguments.seed, lambda what, done, of: None)
     print(f"designed in {time.perf_counter() - began:.0f} s from {found.tried} experiments", flush=True)
-    period = settings.log.period_s
-    blind, seeing = (ExperimentSimulator(settings, theta) for theta in (estimate, truth))
+    period, problem = settings.log.period_s, Problem(settings, [found.log])
+    parameters, priors = problem.parameters, problem.priors
+    boxes = [estimate_box(parameters, theta) for theta in (estimate, truth)]
+    known, there = (white_posterior(box, prior_slopes(priors, box)) for box in boxes)
+    blind, seeing = ExperimentSimulator(settings, known), ExperimentSimulator(settings, there)
     randoms = random_experiments(settings, blind, arguments.random, arguments.seed)
-    stage = Problem(settings, [found.log])
-    known = prior_information(stage.priors, stage.parameters, truth)
 
     def predicted(experiment) -> np.ndarray:
-        told = seeing.information(experiment)
+        angle = simulate_log(settings, experiment.log(settings), values, str(TRUTH)).angle
+        told = seeing.information(experiment, angle)
         assert told is not None, "the experiment's simulation diverged"
-        return np.sqrt(np.diag(np.linalg.inv(known + told)))
+        return there.add(told).deviations
 
     designed = predicted(found.best.experiment)
     drawn = np.array([predicted(e) for e in randoms])

@@ -17,6 +17,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
 
 from hydroid import load_settings
 from hydroid.advice.pseudo_random import pseudo_random_log
@@ -56,8 +57,8 @@ def bound(problem: Problem, at: Jacobian, noise: tuple[Noise, ...]) -> np.ndarra
     """The Cramér-Rao bound of each free parameter's standard deviation, for the true noise."""
     free, information = problem.parameters.free, 0.0
     for channel, process in zip(problem.channels, noise, strict=True):
-        white = process.whitened(at.slopes[free][:, channel.rows])
-        information = information + white @ white.T
+        slopes = at.slopes[free][:, channel.rows]
+        information = information + slopes @ solve_toeplitz(process.autocovariance, slopes.T)
     return np.sqrt(np.diag(np.linalg.inv(information))) * at.scale[free]
 
 

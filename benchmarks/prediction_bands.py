@@ -19,7 +19,6 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import prediction_bands
 from hydroid.posterior.covariance import uncertainty
-from hydroid.posterior.delta import precision
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
@@ -57,7 +56,7 @@ def fitted(settings: FitSettings, log: Log) -> IdentifiedModel:
     summary = FitSummary(
         stage="mech",
         estimate=parameter_estimates(problem, known),
-        covariance=precision(problem.parameters, known).covariance(),
+        covariance=known.posterior.stored(problem.parameters),
         noise_deg=noise_levels(problem, known),
     )
     return IdentifiedModel(settings, theta, "fit", summary)

@@ -23,7 +23,6 @@ from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.covariance import uncertainty
-from hydroid.posterior.delta import precision
 from hydroid.posterior.quantities import joint_measure
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -82,7 +81,7 @@ def main() -> None:
         found = refine(one, first, settings.refinement, lambda n, rms: None)
         theta = one.parameters.from_unit(found.point[None])[0]
         told = uncertainty(one, theta)
-        known = precision(one.parameters, told).propagate(values, positive)
+        known = told.posterior.propagate(values, positive)
         intervals.append(known.interval)
         estimates.append(known.value)
         sds.append(known.sd)

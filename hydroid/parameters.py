@@ -71,6 +71,10 @@ class Parameter:
             return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
         return (np.asarray(value) - self.lower) / (self.upper - self.lower)
 
+    def width(self, value: float) -> float:
+        """Return the change of the value per change of its position there."""
+        return value * float(np.log(self.upper / self.lower)) if self.log else self.upper - self.lower
+
     def at(self, position: Array | float) -> Array:
         """Return the values at positions; the ends are the bounds to the last digit. Equations (15), (16)."""
         low, high = self.lower, self.upper

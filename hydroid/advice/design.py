@@ -28,6 +28,8 @@ ELITE = 4
 """number of best experiments that are kept and changed"""
 DRAWN = 6
 """of so many experiments one is drawn at random; the others are changes of the best"""
+FEWEST = 8
+"""drawn at random, where the effort allows so many"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,7 @@ def design(
     known = forecast(fitted)
     experiments, simulator = RandomExperiments(settings, rng), ExperimentSimulator(settings, known)
     random: list[Trial] = []
-    first = max(2, effort // DRAWN)
+    first = max(min(FEWEST, effort), effort // DRAWN)
     for drawn in range(1, first + 1):
         trial = simulator.trial(experiments.draw())
         random += [trial] if trial is not None else []

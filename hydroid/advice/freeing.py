@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.advice.terms import ExtendedModel
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
@@ -47,7 +47,9 @@ class Freeing:
         free = problem.parameters.free
         self._point = problem.parameters.to_unit(uncertainty.theta[None])[0]
         slopes = np.nan_to_num(np.hstack([at.slopes, at.prior_weight * at.prior_slopes])[free])
-        self._columns = slopes * (_widths(problem.parameters, self._point) / at.scale[free])[:, None]
+        parameters = zip(problem.parameters.parameters, uncertainty.theta, free, strict=True)
+        widths = np.array([p.width(value) for p, value, is_free in parameters if is_free])
+        self._columns = slopes * (widths / at.scale[free])[:, None]
         self._prior_weight = at.prior_weight
 
     def without(self) -> Freed:
@@ -119,10 +121,3 @@ class Freeing:
     def _freed(self, row: Array, value: float) -> Freed:
         residual = row[: self._problem.measured.size]
         return Freed(float(self._problem.rms(residual[None])[0]), value, residual)
-
-
-def _widths(parameters: ParameterSet, unit: Array) -> Array:
-    """Change of each free parameter per change of its place in the unit box, shape (p,)."""
-    step = np.where(unit > 0.5, -1e-6, 1e-6)
-    moved = parameters.from_unit(np.vstack([unit, unit + np.diag(step)]))[:, parameters.free]
-    return np.diag(moved[1:] - moved[0]) / step

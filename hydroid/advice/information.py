@@ -34,7 +34,7 @@ from hydroid.settings.fit import FitSettings
 PRIOR_SD = 1.0
 """relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
 so weak that a direction which stays unknown would outweigh all that an experiment can do"""
-STEP = 0.1
+STEP = 1e-4
 """step of an experiment's derivatives in standard deviations, to one side; central ones agree to 0.1 %"""
 MAX_REPAIRS = 60
 """changes after which an experiment that still breaks a limit is given up"""

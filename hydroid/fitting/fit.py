@@ -15,6 +15,7 @@ from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty, uncertainty
 from hydroid.posterior.directions import Identifiability, identifiability
+from hydroid.posterior.jacobian import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
@@ -156,7 +157,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
         refinements[name], start, final = result, estimates[name], name
     refined = time.perf_counter()
-    about = uncertainty(last, estimates[final].theta)
+    about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
     directions = identifiability(last, about)
     determined = quantities(last, about)
     return Fit(
@@ -175,6 +176,17 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             "uncertainty": time.perf_counter() - refined,
         },
     )
+
+
+def _slopes(problem: Problem, descent: Descent | None) -> Array | None:
+    """Derivatives that least squares ended with, per relative change of the free parameters, (p, R)."""
+    if descent is None or not len(descent.jacobian):
+        return None
+    free, samples = problem.parameters.free, problem.measured.size
+    theta = problem.parameters.from_unit(descent.point[None])[0]
+    width = np.array([p.width(theta[i]) for i, p in enumerate(problem.parameters.parameters) if free[i]])
+    scale = estimate_box(problem.parameters, theta).scale[free]
+    return descent.jacobian[:samples].T * (scale / width)[:, None]
 
 
 def _strained(problem: Problem, theta: Array) -> dict[str, float]:

@@ -124,9 +124,12 @@ class Uncertainty:
         return (whole / np.outer(deviation, deviation))[np.ix_(self.free, self.free)]
 
 
-def uncertainty(problem: Problem, theta: Array) -> Uncertainty:
-    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show."""
-    return uncertainty_from(problem, theta, jacobian(problem, theta))
+def uncertainty(problem: Problem, theta: Array, first: Array | None = None) -> Uncertainty:
+    """Return the uncertainty of theta, shape (P,), for the noise that its residuals show.
+
+    `first` are derivatives to begin with (`jacobian`).
+    """
+    return uncertainty_from(problem, theta, jacobian(problem, theta, first))
 
 
 def uncertainty_from(

@@ -10,17 +10,22 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
 from hydroid.posterior.posterior import WEAK_PRIOR
 from hydroid.problem.problem import Problem
+from hydroid.settings.problem import MECHANICAL_UNITS
 
 MIN_COMPONENT = 0.1
 """components below this part of the largest are left out of a direction's parameters"""
-EQUAL_WITHIN = 0.05
-"""components that differ by less than this part of the largest are equal"""
+
+NEW_ABOVE = 0.5
+"""part of a common scale outside the parameters already named, above which it is a direction of its own"""
+
+Flags = NDArray[np.bool_]
 
 
 class DirectionKind(StrEnum):
@@ -31,7 +36,7 @@ class DirectionKind(StrEnum):
     SINGLE = "single parameter"
     """one parameter whose effect is below the noise"""
     COMMON_SCALE = "common scale"
-    """parameters that may all change by one factor"""
+    """all parameters of the arm change by one factor; masses may deviate to make up for a fixed one"""
     COMBINATION = "combination"
     """any other combination"""
 
@@ -82,20 +87,53 @@ def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiabili
         for kind, which in ((DirectionKind.NO_EFFECT, alone & idle), (DirectionKind.SINGLE, alone & ~idle))
         for i in np.flatnonzero(which)
     ]
-    _, values, axes = np.linalg.svd(root[:, ~alone], full_matrices=False)
-    others = [name for name, each in zip(names, alone, strict=True) if not each]
-    weak = axes[values < 1 / WEAK_ABOVE][::-1]
-    named += [_combination(others, one, root[:, ~alone]) for one in weak]
+    basis = np.eye(len(names))[~alone]  # of the directions that are not named yet
+    scale = _common_scale(problem, names, root, (idle, alone))
+    if scale is not None:
+        named.append(_combination(names, scale, root, DirectionKind.COMMON_SCALE))
+        basis = np.linalg.svd((scale @ basis.T)[None])[2][1:] @ basis
+    _, values, axes = np.linalg.svd(root @ basis.T, full_matrices=False)
+    weak = (axes @ basis)[values < 1 / WEAK_ABOVE][::-1]
+    named += [_combination(names, one, root) for one in weak]
     return Identifiability(names, len(names) - len(named), tuple(named))
 
 
-def _combination(names: list[str], changes: Array, root: Array) -> Direction:
-    """Describe a direction by its components, the largest first."""
+def _common_scale(
+    problem: Problem, names: tuple[str, ...], root: Array, flags: tuple[Flags, Flags]
+) -> Array | None:
+    """A common factor on all parameters that the equation of motion (1) is linear in, shape (p,).
+
+    A fixed mass, such as the jaws', keeps its value. The free masses then deviate from the common factor so
+    that they compensate for it best. None where the data determine the factor, or where most of it is named.
+    `flags`: which parameters have no effect, and which are named by themselves.
+    """
+    idle, named = flags
+    quantities = [problem.settings.parameters[name].quantity for name in names]
+    linear = np.array([q in MECHANICAL_UNITS for q in quantities]) & ~idle
+    mass = np.array([q == "mass" for q in quantities]) & linear
+    if linear.sum() < 2:
+        return None
+    changes = linear.astype(float)
+    if mass.any():
+        # a change of 100 % from the common factor counts as much as the noise
+        matrix = np.vstack([root[:, mass], np.eye(mass.sum())])
+        target = np.append(-root @ changes, np.zeros(mass.sum()))
+        changes[mass] += np.linalg.lstsq(matrix, target)[0]
+    weak = np.linalg.norm(root @ changes) < np.linalg.norm(changes) / WEAK_ABOVE
+    new = np.linalg.norm(changes[~named]) > NEW_ABOVE * np.linalg.norm(changes)
+    return changes if weak and new else None
+
+
+def _combination(
+    names: tuple[str, ...], changes: Array, root: Array, kind: DirectionKind = DirectionKind.COMBINATION
+) -> Direction:
+    """Describe a direction by its components, the largest first; those of a common scale in their order."""
     changes = changes / changes[np.argmax(np.abs(changes))]
     order = [int(i) for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= MIN_COMPONENT]
-    kind = DirectionKind.SINGLE if len(order) == 1 else DirectionKind.COMBINATION
-    if len(order) > 1 and all(abs(changes[i] - 1) < EQUAL_WITHIN for i in order):
-        kind, order = DirectionKind.COMMON_SCALE, sorted(order)
+    if kind is DirectionKind.COMMON_SCALE:
+        order = [int(i) for i in np.flatnonzero(changes)]
+    elif len(order) == 1:
+        kind = DirectionKind.SINGLE
     return Direction(kind, {names[i]: float(changes[i]) for i in order}, _deviation(root, changes))
 
 

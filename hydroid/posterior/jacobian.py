@@ -16,9 +16,10 @@ from hydroid.search.axes import Box, differentiate, single_axes
 STEP = 1e-3
 """relative step of the first differences, by each parameter"""
 ROUNDS = 2
-"""times at most that the axes of the covariance are taken and followed"""
-AGREE = 0.1
-"""relative change of every standard deviation, below which another round would change nothing"""
+"""rounds of differences along the axes of the covariance at most"""
+FAR = 3.0
+"""relative change of a standard deviation, above which the first axes were so far off that another round
+follows; below it, one changes standard deviations by a few per cent"""
 UNKNOWN = 1.0
 """relative standard deviation above which it does not matter how large it is"""
 MIN_SCALE = 0.01
@@ -39,7 +40,7 @@ class Jacobian:
             both sides.
         prior_slopes: derivatives of the M priors' scores, shape (P, M).
         scale: what a relative change of 1 is, in the parameter's unit, shape (P,).
-        doubt: relative change of each standard deviation in the last round, shape (P,).
+        doubt: relative change of each standard deviation in a second round, (P,); 0 without one.
         prior_weight: weight of a score of 1 beside the residuals [rad] (`noise.prior_weight`).
     """
 
@@ -61,33 +62,38 @@ class Jacobian:
         return self.effects <= NO_EFFECT_BELOW * np.nanmax(self.effects, initial=0.0)
 
 
-def jacobian(problem: Problem, theta: Array) -> Jacobian:
+def jacobian(problem: Problem, theta: Array, first: Array | None = None) -> Jacobian:
     """Return the derivatives at theta, shape (P,), from 1 + p simulations, p free, and 2 p or more a round.
 
     The first differences are by each parameter. Then come rounds of differences, a standard deviation to each
     side along the axes of the covariance that follows. A second round follows where a standard deviation
-    changed.
+    changed by far.
+
+    Args:
+        problem: the problem.
+        theta: the parameters.
+        first: derivatives to begin with, shape (p, R), such as those of the least squares that ended there.
     """
     problem = with_open_start(problem, theta)
     at, residual = estimate_box(problem.parameters, theta), problem.residuals(theta[None])[0]
     scores = prior_slopes(problem.priors, at)
     weight = prior_weight(problem.channels, residual, problem.settings.objective)
-    single = single_axes(at, STEP)
-    slopes = differentiate(problem.residuals, at, single.one_sided, residual)
-    if not np.isfinite(slopes).all():
-        slopes = differentiate(problem.residuals, at, single, residual)
+    slopes = _by_parameter(problem, at, residual) if first is None else first.copy()
     diverges = np.logical_not(np.isfinite(slopes).all(axis=1))
     slopes[diverges] = 0.0
-    doubt = np.zeros(len(slopes))
+    change = np.zeros(len(slopes))
     after = white_posterior(at, slopes / weight, scores)
-    for _ in range(ROUNDS):
+    rounds = 0
+    while rounds < ROUNDS:
+        rounds += 1
         before = after.deviations
         slopes = differentiate(problem.residuals, at, after.axes(step=1.0), residual, slopes)
         after = white_posterior(at, slopes / weight, scores)
         known = np.minimum(before, after.deviations) < UNKNOWN
-        doubt = np.where(known, np.abs(after.deviations / before - 1), 0.0)
-        if (doubt <= AGREE).all():
+        change = np.where(known, np.exp(np.abs(np.log(after.deviations / before))) - 1, 0.0)
+        if (change <= FAR).all():
             break
+    doubt = change if rounds > 1 else np.zeros(len(slopes))
     effects = np.linalg.norm(slopes, axis=1)
     slopes[effects <= NO_EFFECT_BELOW * effects.max()] = 0.0  # not the rounding that the axes bring
     slopes[diverges] = np.nan
@@ -96,6 +102,15 @@ def jacobian(problem: Problem, theta: Array) -> Jacobian:
     all_slopes[free], all_scores[free], doubts = slopes, scores, np.zeros(len(theta))
     doubts[free] = doubt
     return Jacobian(residual, all_slopes, all_scores, at.scale, doubts, weight)
+
+
+def _by_parameter(problem: Problem, at: Box, residual: Array) -> Array:
+    """Derivatives by each parameter, (p, R); NaN where simulations diverge on both sides."""
+    single = single_axes(at, STEP)
+    slopes = differentiate(problem.residuals, at, single.one_sided, residual)
+    if np.isfinite(slopes).all():
+        return slopes
+    return differentiate(problem.residuals, at, single, residual)
 
 
 def estimate_box(parameters: ParameterSet, theta: Array) -> Box:

@@ -80,14 +80,14 @@ class Noise:
 
         The covariance matrix S is a part of a circulant one, which the Fourier transform makes diagonal.
         """
-        lags, size = self.autocovariance, next_fast_len(2 * self.samples, real=True)
+        lags, size = self.autocovariance, _transform_size(self.samples)
         filler = np.zeros(size - 2 * self.samples + 1)
-        return np.tile(np.fft.rfft(np.concatenate([lags, filler, lags[:0:-1]])).real, 2)
+        return np.tile(np.real(np.fft.rfft(np.concatenate([lags, filler, lags[:0:-1]]))), 2)
 
     def covariance_of(self, rows: Array) -> Array:
         """Return rows S rows', shape (n, n), where rows is (n, T) and S the noise's covariance matrix."""
         waves = transformed(rows)
-        return (waves * self.power) @ waves.T
+        return np.asarray((waves * self.power) @ waves.T, dtype=float)
 
     @property
     def effective_sample_size(self) -> float:
@@ -148,10 +148,15 @@ def transformed(rows: Array) -> Array:
 
     With them, rows S rows' is a sum of products weighed by `Noise.power`.
     """
-    size = next_fast_len(2 * rows.shape[1], real=True)
+    size = _transform_size(rows.shape[1])
     waves = np.fft.rfft(rows, size) / np.sqrt(size)
     waves[:, 1 : (size + 1) // 2] *= np.sqrt(2)  # frequencies that stand for their negative ones as well
     return np.hstack([waves.real, waves.imag])
+
+
+def _transform_size(samples: int) -> int:
+    """Return a fast length of transforms of twice as many samples."""
+    return int(next_fast_len(2 * samples, real=True))  # pyright: ignore[reportArgumentType, reportUnknownArgumentType]
 
 
 def neighbours(noise: Noise) -> list[Noise]:

@@ -85,7 +85,7 @@ class Posterior:
 
         The sum of their squares is the variance.
         """
-        return np.asarray(solve_triangular(self.root, slopes, trans="T"), dtype=float)
+        return np.asarray(solve_triangular(self.root.T, slopes, lower=True), dtype=float)
 
     def sd(self, slopes: Array) -> Array:
         """Standard deviations of quantities, shape (m,), from derivatives per relative change, (p, m)."""
@@ -107,7 +107,7 @@ class Posterior:
         """Return what is known of some of the parameters, shape (P,), whatever the others are."""
         varied = self.box.varied & chosen
         inside = chosen[self.box.varied]
-        root = np.linalg.cholesky(np.linalg.inv(self.covariance[np.ix_(inside, inside)])).T
+        root = np.asarray(np.linalg.cholesky(np.linalg.inv(self.covariance[np.ix_(inside, inside)])).T, float)
         return Posterior(replace(self.box, varied=varied), root, self.quantile)
 
     def propagate(

@@ -16,8 +16,8 @@ from hydroid.fitting.search import HISTORY
 from hydroid.fitting.validation import Prediction
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
-from hydroid.posterior.posterior import stored_posterior
 from hydroid.posterior.flags import WEAK_ABOVE
+from hydroid.posterior.posterior import stored_posterior
 from hydroid.problem.stage import Stage
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
 from hydroid.report.objectives import learning, pareto

@@ -39,7 +39,7 @@ class DesignSettings(Settings):
     noise_correlation_s: NotNegative = 0.0
     """time in which the noise's autocorrelation falls to 1/e (first order) [s]; 0: white noise"""
     effort: Annotated[int, Field(ge=2, le=1_000_000)] = 240
-    """number of experiments that are tried: one in six at random, the others changes of the best"""
+    """number of experiments that are tried: one in six drawn at random, the others changes of the best"""
 
     @model_validator(mode="after")
     def _ordered(self) -> "DesignSettings":

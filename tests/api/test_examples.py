@@ -25,7 +25,7 @@ QUICK: dict[str, object] = {
     "search.nsga2": SMALL,
     "refinement": None,
     "joint_refinement": False,
-    "design": {"candidates": 2, "improvements": 1, "poses": "any"},
+    "design": {"effort": 3, "poses": "any"},
 }
 
 

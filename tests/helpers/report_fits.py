@@ -12,9 +12,8 @@ from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
 from hydroid.posterior.band import Band
 from hydroid.posterior.covariance import Uncertainty, uncertainty_from
-from hydroid.posterior.delta import precision
 from hydroid.posterior.directions import identifiability
-from hydroid.posterior.jacobian import Jacobian, relative_scale
+from hydroid.posterior.jacobian import Jacobian, estimate_box
 from hydroid.posterior.noise import channel_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.problem.channels import make_channels
@@ -132,13 +131,13 @@ def make_fit(
         {"refined": refined} if "refined" in names else {},
         uncertain,
         identifiability(problem, uncertain),
-        make_quantities(problem, uncertain),
-        (),
+        make_quantities(problem),
+        {},
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
 
 
-def make_quantities(problem: Problem, uncertain: Uncertainty) -> Quantities:
+def make_quantities(problem: Problem) -> Quantities:
     """Of each joint a speed that is known, one that is not, and a curve of speed that ends without limits."""
     scalars, curves = {}, {}
     for joint in problem.settings.outputs:
@@ -155,7 +154,7 @@ def make_quantities(problem: Problem, uncertain: Uncertainty) -> Quantities:
             interval=((None, None), (-13.0, -11.0), (11.0, 13.0), (None, None)),
             **one,
         )
-    return Quantities(scalars, curves, precision(problem.parameters, uncertain), {})
+    return Quantities(scalars, curves, {})
 
 
 def make_record(
@@ -191,9 +190,9 @@ def make_uncertainty(
         residual,
         slopes,
         np.zeros((len(theta), 0)),
-        relative_scale(problem.parameters, theta),
+        estimate_box(problem.parameters, theta).scale,
         np.zeros(len(theta)),
-        prior_weight=1.0,
+        prior_weight=float(np.deg2rad(0.1)),
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
     return uncertainty_from(problem, theta, at, noise)

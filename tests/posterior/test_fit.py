@@ -12,7 +12,7 @@ from hydroid import load_settings
 from hydroid.api.fit import FitResult
 from hydroid.errors import RunError
 from hydroid.estimate import read_estimate
-from hydroid.posterior.delta import stored_precision
+from hydroid.posterior.posterior import stored_posterior
 from hydroid.prediction import simulate_log
 from hydroid.report.quantities_report import curves_csv, quantity_table
 
@@ -56,7 +56,7 @@ def test_what_no_free_parameter_changes_is_not_stated(fitted):
 
 def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
     model = hydroid.load_identified(fitted.folder)
-    kept = stored_precision(model)
+    kept = stored_posterior(model)
     i, j = (model.settings.parameter_set().names.index(name) for name in ("A_A", "A_B"))
     found = kept.propagate(lambda theta: theta[:, [i]] / theta[:, [j]], positive=True)
     np.testing.assert_allclose(
@@ -66,11 +66,11 @@ def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
 
 def test_other_values_or_free_parameters_are_not_the_fits(fitted):
     changed = hydroid.load_identified(fitted.folder, overrides={"parameters.A_A.fixed": 900})
-    assert stored_precision(changed) is None
+    assert stored_posterior(changed) is None
     with pytest.raises(RunError, match="holds no covariance of these parameters"):
         hydroid.quantity(changed, lambda plant: plant.time)
     moved = replace(fitted.model, theta=1.01 * fitted.model.theta)
-    assert stored_precision(moved) is None
+    assert stored_posterior(moved) is None
 
 
 def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):

@@ -12,7 +12,7 @@ from report_fits import make_fit, make_problem, make_uncertainty
 
 from hydroid.fitting.validation import fitted
 from hydroid.posterior.directions import identifiability
-from hydroid.posterior.intervals import THRESHOLD, Profile
+from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.posterior.sweep import Surface
 from hydroid.problem.problem import Evaluation
 from hydroid.report.chart import Chart, Mark, Panel, figure

@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.cli.app import main as hydroid
+from hydroid.commands.app import main as hydroid
 from hydroid.fitting import checkpoints
 from hydroid.report import page_file
 

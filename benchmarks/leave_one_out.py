@@ -62,7 +62,7 @@ def study(stage: str, seconds: float) -> None:
     print(f"\nstage {stage}, {len(logs)} logs, {time.perf_counter() - began:.0f} s for the fit to all\n")
     print("| left out | expected [deg] | actual [deg] | actual / expected | inside the band |")
     print("| --- | --- | --- | --- | --- |")
-    for result in hydroid.validate(model, logs, None, leave_one_out=True).result:
+    for result in hydroid.validate(logs, fit=model, out=None, leave_one_out=True).result:
         band = result.bands[2]
         expected, actual = np.degrees([band.expected, band.error])
         print(

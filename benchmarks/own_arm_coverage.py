@@ -35,7 +35,7 @@ SPEC.loader.exec_module(example)
 
 def machine(folder: Path) -> IdentifiedModel:
     """Return the example's machine, in the settings of a project that has not seen its logs."""
-    hydroid.init(folder, EXAMPLE / "robot.urdf")
+    hydroid.init(folder, arm=EXAMPLE / "robot.urdf")
     at = hydroid.start_values(hydroid.load_settings(folder / "fit.yaml", {"log.period_s": example.PERIOD}))
     factors = {n: next((f for s, f in example.TRUTH.items() if n.startswith(s)), 1.0) for n in at.values}
     return identified(at.settings, {n: v * factors[n] for n, v in at.values.items()}, "the machine")
@@ -47,7 +47,7 @@ def seen(truth: IdentifiedModel, seed: int) -> Log:
     command = example.commands(len(arm.joints), seed)
     angle = np.tile(0.5 * (arm.lower + arm.upper), (len(command), 1))
     drive = Log("log", period * np.arange(len(command)), command, angle, period)
-    return hydroid.simulate(truth, drive, noise_deg=example.NOISE_DEG, seed=seed)
+    return hydroid.simulate(drive, fit=truth, out=None, noise_deg=example.NOISE_DEG, seed=seed).log
 
 
 def main() -> None:
@@ -58,7 +58,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         truth = machine(Path(place) / "machine")
         logs = [EXAMPLE / f"log_{number}.csv" for number in (1, 2, 3)]
-        hydroid.init(Path(place) / "mine", EXAMPLE / "robot.urdf", logs)
+        hydroid.init(Path(place) / "mine", arm=EXAMPLE / "robot.urdf", log=logs)
         study(truth, hydroid.load_settings(Path(place) / "mine" / "fit.yaml"), fits)
 
 

@@ -1,54 +1,41 @@
 """hydroid: physical parameters of a hydraulic manipulator from its logs, on MuJoCo.
 
-    settings = hydroid.load_settings("fit-hyd", {"search.seed": 3})
-    logs = hydroid.read_logs(["a.csv", "b.csv"], settings)
-    result = hydroid.fit(settings, logs, out="runs/a")
+    fitted = hydroid.fit_hyd("a.csv", config="my-fit.yaml", out="runs/a")
+    print(fitted.best.summary.values)
 
     plant = hydroid.load_plant("runs/a")
     plant.reset()
     angle = plant.step(command)
 
-Each command of `hydroid --help` is one function here. Every name is imported when it is first used.
+Each command of `hydroid --help` is one function here: its arguments come first, its options are keywords,
+and its result prints itself in a notebook. Every name is imported when it is first used.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hydroid.api.arms import collisions as collisions
-    from hydroid.api.arms import read_arms as read_arms
-    from hydroid.api.arms import simulate_arms as simulate_arms
-    from hydroid.api.convert import Conversion as Conversion
-    from hydroid.api.convert import convert as convert
-    from hydroid.api.fit import FitResult as FitResult
-    from hydroid.api.fit import fit as fit
-    from hydroid.api.judge import identifiability as identifiability
-    from hydroid.api.judge import sensitivity as sensitivity
-    from hydroid.api.judge import surface as surface
-    from hydroid.api.judge import validate as validate
-    from hydroid.api.look import Check as Check
-    from hydroid.api.look import LogCheck as LogCheck
-    from hydroid.api.look import check as check
-    from hydroid.api.look import load_settings as load_settings
-    from hydroid.api.look import plot_actuator as plot_actuator
-    from hydroid.api.look import read_commands as read_commands
-    from hydroid.api.look import read_logs as read_logs
-    from hydroid.api.model import simulate as simulate
-    from hydroid.api.motion import render as render
-    from hydroid.api.motion import view as view
-    from hydroid.api.plan import design as design
-    from hydroid.api.plan import suggest as suggest
-    from hydroid.api.quantity import QuantityResult as QuantityResult
-    from hydroid.api.quantity import quantity as quantity
-    from hydroid.api.report import report as report
-    from hydroid.api.stages import FitOptions as FitOptions
-    from hydroid.api.stages import FitRuns as FitRuns
-    from hydroid.api.stages import collect as collect
-    from hydroid.api.stages import fit_hyd as fit_hyd
-    from hydroid.api.stages import fit_mech as fit_mech
-    from hydroid.api.start import init as init
-    from hydroid.api.studies import study as study
-    from hydroid.api.study import Study as Study
+    from hydroid.commands.analyse import analyse as analyse
+    from hydroid.commands.check import check as check
+    from hydroid.commands.convert import convert as convert
+    from hydroid.commands.design import design as design
+    from hydroid.commands.fit import FitResult as FitResult
+    from hydroid.commands.fit import fit as fit
+    from hydroid.commands.fit_hyd import fit_hyd as fit_hyd
+    from hydroid.commands.fit_mech import fit_mech as fit_mech
+    from hydroid.commands.init import init as init
+    from hydroid.commands.inputs import load_settings as load_settings
+    from hydroid.commands.inputs import read_logs as read_logs
+    from hydroid.commands.quantity import QuantityResult as QuantityResult
+    from hydroid.commands.quantity import quantity as quantity
+    from hydroid.commands.report import report as report
+    from hydroid.commands.simulate import simulate as simulate
+    from hydroid.commands.study import study as study
+    from hydroid.commands.suggest import suggest as suggest
+    from hydroid.commands.validate import validate as validate
+    from hydroid.commands.view import view as view
     from hydroid.errors import HydroidError as HydroidError
     from hydroid.identified_model import IdentifiedModel as IdentifiedModel
     from hydroid.identified_model import identified as identified
@@ -59,33 +46,27 @@ if TYPE_CHECKING:
     from hydroid.parallel.cluster import open_workers as open_workers
     from hydroid.plant import Plant as Plant
     from hydroid.plant import load_plant as load_plant
-    from hydroid.project import Project as Project
 
 __version__ = "0.1.0"
 
+_COMMANDS = (
+    *("analyse", "check", "convert", "design", "fit_hyd", "fit_mech", "init", "report"),
+    *("simulate", "study", "suggest", "validate", "view"),
+)
 _NAMES = {
-    "hydroid.api.arms": "collisions read_arms simulate_arms",
-    "hydroid.api.convert": "Conversion convert",
-    "hydroid.api.fit": "FitResult fit",
-    "hydroid.api.report": "report",
-    "hydroid.api.stages": "FitOptions FitRuns collect fit_hyd fit_mech",
-    "hydroid.api.judge": "identifiability sensitivity surface validate",
-    "hydroid.api.look": "Check LogCheck check load_settings plot_actuator read_commands read_logs",
-    "hydroid.api.model": "simulate",
-    "hydroid.api.motion": "render view",
-    "hydroid.api.plan": "design suggest",
-    "hydroid.api.quantity": "QuantityResult quantity",
-    "hydroid.api.start": "init",
-    "hydroid.api.studies": "study",
-    "hydroid.api.study": "Study",
+    "hydroid.commands.fit": "FitResult fit",
+    "hydroid.commands.inputs": "load_settings read_logs",
+    "hydroid.commands.quantity": "QuantityResult quantity",
     "hydroid.errors": "HydroidError",
     "hydroid.identified_model": "IdentifiedModel identified load_identified start_values",
     "hydroid.log": "Log write_log",
     "hydroid.parallel.cluster": "open_workers",
     "hydroid.plant": "Plant load_plant",
-    "hydroid.project": "Project",
 }
-_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+_HOMES = {
+    **{name: f"hydroid.commands.{name}" for name in _COMMANDS},
+    **{name: module for module, names in _NAMES.items() for name in names.split()},
+}
 
 __all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll]
 
@@ -100,3 +81,14 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
+
+
+class _Package(ModuleType):
+    """Keeps the commands `report` and `study`: importing the packages of these names would replace them."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name not in _HOMES or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -1,5 +1,5 @@
 """`python -m hydroid`: the command line."""
 
-from hydroid.cli.app import main
+from hydroid.commands.app import main
 
 main()

@@ -4,15 +4,15 @@ import re
 from pathlib import Path
 
 import yaml
-from typer.main import get_command
 
-from hydroid.cli.app import app
+from hydroid.commands.app import COMMANDS as NAMES
+from hydroid.commands.app import click_command
 from hydroid.settings.log import LogSettings
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 PAGES = "".join(p.read_text() for p in sorted((ROOT / "docs").glob("*.md")))
-COMMANDS = get_command(app).commands  # pyright: ignore
+COMMANDS = {name: click_command(name) for name in NAMES}
 
 
 def test_make_targets_exist():

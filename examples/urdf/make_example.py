@@ -88,7 +88,7 @@ def write_log(project: Path, path: Path, seed: int) -> None:
     command = commands(len(arm.joints), seed)
     angle = np.tile(0.5 * (arm.lower + arm.upper), (len(command), 1))
     log = Log("commands", np.arange(len(command), dtype=np.float64) * PERIOD, command, angle, PERIOD)
-    seen = hydroid.simulate(truth, log, noise_deg=NOISE_DEG, seed=seed).angle
+    seen = hydroid.simulate(log, fit=truth, out=None, noise_deg=NOISE_DEG, seed=seed).log.angle
     names = [name.removesuffix("_joint") for name in arm.joint_names]
     what = ("valve [V]", "angle [rad]")
     header = ["Time [ms]", *(f"{name} {column}" for column in what for name in names)]
@@ -105,7 +105,7 @@ def main(folder: Path) -> None:
     (folder / "robot.urdf").write_text(urdf(), encoding="utf-8")
     with tempfile.TemporaryDirectory() as place:
         project = Path(place) / "machine"
-        hydroid.init(project, folder / "robot.urdf")
+        hydroid.init(project, arm=folder / "robot.urdf")
         for number in (1, 2, 3):
             write_log(project, folder / f"log_{number}.csv", number)
 

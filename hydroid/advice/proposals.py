@@ -155,7 +155,7 @@ def freeing_command(problem: Problem, test: TermTest, run: str = "RUN") -> str:
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
     config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{name}"))
     return (
-        f"hydroid fit-{problem.settings.stage} {given} --config {config} --from {own} "
+        f"hydroid fit-{problem.settings.stage} {given} --config {config} --start {own} "
         f"--set {shlex.quote(f'parameters.{name}={parameter}')} --out {out}"
     )
 

@@ -81,7 +81,7 @@ def window(playback: Playback) -> Generator[Viewer]:
             _try_window()
         viewer = mujoco.viewer.launch_passive(playback.model, playback.data, show_left_ui=False)
     except (ImportError, RuntimeError) as error:
-        hint = "without a display write a file: hydroid render RUN -o arm.mp4"
+        hint = "without a display write a file: hydroid view RUN -o arm.mp4"
         raise RunError(f"no window can be opened ({error})", hint=hint) from None
     drawing = set(threading.enumerate()) - others
     try:

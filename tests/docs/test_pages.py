@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from typer.main import get_command
 
-from hydroid.cli.app import app
+from hydroid.commands.app import COMMANDS as NAMES
+from hydroid.commands.app import click_command
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 RUN = ("quick_start", "first_log", "recording", "algorithms", "python", "two_arms", "own_arm")
 """pages whose `sh` and `python` blocks are run, in this order; other blocks are only shown"""
-COMMANDS = get_command(app).commands  # pyright: ignore
+COMMANDS = {name: click_command(name) for name in NAMES}
 
 
 class Block(NamedTuple):

@@ -22,7 +22,7 @@ import yaml
 from damage import TOKENS, VALUES, change_tree, damage
 
 import hydroid
-from hydroid.cli.app import app
+from hydroid.commands.app import app
 from hydroid.errors import HydroidError
 
 ROOT = Path(__file__).parents[2]

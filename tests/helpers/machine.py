@@ -40,7 +40,7 @@ def write_log(
     start = np.clip(0.0, arm.lower + 0.4, arm.upper - 0.4)
     angle = np.tile(start, (len(command), 1))
     log = Log("commands", period * np.arange(len(command)), command, angle, period)
-    seen = hydroid.simulate(truth, log, noise_deg=noise_deg, seed=seed).angle
+    seen = hydroid.simulate(log, fit=truth, out=None, noise_deg=noise_deg, seed=seed).log.angle
     names = ["t_ms", *(f"valve_{n}_V" for n in arm.joint_names), *(f"enc_{n}_rad" for n in arm.joint_names)]
     rows = np.column_stack([1e3 * log.time, command / 10, seen])
     np.savetxt(path, rows, fmt="%.6g", delimiter=";", header=";".join(names), comments="")

@@ -238,11 +238,10 @@ def save(wrong: Wrong, folder: Path) -> list[Path]:
 def told(wrong: Wrong, folder: Path) -> list[str]:
     """What `hydroid check` says, a line each."""
     import hydroid
-    from hydroid.cli.look import check_lines
 
     overrides = {f"log.{key}": value for key, value in wrong.settings.items()}
-    result = hydroid.check(save(wrong, folder), hydroid.load_settings("fit-mech", overrides))
-    return [line.replace(f"{folder}/", "") for line in check_lines(result)]
+    result = hydroid.check(save(wrong, folder), set=overrides)
+    return [line.replace(f"{folder}/", "") for line in result.lines()]
 
 
 def table() -> str:

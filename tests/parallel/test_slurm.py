@@ -40,7 +40,7 @@ QUICK = [
     "--quiet",
 ]
 OFTEN = f"""#!{sys.executable}
-from hydroid.cli.app import main
+from hydroid.commands.app import main
 from hydroid.fitting import checkpoints
 checkpoints.SAVE_EVERY = 0  # a checkpoint every generation
 main()

@@ -13,7 +13,6 @@ import numpy as np
 import psutil
 import pytest
 from spread_problem import CountingSpread, arguments, assert_same, random_candidates
-from typer.testing import CliRunner
 from worker_targets import Rows
 
 from hydroid.errors import ModelError, RunError, SettingsError
@@ -191,11 +190,3 @@ def test_only_the_user_can_read_credentials(tmp_path: Path):
     assert "BEGIN CERTIFICATE" in (folder / "distributed.yaml").read_text()
     with pytest.raises(FileExistsError):
         write_credentials(folder)
-
-
-def test_the_old_option_names_the_new_one():
-    from hydroid.cli.app import app
-
-    result = CliRunner().invoke(app, ["fit-mech", "log.csv", "--workers", "4"])
-    assert result.exit_code == 2
-    assert "is now --dask local:4" in result.output

@@ -86,7 +86,7 @@ def test_leaving_out_each_log_predicts_it(fitted):
     logs = [
         noisy(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
     ]
-    study = hydroid.validate(model, logs, None, leave_one_out=True)
+    study = hydroid.validate(logs, fit=model, out=None, leave_one_out=True)
     assert len(study.result) == 3
     for result in study.result:
         band = result.bands[2]
@@ -96,7 +96,7 @@ def test_leaving_out_each_log_predicts_it(fitted):
     assert len(spread) == 3
     assert max(spread) < 5
     with pytest.raises(hydroid.errors.SettingsError, match="two logs"):
-        hydroid.validate(model, logs[:1], None, leave_one_out=True)
+        hydroid.validate(logs[:1], fit=model, out=None, leave_one_out=True)
 
 
 def test_without_a_band_nothing_is_called_as_expected(fitted):

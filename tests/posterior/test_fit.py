@@ -9,7 +9,7 @@ from conftest import step_log
 
 import hydroid
 from hydroid import load_settings
-from hydroid.api.fit import FitResult
+from hydroid.commands.fit import FitResult
 from hydroid.errors import RunError
 from hydroid.estimate import read_estimate
 from hydroid.posterior.posterior import stored_posterior
@@ -98,7 +98,9 @@ def test_the_report_has_the_quantities_that_are_determined(fitted):
 
 
 def test_the_curves_of_an_identified_actuator_have_bands(fitted, tmp_path):
-    files = hydroid.plot_actuator(fitted.folder, 2, tmp_path)
-    assert "Bands: 95 % intervals" in files[-1].read_text(encoding="utf-8")
+    page = tmp_path / "actuator.html"
+    hydroid.view(fitted.folder, actuator=2, out=tmp_path)
+    assert "Bands: 95 % intervals" in page.read_text(encoding="utf-8")
     nominal = hydroid.load_identified(None, "fit-hyd", nominal=True)
-    assert "Bands" not in hydroid.plot_actuator(nominal, 2, tmp_path)[-1].read_text(encoding="utf-8")
+    hydroid.view(fit=nominal, actuator=2, out=tmp_path)
+    assert "Bands" not in page.read_text(encoding="utf-8")

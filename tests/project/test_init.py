@@ -3,6 +3,7 @@
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,8 +14,9 @@ from scipy.io import savemat
 from typer.testing import CliRunner
 
 import hydroid
-from hydroid.cli.app import app
+from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
+from hydroid.project import Project
 from hydroid.settings.arm import load_arm
 
 QUICK = {
@@ -23,15 +25,19 @@ QUICK = {
 }
 
 
+def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
+    return hydroid.init(folder, arm=arm, log=logs, **more).project
+
+
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a URDF, three logs of a machine like it, and a project `mine` of all."""
     folder = tmp_path_factory.mktemp("lab")
     robot = write_robot(folder)
-    hydroid.init(folder / "machine", robot)
+    init(folder / "machine", robot)
     for seed in range(3):
         write_log(folder / "machine", folder / f"move_{seed}.csv", seed, seconds=8.0)
-    hydroid.init(folder / "mine", robot, sorted(folder.glob("move_*.csv")))
+    init(folder / "mine", robot, sorted(folder.glob("move_*.csv")))
     return folder
 
 
@@ -71,12 +77,12 @@ def test_a_fit_starts_near_the_log(place: Path):
 
 def test_a_fit_and_what_follows_run(place: Path, tmp_path: Path):
     logs = sorted(place.glob("move_*.csv"))[:1]
-    hyd = hydroid.fit_hyd(logs, tmp_path / "hyd", config=place / "mine" / "fit.yaml", overrides=QUICK)
+    hyd = hydroid.fit_hyd(logs, out=tmp_path / "hyd", config=place / "mine" / "fit.yaml", set=QUICK)
     units = {name: one.unit for name, one in hyd.results[0].summary.estimate.items()}
     assert {units[f"size_{name}"] for name in ("swing", "boom", "stick")} == {"cm³/rad"}
     assert {"M_boom", "open_A_boom", "lag_boom"} <= set(units)
-    assert hydroid.plot_actuator(hyd.out, 3, tmp_path / "actuator")
-    hydroid.simulate(hyd.out, logs[0], tmp_path / "again.csv")
+    hydroid.view(hyd.out, actuator=3, out=tmp_path / "actuator")
+    hydroid.simulate(logs[0], fit=hyd.out, out=tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_text().startswith("t_ms,")
     plant = hydroid.load_plant(hyd.out)
     assert plant.step(np.array([50.0, 0, 0])).shape == (3,)
@@ -109,7 +115,7 @@ def test_an_mjcf_and_a_mat_file_give_the_same_settings(place: Path, tmp_path: Pa
     rec = {"time_s": values[:, 0] / 1000, "valve_V": values[:, 1:4], "q_rad": values[:, 4:7]}
     savemat(tmp_path / "run.mat", rec)
     shutil.copytree(place / "machine", tmp_path / "robot")
-    project = hydroid.init(tmp_path / "mine", tmp_path / "robot" / "arm.xml", [tmp_path / "run.mat"])
+    project = init(tmp_path / "mine", tmp_path / "robot" / "arm.xml", [tmp_path / "run.mat"])
     found = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     other = hydroid.load_settings(place / "mine" / "fit.yaml")
     assert [found.log.columns("angle", j).column for j in (1, 2, 3)] == [
@@ -127,7 +133,7 @@ def test_an_mjcf_and_a_mat_file_give_the_same_settings(place: Path, tmp_path: Pa
 def test_nothing_is_overwritten(place: Path):
     before = {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
     with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder"):
-        hydroid.init(place / "mine")
+        init(place / "mine")
     assert before == {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
     assert {path.name for path in place.iterdir()} == {"digger", "machine", "mine"} | {
         f"move_{k}.csv" for k in range(3)
@@ -136,7 +142,7 @@ def test_nothing_is_overwritten(place: Path):
 
 def test_a_folder_with_other_things_in_it_will_do(tmp_path: Path):
     robot = write_robot(tmp_path)
-    project = hydroid.init(tmp_path / "digger", robot)
+    project = init(tmp_path / "digger", robot)
     assert (tmp_path / "digger" / "arm.yaml").is_file()
     assert (tmp_path / "digger" / "meshes" / "boom.stl").is_file()
     assert set(project.files) >= {"arm.yaml", "arm.xml", "arm.png", "fit.yaml", "links"}
@@ -147,17 +153,17 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path):
     log.write_text("name,colour\nboom,red\nstick,blue\n")
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(LogError, match="no column that looks like a time"):
-        hydroid.init(tmp_path / "new" / "mine", robot, [log])
+        init(tmp_path / "new" / "mine", robot, [log])
     robot.write_text(robot.read_text().replace("</robot>", ""))
     with pytest.raises(ModelError, match="cannot be read as XML"):
-        hydroid.init(tmp_path / "new" / "mine", robot)
+        init(tmp_path / "new" / "mine", robot)
     with pytest.raises(SettingsError, match="no such file"):
-        hydroid.init(tmp_path / "new" / "mine", tmp_path / "none.urdf")
+        init(tmp_path / "new" / "mine", tmp_path / "none.urdf")
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
-    hydroid.init(tmp_path / "mine")
+    init(tmp_path / "mine")
     arm = load_arm(tmp_path / "mine" / "arm.yaml")
     assert [joint.actuator.kind for joint in arm.joints] == ["linear", "linear"]
     assert arm.joints[0].actuator.sense == 1
@@ -178,7 +184,7 @@ def changed_log(place: Path, tmp_path: Path, change) -> Path:
 
 def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_path: Path):
     log = changed_log(place, tmp_path, lambda v: v * [1, 1, -1, 1, 1, 1, 1])
-    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, -10, 10]
     (line,) = [line for line in project.columns if "of the command is reversed" in line]
@@ -187,7 +193,7 @@ def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_
 
 def test_angles_outside_the_arms_range_are_said(place: Path, tmp_path: Path):
     log = changed_log(place, tmp_path, lambda v: v + np.array([0, 0, 0, 0, 0, 2.0, 0]))
-    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
     (line,) = [
         line for line in project.columns if line.startswith("boom_joint: the angles in the log run from")
     ]
@@ -197,7 +203,7 @@ def test_angles_outside_the_arms_range_are_said(place: Path, tmp_path: Path):
 def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
     lines = (place / "move_0.csv").read_text().replace("valve_stick_joint_V", "torque").splitlines()
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
+    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert project.unused == ("torque",)
     assert settings.outputs == (1, 2)
@@ -227,18 +233,18 @@ def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     rows = [";".join(line.split(";")[k] for k in at) for line in lines[1:]]
     (tmp_path / "log.csv").write_text("\n".join(["t_ms;u1_V;u2_V;u3_V;q1_rad;q2_rad;q3_rad", *rows]))
     arm = place / "mine" / "arm.yaml"
-    project = hydroid.init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=order)
+    project = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=order)
     assert project.files == ("arm.png", "fit.yaml", "next-steps.md")
     settings = hydroid.load_settings(tmp_path / "second" / "fit.yaml")
     assert settings.arm == load_arm(arm)
     assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]
     with pytest.raises(SettingsError, match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom"):
-        hydroid.init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])
+        init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])
 
 
 def test_commands_of_another_joint_are_said(place: Path, tmp_path: Path):
     log = changed_log(place, tmp_path, lambda v: v[:, [0, 2, 1, 3, 4, 5, 6]])
-    project = hydroid.init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
     lines = [line for line in project.columns if "check which columns belong together" in line]
     assert [line.split(" (")[0] for line in lines] == [
         "swing_joint follows the command of boom_joint",

@@ -28,7 +28,7 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
     test = TermTest(Term("M3", free, 21.17, named=True), Verdict.FREE, 9.0, 0.0, 0.001, 25.0)
     assert setting_line(test).endswith("start: 21.17}")
     command = freeing_command(make_problem(("a b.csv",)), test, "runs/my fit")
-    assert "'a b.csv' --config 'runs/my fit/config.yaml' --from 'runs/my fit' --set 'param" in command
+    assert "'a b.csv' --config 'runs/my fit/config.yaml' --start 'runs/my fit' --set 'param" in command
     assert command.endswith(" --out 'runs/my fit-M3'")
     key, value = parse_override(command.split("--set '")[1].split("'")[0])
     assert (key, value) == ("parameters.M3", yaml.safe_load(setting_line(test))["M3"])

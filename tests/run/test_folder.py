@@ -21,6 +21,7 @@ from hydroid.files import write_atomic
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
+from hydroid.report import page_file
 from hydroid.run import lock
 from hydroid.run.folder import RunFolder
 from hydroid.run.lock import locked
@@ -62,7 +63,7 @@ def made(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def _no_report(monkeypatch):
     """Figures take longer than all else here."""
-    monkeypatch.setattr("hydroid.report.page_file.write_page", lambda *_: [])
+    monkeypatch.setattr(page_file, "write_page", lambda *_: [])
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ def start(cwd: Path, *options: object, out: str) -> "subprocess.Popen[str]":
     log = cwd / "log.csv"
     if not log.exists():
         log.write_text("\n".join(LOG.read_text().splitlines()[:601]) + "\n")
-    code = "import hydroid.cli.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
+    code = "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; a.main()"
     command = [
         sys.executable,
         "-c",

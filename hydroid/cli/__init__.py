@@ -1,1 +1,0 @@
-"""The command line: one thin function for each function of `hydroid.api`."""

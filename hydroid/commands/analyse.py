@@ -1,0 +1,205 @@
+"""`hydroid analyse`: what the logs determine, and what each parameter does to the response."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.commands.inputs import load_settings, open_model, problem_of, run_logs
+from hydroid.commands.options import FIT_HELP, Folder, MoreLogs, OwnConfig, Repair, Set, command, names
+from hydroid.commands.progress import Progress
+from hydroid.commands.result import Result, as_path, rows
+from hydroid.errors import SettingsError
+from hydroid.estimate import finite
+from hydroid.identified_model import start_values
+
+if TYPE_CHECKING:
+    from hydroid.commands.inputs import ModelSource
+    from hydroid.parameters import Array
+    from hydroid.posterior.sweep import Surface, Sweep
+    from hydroid.problem.problem import Problem
+    from hydroid.report.table import Table
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+
+SENSITIVITY = ("log", "output", "parameter", "rms_per_percent")
+"""keys of the table of sensitivities"""
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """What logs determine at some parameters.
+
+    Attributes:
+        uncertainty: intervals, directions, profiles.
+        sweep: the effect of each parameter over time, if it was asked for.
+        surfaces: the error over pairs of parameters.
+    """
+
+    uncertainty: "UncertaintyStudy"
+    sweep: "Sweep | None"
+    surfaces: "list[Surface]"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AnalyseResult(Result):
+    """An analysis with its page, whose tables are `parameters`, `sensitivity` and `surface`."""
+
+    result: "Analysis"
+
+    def lines(self) -> "list[Table | str]":
+        """Return the tables, and what the logs leave open."""
+        from hydroid.words import sentence
+
+        study, tables = self.result.uncertainty, self.page.tables
+        parts = [tables[name] for name in ("sensitivity", "surface") if name in tables]
+        notes = [f"- {sentence(finding)}" for finding in study.summary.findings]
+        return [study.table, *parts, *([study.moved] if study.moved else []), *notes, *self.written]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the estimate, the findings, and the rows of the further parts."""
+        study, tables = self.result.uncertainty, self.page.tables
+        content, profiles = study.summary.plain(), {p.name: p.interval for p in study.profiles}
+        for name, parameter in content["estimate"].items():
+            ends = profiles.get(name)
+            parameter["profile_interval"] = None if ends is None else [finite(end) for end in ends]
+        error = "error" if study.problem.settings.objective.relative else "error_deg"
+        lowest = ("first_lowest", "second_lowest", f"lowest_{error}")
+        surface = ("parameters", *lowest, "first_estimate", "second_estimate", f"estimate_{error}")
+        parts = {"sensitivity": SENSITIVITY, "surface": surface}
+        return {
+            "at": study.source,
+            "rank": study.identifiability.rank,
+            "findings": content["findings"],
+            "estimate": content["estimate"],
+        } | {name: rows(tables[name], *keys) for name, keys in parts.items() if name in tables}
+
+
+@command
+def analyse(
+    logs: MoreLogs = (),
+    *,
+    fit: Annotated[
+        "ModelSource | None",
+        typer.Option(metavar="RUN|YAML", help=f"{FIT_HELP} [default: the start values of the parameters]."),
+        Path | None,
+    ] = None,
+    profile: Annotated[
+        "str | list[str]",
+        typer.Option(
+            metavar="K,D", help="Parameters to profile. Each point of a profile takes a refinement."
+        ),
+        str,
+    ] = "",
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            help="Add the effect of each free parameter on each output over time (article, figure 10): for "
+            "1 % of the parameter, and for 20 values within its bounds. Both are also written as CSV."
+        ),
+    ] = False,
+    over: Annotated[
+        "Sequence[str | Sequence[str]]",
+        typer.Option(
+            metavar="K,D",
+            help="Add the error over two parameters, the others at the estimate (article, figure 11). Repeat "
+            "it for several pairs. The setting objective.norm says which error: inf, 2 (rms) or 1.",
+        ),
+        list[str] | None,
+    ] = (),
+    points: Annotated[int, typer.Option(min=3, max=301, help="Grid points along each axis of --over.")] = 31,
+    around: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            max=1000,
+            metavar="PCT",
+            help="With --over: ±PCT % around the estimate [default: from bound to bound].",
+        ),
+    ] = None,
+    out: Folder = "runs/analysis",
+    config: OwnConfig = None,
+    set: Set = None,
+    repair: Repair = False,
+) -> AnalyseResult:
+    """Find which parameters, and which combinations of parameters, the logs determine.
+
+    Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
+    do not determine.
+
+    Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
+
+        study = hydroid.analyse("a.csv", fit="runs/a", over=["K,D"])
+        print(study.result.uncertainty.uncertainty.interval)
+
+    Raises:
+        SettingsError: a name that is no free parameter.
+        RunError: the simulation diverged, or the folder cannot be written.
+    """
+    pairs = [_pair(pair) for pair in over or ()]
+    if fit is None:
+        model = start_values(load_settings(config or "fit-mech", set))
+    else:
+        model = open_model(fit, config, set)
+    problem = problem_of(model, logs or run_logs(model), repair=repair)
+    from hydroid.posterior import sweep as sweeps
+    from hydroid.report.objectives import surface_page
+    from hydroid.report.sensitivity_report import sensitivity_page
+    from hydroid.report.uncertainty_report import uncertainty_page
+
+    grid = points, None if around is None else around / 100
+    with Progress() as progress:
+        study = _uncertainty(problem, model.theta, model.source, names(profile), progress)
+        theta = study.uncertainty.theta
+        sweep = sweeps.sweep(problem, theta, progress) if sensitivity else None
+        surfaces = [sweeps.surface(problem, theta, pair, *grid, progress) for pair in pairs]
+    pages = [uncertainty_page(study)]
+    pages += [sensitivity_page(problem, theta, sweep)] if sweep else []
+    pages += [surface_page(surfaces, model.settings.objective)] if surfaces else []
+    page = replace(
+        pages[0],
+        name="analysis",
+        sections=tuple(section for page in pages for section in page.sections),
+        data={name: text for page in pages for name, text in page.data.items()},
+    )
+    return AnalyseResult(Analysis(study, sweep, surfaces), page, as_path(out)).write()
+
+
+def _uncertainty(
+    problem: "Problem", theta: "Array", source: str, profile: Sequence[str], progress: Progress
+) -> "UncertaintyStudy":
+    """Return what the logs determine at `theta`, or at a better optimum that a profile comes across."""
+    from hydroid.fitting.refinement import refine
+    from hydroid.posterior import covariance, directions
+    from hydroid.posterior import profile as profiling
+    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.settings.search import RefinementSettings
+
+    def at(theta: "Array", source: str) -> UncertaintyStudy:
+        uncertainty = covariance.uncertainty(problem, theta)
+        profiles: list[profiling.Profile] = []
+        for done, name in enumerate(profile):
+            progress("profiles", done, len(profile))
+            profiles.append(profiling.profile(problem, uncertainty, name))
+        identifiability = directions.identifiability(problem, uncertainty)
+        return UncertaintyStudy(problem, source, uncertainty, identifiability, tuple(profiles))
+
+    study = at(theta, source)
+    better = profiling.better_optimum(problem, study.uncertainty, study.profiles)
+    if better is None:
+        return study
+    refinement = problem.settings.refinement or RefinementSettings()
+    unit = refine(problem, better, refinement, lambda simulated, rms: None).point
+    theta = problem.parameters.from_unit(unit[None])[0]
+    values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
+    moved = f"A profile found a better optimum. It was refined, and all results are of it: {values}."
+    return replace(at(theta, f"a better optimum than that of {source}"), moved=moved)
+
+
+def _pair(given: str | Sequence[str]) -> tuple[str, str]:
+    pair = names(given if isinstance(given, str) else [*given])
+    if len(pair) != 2:
+        hint = "such as K,D"
+        raise SettingsError("is no pair of parameters", where=f"--over {','.join(pair)}", hint=hint)
+    return pair[0], pair[1]

@@ -1,0 +1,101 @@
+"""What a command prints: tables and lines, or JSON; log lines and errors."""
+
+import json
+import logging
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from hydroid.commands.result import Printed
+    from hydroid.errors import HydroidError
+
+SCHEMA = 1
+"""version of the JSON (docs/json.md)"""
+OPTIONS = {
+    "search.algorithm": "--algorithm",
+    "search.pymoo.algorithm": "--algorithm",
+    "search.seed": "--seed",
+    "simulation.threads": "--threads",
+    "refinement": "--no-refinement",
+    "joint_refinement": "--both-stages",
+    "design.duration_s": "--duration",
+    "design.joints": "--joints",
+    "design.criterion": "--criterion",
+}
+"""settings that have an option of their own"""
+
+
+def show(result: "Printed", *, as_json: bool) -> None:
+    """Print a result: as JSON, or as tables and lines."""
+    if as_json:
+        _print_json(result.plain())
+        return
+    for line in result.lines():
+        if isinstance(line, str):
+            typer.echo(line)
+        else:
+            line.show()
+
+
+def show_error(error: "HydroidError") -> None:
+    """Print what the user can correct, in one line or as JSON, by the option that set what is wrong."""
+    key = error.where.removeprefix("--set ")
+    option = OPTIONS.get(key, "")
+    where, what = error.where, error.what
+    if option and any(word.partition("=")[0] == option for word in sys.argv[1:]):
+        where, what = option, what.removeprefix(f"{key}: ")
+    if wants_json():
+        kind = type(error).__name__.removesuffix("Error").lower()
+        _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": error.hint}})
+    else:
+        text = str(type(error)(what, where=where, hint=error.hint))
+        typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
+
+
+def show_usage_error(error: Any) -> None:
+    """Print a wrong command line, as click does or as JSON."""
+    if wants_json():
+        _print_json({"error": {"kind": "usage", "what": error.format_message(), "where": "", "hint": ""}})
+    else:
+        error.show()
+
+
+def wants_json() -> bool:
+    """Return whether the command line asks for JSON, also where it is otherwise wrong."""
+    return "--json" in sys.argv[1:]
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    typer.echo(json.dumps({"schema": SCHEMA} | content, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def log_lines(*, verbose: bool, quiet: bool) -> Generator[None]:
+    """Print warnings and notes of hydroid's loggers, nothing where quiet, every line where verbose.
+
+    An error is not among them: it ends the command, which prints it.
+    """
+    handler = _Terminal()
+    form = "%(asctime)s %(levelname)-7s %(message)s" if verbose else "hydroid: %(message)s"
+    handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
+    handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
+    logger = logging.getLogger("hydroid")
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+
+
+class _Terminal(logging.Handler):
+    """Writes to what is stderr at that moment: a progress bar takes its place while it is drawn."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        typer.echo(self.format(record), err=True)

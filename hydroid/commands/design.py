@@ -1,0 +1,98 @@
+"""`hydroid design`: the next experiment."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.commands.inputs import open_model, read_logs, setting_changes
+from hydroid.commands.options import Fit, Folder, MoreLogs, OwnConfig, Repair, Seed, Set, command, names
+from hydroid.commands.progress import Progress
+from hydroid.commands.result import Result, as_path, rows
+
+if TYPE_CHECKING:
+    from hydroid.advice.design import Design
+    from hydroid.report.table import Table
+
+PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
+"""keys of the table of predicted relative standard deviations"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignResult(Result):
+    """An experiment with the precision that it is predicted to bring."""
+
+    result: "Design"
+
+    @property
+    def _commands(self) -> str | None:
+        return self.out and str(self.out / "commands.csv")
+
+    def lines(self) -> "list[Table | str]":
+        """Return the table of precisions, and the file of commands."""
+        return [self.table, *([self._commands] if self._commands else [])]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the same."""
+        return {"commands": self._commands, "precision": rows(self.table, *PRECISION)}
+
+
+@command
+def design(
+    logs: MoreLogs = (),
+    *,
+    fit: Fit,
+    out: Folder = "runs/design",
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the experiment [s].")] = None,
+    joints: Annotated[
+        "str | list[str] | None",
+        typer.Option(metavar="2,3", help="Joints to drive [default: the compared joints]."),
+        str | None,
+    ] = None,
+    criterion: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E|D",
+            help="What the experiment minimises. E: the uncertainty of the worst-known combination of "
+            "parameters. D: the volume of the uncertainty of all of them together.",
+        ),
+    ] = None,
+    seed: Seed = 1,
+    config: OwnConfig = None,
+    set: Set = None,
+    repair: Repair = False,
+) -> DesignResult:
+    """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
+
+    SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
+    design.margin_deg, design.clearance_m) are checked only in simulation with the present estimate; the
+    real arm may exceed them. Collisions are checked with the shapes of the model, which knows no hoses and
+    nothing that stands around the machine.
+
+    Writes commands.csv (the experiment) and predicted.csv (the simulated motion, no measurement). The
+    settings define the compared joints, the free parameters and the limits.
+
+    Example: hydroid design LOG.csv --fit runs/mech --duration 30
+
+        commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
+
+    Raises:
+        SettingsError: limits that no experiment keeps.
+        RunError: the folder cannot be written.
+    """
+    driven = [int(name) if name.isdigit() else name for name in names(joints)] or None
+    options = {"design__duration_s": duration, "design__criterion": criterion, "design__joints": driven}
+    model = open_model(fit, config, setting_changes(set, **options))
+    from hydroid.advice.design import design as best_experiment
+    from hydroid.log import write_log
+    from hydroid.report.design_report import design_page
+
+    settings, folder = model.settings, as_path(out)
+    with Progress() as progress:
+        existing = read_logs(logs, settings, repair=repair)
+        result = best_experiment(settings, model.theta, existing, seed, progress)
+    if folder:
+        write_log(folder / "commands.csv", result.log, settings.log)
+        write_log(folder / "predicted.csv", result.predicted, settings.log)
+    page = design_page(settings.arm, settings.design, result, model.values)
+    return DesignResult(result, page, folder).write()

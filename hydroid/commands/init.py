@@ -1,0 +1,109 @@
+"""`hydroid init`: a project for your own arm and log."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.commands.inputs import as_list
+from hydroid.commands.options import command, names
+from hydroid.commands.result import Printed
+from hydroid.errors import SettingsError
+from hydroid.files import is_file
+
+if TYPE_CHECKING:
+    from hydroid.commands.inputs import Source
+    from hydroid.project import Project
+    from hydroid.report.table import Table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InitResult(Printed):
+    """A project that was written."""
+
+    project: "Project"
+
+    def lines(self) -> "list[Table | str]":
+        """Return the files, what was guessed, and what to run next."""
+        project = self.project
+        lines = [f"{project.folder}: {', '.join(project.files)}"]
+        guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
+        for heading, group in (("The arm:", project.notes), (guessed, project.columns)):
+            lines += ["", heading, *(f"  {line}" for line in group)] if group else []
+        if project.unused:
+            lines.append(f"  not used: {', '.join(project.unused)}")
+        next_steps = f"Next: look at {project.folder / 'arm.png'}, then"
+        return [*lines, "", next_steps, *(f"  {line}" for line in project.commands)]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the same by name."""
+        keys = ("files", "notes", "columns", "unused", "commands")
+        return {"out": str(self.project.folder)} | {key: [*getattr(self.project, key)] for key in keys}
+
+
+@command
+def init(
+    folder: Annotated[
+        "Source", typer.Argument(metavar="DIR", help="Folder of the project, new or not."), Path
+    ],
+    *,
+    arm: Annotated[
+        "Source | None",
+        typer.Option(
+            metavar="robot.urdf",
+            help="URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].",
+        ),
+        Path | None,
+    ] = None,
+    log: Annotated[
+        "Source | list[Source] | None",
+        typer.Option(
+            metavar="LOG",
+            help="A log; its columns are guessed. Repeat it for several logs: the next steps keep the last "
+            "to validate on.",
+        ),
+        list[Path] | None,
+    ] = None,
+    joints: Annotated[
+        "str | list[str] | None",
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Names of the arm's joints in the order of the log's numbers (u1, u2, ...) [default: the "
+            "order in the arm's file].",
+        ),
+        str | None,
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LINK",
+            help="Last link of the arm, if the robot has several branches [default: the end of the "
+            "branch whose joints the log names, or else of the longest branch].",
+        ),
+    ] = None,
+) -> InitResult:
+    """Write a project that runs, from your arm's CAD and your log.
+
+    It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
+    picture to check the arm by, and the commands to run next. Nothing is overwritten.
+
+    Example: hydroid init mine --arm robot.urdf --log a.csv
+
+        project = hydroid.init("mine", arm="robot.urdf", log=["a.csv", "b.csv"]).project
+        print(*project.notes, *project.columns, *project.commands, sep="\\n")
+
+    Raises:
+        SettingsError: a file of the project is there already, or no joint has one of the names.
+        ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot.
+        RunError: the folder cannot be written.
+    """
+    logs = [Path(path) for path in as_list(log)]
+    robot = None if arm is None else Path(arm)
+    for path in (*logs, *([] if robot is None else [robot])):
+        if not is_file(path):
+            raise SettingsError("no such file", where=str(path))
+    from hydroid.project import Sources, write_project
+
+    sources = Sources(robot, tuple(logs), tuple(names(joints)), tip)
+    return InitResult(write_project(Path(folder), sources))

@@ -1,0 +1,120 @@
+"""`hydroid simulate`: the log that a model predicts."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from hydroid.commands.arms import read_arms
+from hydroid.commands.inputs import open_model
+from hydroid.commands.options import Arm, Fit, OwnConfig, Pose, Repair, Seed, Set, command
+from hydroid.commands.result import Printed, as_path
+from hydroid.errors import SettingsError
+from hydroid.files import write_atomic
+
+if TYPE_CHECKING:
+    from hydroid.commands.inputs import Source
+    from hydroid.log import Log
+    from hydroid.report.table import Table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Printed):
+    """Simulated logs.
+
+    Attributes:
+        logs: by the arm's name: right, left, or alone.
+        out: the log that was written; None: none.
+        trace: the file of pressures and flows; None: none.
+    """
+
+    logs: "dict[str, Log]"
+    out: Path | None
+    trace: Path | None
+
+    @property
+    def log(self) -> "Log":
+        """The log of the first arm."""
+        return next(iter(self.logs.values()))
+
+    def lines(self) -> "list[Table | str]":
+        """Return the files."""
+        return [str(file) for file in (self.out, self.trace) if file is not None]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the files and the length of the log."""
+        files = {"out": self.out and str(self.out), "trace": self.trace and str(self.trace)}
+        return files | {"samples": len(self.log.time), "duration_s": float(self.log.duration)}
+
+
+@command
+def simulate(
+    commands: Annotated[
+        "Source | Log",
+        typer.Argument(
+            metavar="COMMANDS.csv",
+            help="A log of commands. Its angles before the first command give the start pose.",
+        ),
+        Path,
+    ],
+    *,
+    fit: Fit,
+    out: Annotated[
+        "Source | None", typer.Option(metavar="LOG.csv", help="The log to write."), Path | None
+    ] = Path("runs/simulated.csv"),
+    pose: Pose = None,
+    noise_deg: Annotated[
+        float, typer.Option(min=0, max=90, help="Standard deviation of Gaussian noise on the angles [deg].")
+    ] = 0.0,
+    seed: Seed = 0,
+    trace: Annotated[
+        "Source | None",
+        typer.Option(metavar="CSV", help="Also write pressures, flows, spool position and force (stage 2)."),
+        Path | None,
+    ] = None,
+    arm: Arm = None,
+    config: OwnConfig = None,
+    set: Set = None,
+    repair: Repair = False,
+) -> Simulation:
+    """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit.
+
+    Of two arms neither feels the other: the carrier stands still, and they share no pump.
+
+    Example: hydroid simulate COMMANDS.csv --fit runs/hyd --out sim.csv
+
+        log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
+
+    Raises:
+        SettingsError: a trace of stage 1 or of two arms, or `out` would overwrite the commands.
+        LogError: the commands cannot be used.
+        RunError: the simulation diverged, or a file cannot be written.
+    """
+    target, traced = as_path(out), as_path(trace)
+    if target and isinstance(commands, str | Path) and target.resolve() == Path(commands).resolve():
+        raise SettingsError("would overwrite the commands", where=f"--out {out}", hint="name another file")
+    model = open_model(fit, config, set)
+    if traced and model.settings.stage != "hyd":
+        raise SettingsError("stage mech has no pressures to trace", where=model.source, hint="set stage: hyd")
+    if traced and arm is not None:
+        raise SettingsError("is of one arm that stands alone", where="--trace", hint="leave --arm out")
+    read = read_arms(commands, model.settings, arm, pose=pose, repair=repair)
+    from hydroid.log import write_logs
+    from hydroid.prediction import predict_log, trace_csv
+    from hydroid.settings.two_arms import columns_of
+
+    logs: dict[str, Log] = {}
+    for number, (name, log) in enumerate(read.items()):
+        predicted = predict_log(model, log)
+        noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
+        logs[name] = replace(predicted, angle=predicted.angle + noise)
+    if target:
+        columns = model.settings.log
+        write_logs(
+            target, [(log, columns if arm is None else columns_of(columns, n)) for n, log in logs.items()]
+        )
+    if traced:
+        write_atomic(traced, trace_csv(model, *read.values()))
+    return Simulation(logs, target, traced)

@@ -1,0 +1,95 @@
+"""`hydroid validate`: fits on logs that they were not fitted to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.commands.inputs import as_list, open_model, read_logs
+from hydroid.commands.options import FIT_HELP, Folder, Logs, Repair, Set, command
+from hydroid.commands.result import Result, as_path
+from hydroid.errors import SettingsError
+
+if TYPE_CHECKING:
+    from hydroid.commands.inputs import ModelSource
+    from hydroid.fitting.validation import Prediction
+    from hydroid.report.table import Table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ValidateResult(Result):
+    """The response of each fit to each log."""
+
+    result: "list[Prediction]"
+
+    def lines(self) -> "list[Table | str]":
+        """Return the table of errors, and what to beware of."""
+        warnings = [f"- {warning}" for warning in self.page.warnings]
+        return [self.page.tables["errors"], *warnings, *self.written]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the errors of each fit, log and joint."""
+        return {"results": [row for result in self.result for row in result.plain()]}
+
+
+@command
+def validate(
+    logs: Logs,
+    *,
+    fit: Annotated[
+        "ModelSource | Sequence[ModelSource]",
+        typer.Option(metavar="RUN|YAML", help=f"{FIT_HELP}. Repeat the option for several estimates."),
+        list[Path],
+    ],
+    leave_one_out: Annotated[
+        bool,
+        typer.Option(
+            help="Give the fit's own logs. For each of them: refit without it, and predict it. Takes one fit."
+        ),
+    ] = False,
+    out: Folder = "runs/validation",
+    set: Set = None,
+    repair: Repair = False,
+) -> ValidateResult:
+    """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots.
+
+    Each fit reads the logs with its own settings. The report of each run shows its unseen logs too.
+
+    Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
+
+        validated = hydroid.validate("b.csv", fit="runs/a")
+        print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+
+    Raises:
+        LogError: a log cannot be used.
+        RunError: a simulation diverged, or the folder cannot be written.
+    """
+    models = [open_model(model, None, set) for model in as_list(fit)]
+    if leave_one_out and len(models) > 1:
+        raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
+    read = [read_logs(logs, model.settings, repair=repair) for model in models]
+    from hydroid.fitting.validation import predicted, without_one
+    from hydroid.report.comparison import validation_page
+    from hydroid.report.drawing import draw
+    from hydroid.run.identity import was_fitted
+    from hydroid.run.record import keep_validation
+
+    folds = [without_one(models[0], read[0], i) for i in range(len(read[0]))] if leave_one_out else []
+    by_model: list[list[Prediction]] = []
+    for model, own in zip(models, read, strict=True):
+        seen = [was_fitted(Path(model.source).parent, log) for log in own]
+        unseen = [None if fitted is None else not fitted for fitted in seen]
+        if folds:
+            by_model.append([predicted(fold, log, True) for fold, log in zip(folds, own, strict=True)])
+        else:
+            by_model.append([predicted(model, log, new) for log, new in zip(own, unseen, strict=True)])
+    results = [result for own in by_model for result in own]
+    page = validation_page(results, models[0].settings.arm, folds)
+    validated = ValidateResult(results, page, as_path(out)).write()
+    if out is not None and not folds:
+        for model, own in zip(models, by_model, strict=True):
+            if (run := keep_validation(model, own)) is not None:
+                draw([run], run)
+    return validated

@@ -1,0 +1,217 @@
+"""`hydroid view`: the arm in motion, in a window or a film; its collisions; the curves of its actuators."""
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hydroid.commands.arms import read_arms, read_trajectories
+from hydroid.commands.inputs import load_settings, nominal_model, require_hydraulics, run_logs
+from hydroid.commands.options import FIT_HELP, Arm, Pose, Repair, Set, command
+from hydroid.commands.progress import Progress
+from hydroid.commands.result import Files, Printed, Result, as_path
+from hydroid.errors import SettingsError
+from hydroid.files import is_file, write_atomic
+from hydroid.identified_model import IdentifiedModel
+from hydroid.viewer.opengl import choose_platform
+
+if TYPE_CHECKING:
+    from hydroid.arm.collision import Clearance
+    from hydroid.commands.inputs import ConfigSource, ModelSource, Source
+    from hydroid.log import Log
+    from hydroid.report.table import Table
+    from hydroid.settings.fit import FitSettings
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Collisions(Result):
+    """Which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
+
+    result: "Clearance"
+
+    @property
+    def exit_status(self) -> int:
+        """Return 1 if bodies meet."""
+        return 1 if self.result.meetings else 0
+
+    def lines(self) -> "list[Table | str]":
+        """Return the tables, and the answer in a sentence."""
+        return [*self.page.tables.values(), self.page.lead, *self.written]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the smallest distance and the meetings."""
+        result = self.result
+        nearest = result.smallest
+        meetings = [
+            {
+                "bodies": [meeting.first, meeting.second],
+                "from_s": meeting.begins,
+                "to_s": meeting.ends,
+                "depth_m": meeting.depth,
+                "deepest_at_s": meeting.deepest,
+            }
+            for meeting in result.meetings
+        ]
+        return {
+            "free": not meetings,
+            "clearance_m": float(result.distance[nearest]),
+            "clearance_at_s": float(result.time[nearest]),
+            "clearance_between": [*result.nearest[nearest]],
+            "collisions": meetings,
+            "checked_pairs": result.checked,
+            "excluded": [[*pair] for pair in result.excluded],
+        }
+
+
+@command
+def view(
+    source: Annotated[
+        "Source | Log | None",
+        typer.Argument(
+            metavar="RUN|LOG", help="A run folder, whose first log drives the arm; or a log, with --fit."
+        ),
+        Path | None,
+    ] = None,
+    *,
+    out: Annotated[
+        "Source | None",
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE|DIR",
+            help="Write a film (.mp4, .gif) or several moments (.png) instead of opening a window; with "
+            "--collisions or --actuator, folder for their pages.",
+        ),
+        Path | None,
+    ] = None,
+    fit: Annotated[
+        "ModelSource | None",
+        typer.Option(
+            metavar="RUN|YAML",
+            help=f"{FIT_HELP} [default: the arm's file and `hydraulics` in the settings].",
+        ),
+        Path | None,
+    ] = None,
+    span: Annotated[
+        str,
+        typer.Option(metavar="FROM:TO", help="Part of the log to film [s], such as 10:20 [default: all]."),
+    ] = "",
+    pose: Pose = None,
+    arm: Arm = None,
+    collisions: Annotated[
+        bool,
+        typer.Option(
+            help="Instead, find which bodies meet along the log's joint angles: of the arm, its base and the "
+            "floor; with --arm also of the carrier and the other arm. The exit status is 1 if bodies meet."
+        ),
+    ] = False,
+    actuator: Annotated[
+        int | None,
+        typer.Option(
+            metavar="JOINT",
+            help="Instead, draw the curves of this joint's actuator (1 azimuth, 2 shoulder, ...): "
+            "calibration, current, force, spool, opening, flow and torque, with the 95 % bands of a fit.",
+        ),
+    ] = None,
+    config: Annotated[
+        "ConfigSource | None",
+        typer.Option(help="Settings [default: config.yaml in the folder of the estimate, or else fit-hyd]."),
+        str | None,
+    ] = None,
+    set: Set = None,
+    repair: Repair = False,
+) -> Printed:
+    """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
+
+    Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
+    With -o FILE it writes a film instead, with commands, angles and pressures. This needs no display, but
+    OpenGL by EGL or OSMesa. In a program of your own, set MUJOCO_GL to egl or osmesa before anything is
+    imported.
+
+    Example: hydroid view runs/hyd -o arm.mp4
+
+        hydroid.view("a.csv", out="a.png", fit="runs/a", span="0:2")
+
+    Raises:
+        RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.
+        SettingsError: another kind of file, no such arm, pose or joint, a span without time.
+    """
+    log = source
+    if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
+        if fit is not None:
+            hint = f"name a log, or leave out --fit {fit}"
+            raise SettingsError("is a run itself", where=str(source), hint=hint)
+        fit, log = source, None if actuator else run_logs(source)[0]
+    if collisions:
+        if log is None:
+            raise SettingsError("needs a log or a run", where="--collisions", hint="name the log")
+        own = None if fit is None else nominal_model(fit, config, set).settings
+        return _collisions(log, own or load_settings(config or "fit-hyd", set), as_path(out), arm, repair)
+    if out is not None:
+        choose_platform()
+    model = nominal_model(fit, config, set)
+    if actuator is not None:
+        return _actuator(model, actuator, Path(out or "runs/actuator"))
+    if log is None and (arm is not None or out is not None):
+        where = "--arm" if arm is not None else "--out"
+        raise SettingsError("needs a log or a run: sliders are those of one arm", where=where)
+    logs = None if log is None else read_arms(log, model.settings, arm, pose=pose, repair=repair)
+    if out is not None:
+        return _film(model, logs or {}, Path(out), span)
+    from hydroid.viewer.motion import simulated_motion
+    from hydroid.viewer.playback import Replay, make_sliders
+    from hydroid.viewer.window import show
+
+    with suppress(KeyboardInterrupt):  # as good as closing the window
+        show(make_sliders(model, pose) if logs is None else Replay(simulated_motion(model, logs)))
+    return Files({})
+
+
+def _film(model: IdentifiedModel, logs: "dict[str, Log]", out: Path, span: str) -> Files:
+    from hydroid.viewer.film import check_kind, render_motion
+    from hydroid.viewer.motion import simulated_motion
+
+    kind, part = check_kind(out), _span(span)
+    with Progress() as progress:
+        write_atomic(out, render_motion(simulated_motion(model, logs), kind, part, progress))
+    return Files({"out": str(out)}, (str(out),))
+
+
+def _collisions(
+    log: "Source | Log", settings: "FitSettings", out: Path | None, arm: str | None, repair: bool
+) -> Collisions:
+    logs = read_trajectories(log, settings, arm, repair=repair)
+    from hydroid.arm.machine import load_machine
+    from hydroid.report.collision_report import collision_page
+
+    machine = load_machine(settings.arm, pair=arm is not None)
+    rest = settings.arm.pose(settings.start_pose)
+    angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
+    result = machine.checker.clearance(next(iter(logs.values())).time, angle)
+    return Collisions(result, collision_page(result, machine.arm.name), out).write()
+
+
+def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Files:
+    require_hydraulics(model)
+    from hydroid.posterior.posterior import stored_posterior
+    from hydroid.problem.stage import Stage
+    from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
+    from hydroid.report.page_file import write_page
+
+    stage, arm = Stage(model.settings), model.settings.arm
+    actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)
+    if (posterior := stored_posterior(model)) is not None:
+        known = KnownActuator(posterior, lambda theta: joint_records(arm, stage.candidates(theta), joint))
+        actuator = replace(actuator, known=known)
+    files = [str(file) for file in write_page(actuator_page(actuator), out)]
+    return Files({"files": files}, (files[-1],))
+
+
+def _span(text: str) -> tuple[float, float]:
+    begin, _, end = text.partition(":")
+    try:
+        return float(begin or 0.0), float(end or "inf")
+    except ValueError:
+        raise SettingsError(f"{text!r} is no span", where="--span", hint="write FROM:TO in seconds") from None

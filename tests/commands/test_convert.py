@@ -1,0 +1,87 @@
+"""`convert`: what is written reads back to the same bits, with settings or by guesses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_files import NAMES, cells
+from log_formats import write_mat, write_parquet
+from typer.testing import CliRunner
+
+import hydroid
+from hydroid.commands.app import app
+from hydroid.errors import SettingsError
+from hydroid.log import read_log
+from hydroid.settings.log import LogSettings
+
+ROOT = Path(__file__).parents[2]
+RIG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
+EXCAVATOR = ROOT / "examples" / "excavator"
+WIDE = np.full((2, 2), np.inf) * [-1, 1]
+
+
+@pytest.mark.parametrize("name", ["fit_01", "check_04"])
+def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(name: str, tmp_path: Path) -> None:
+    settings = hydroid.load_settings(EXCAVATOR / "fit.yaml")
+    done = hydroid.convert(EXCAVATOR / f"{name}.csv", out=tmp_path / "plain.csv", config=settings)
+    (log,) = hydroid.read_logs(EXCAVATOR / f"{name}.csv", settings)
+    plain = settings.model_copy(update={"log": LogSettings(period_s=settings.log.period_s)})
+    (back,) = hydroid.read_logs(tmp_path / "plain.csv", plain)
+    np.testing.assert_array_equal(back.time, log.time)
+    np.testing.assert_array_equal(back.command, log.command)
+    # degrees that were interpolated in rad: no cell may exist that is read as these very bits
+    np.testing.assert_allclose(back.angle, log.angle, rtol=4e-16, atol=0)
+    np.testing.assert_array_equal(done.log.command, log.command)
+    assert done.guess is None
+
+
+def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
+    done = hydroid.convert(RIG, out=tmp_path / "plain.csv")
+    settings = hydroid.load_settings("fit-mech")
+    (log,), (back,) = (hydroid.read_logs(path, settings) for path in (RIG, tmp_path / "plain.csv"))
+    np.testing.assert_array_equal(back.command, log.command)
+    np.testing.assert_array_equal(back.angle, log.angle)
+    assert done.guess is not None
+    assert len(done.guess.reasons) == 15
+
+
+def test_a_matlab_file_with_names_of_its_own(tmp_path: Path) -> None:
+    time, *signals = cells(300).T
+    names = ("zeit", "valve_1", "valve_2", "winkel_1", "winkel_2")
+    columns = dict(zip(names, (time, *signals), strict=True))
+    write_mat(tmp_path / "log.mat", columns | {"valve_1": signals[0] / 10, "valve_2": signals[1] / 10})
+    hydroid.convert(tmp_path / "log.mat", out=tmp_path / "log.csv")
+    log, findings = read_log(tmp_path / "log.csv", LogSettings(), WIDE)
+    assert [f for f in findings if f.level == "error"] == []
+    np.testing.assert_allclose(log.command, np.array(signals[:2]).T, rtol=1e-15)
+
+
+def test_the_command_prints_each_guess_and_json(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "a.parquet", dict(zip(NAMES, cells(300).T, strict=True)))
+    arguments = ["convert", str(tmp_path / "a.parquet"), "-o", str(tmp_path / "a.csv")]
+    said = CliRunner().invoke(app, arguments).output
+    assert "u2_pct: command in % of joint 2, by its unit" in said
+    assert "300 samples, 2.99 s, every 0.01 s" in said
+    plain = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).output)
+    assert plain["log"]["joints"]["1"]["angle"] == {"column": "q1_deg", "unit": "deg"}
+
+
+def test_a_guess_is_corrected_and_joints_go_by_the_arms_names(tmp_path: Path) -> None:
+    time, u, _, q, _ = cells(300).T
+    columns = {"t": time, "shoulder cmd [V]": u / 10, "shoulder angle [deg]": q}
+    write_parquet(tmp_path / "a.parquet", columns)
+    out = tmp_path / "a.csv"
+    hydroid.convert(tmp_path / "a.parquet", out=out, config="fit-mech")
+    assert out.read_text().startswith("time_s,u2_pct,q2_deg\n")
+    turned = hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scale": -10})
+    np.testing.assert_allclose(turned.log.command[:, 0], -u, rtol=1e-15)
+    with pytest.raises(SettingsError, match="is no setting of `log`"):
+        hydroid.convert(tmp_path / "a.parquet", out=out, set={"search.seed": 3})
+    with pytest.raises(SettingsError, match=r"unknown setting 'joints\.1\.command\.scal'"):
+        hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scal": 3})
+
+
+def test_the_log_is_not_overwritten(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="would overwrite the log"):
+        hydroid.convert(RIG, out=RIG)

@@ -1,0 +1,77 @@
+"""What the user can correct is one line and exit status 2, and nothing is half-written."""
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import Run
+
+ROOT = Path(__file__).parents[2]
+LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
+FILES = {
+    "broken.csv": "time_s,u1_pct\n0,1\n0.01,x\n",
+    "p.yaml": "K: 1.0\nD: 1.0\nS: 1.0\nM1: 1\nM2: 1\nM3: 1\nM4: 1\nM5: 1\n",
+    "bad.yaml": "F1: 500\n",
+    "d.yaml": "D: 80.0\n",
+}
+WRONG = [
+    ("fit-mech nowhere.csv", "log", "nowhere.csv"),
+    ("fit-mech", "settings", "no log is given"),
+    ("fit-mech {log} --config nonsense", "settings", "nonsense"),
+    ("fit-mech {log} --set search.seed=x", "settings", "--set search.seed"),
+    ("fit-mech {log} --algorithm pso", "settings", "hydroid: --algorithm: must be 'ga', 'nsga2'"),
+    ("fit-mech {log} --algorithm pymoo:Foo", "settings", "'NSGA3'"),
+    ("fit-mech {log} --out .", "run", "holds no run"),
+    ("fit-mech {log} --set outputs=[9]", "log", "no joint 9; the arm has joints 1 to 7"),
+    ("fit-mech {log} --config fit-hyd", "settings", "use hydroid fit-hyd"),
+    ("fit-mech {log} --sed 1", "usage", "--sed"),
+    ("fit-hyd {log} --mech nowhere", "settings", "nowhere"),
+    ("fit-hyd {log} --set parameters.D.start=null", "settings", "give the run of stage 1 with --mech RUN"),
+    ("fit-hyd {log} --mech d.yaml", "settings", "M6"),
+    ("validate {log}", "usage", "--fit"),
+    ("validate {log} --fit nowhere", "settings", "nowhere"),
+    ("validate {log} --fit {root}/configs/fit-mech.yaml", "settings", "these are settings"),
+    ("validate {log} --fit {root}/README.md", "settings", "README.md: is no estimate"),
+    ("analyse {log} --profile Z", "settings", "no free parameter 'Z' to profile"),
+    ("analyse {log} --over K", "settings", "--over K: is no pair of parameters"),
+    ("analyse", "settings", "no log is given"),
+    ("simulate {log} --fit p.yaml --out o.csv", "settings", "'M6' is missing"),
+    ("simulate {log} --fit no.yaml", "settings", "no.yaml"),
+    ("simulate {log} --fit p.yaml --out {log}", "settings", "overwrite"),
+    ("suggest --fit bad.yaml", "settings", "bad.yaml"),
+    ("design --fit nowhere", "settings", "nowhere"),
+    ("report .", "run", "."),
+    ("report nowhere --merge", "run", "no finished run is there"),
+    ("study nowhere.yaml", "settings", "nowhere.yaml"),
+    ("view --actuator 2 --fit bad.yaml", "settings", "no force-stroke curve"),
+    ("view --actuator 9", "settings", "joints 1 to 7"),
+    ("view --actuator 2 --config fit-mech", "settings", "stage 1 (mech) does not model the actuators"),
+    ("view --pose asleep", "settings", "no pose 'asleep'"),
+    ("view --arm both", "settings", "needs a log"),
+    ("view --collisions", "settings", "needs a log"),
+    ("view {log} -o a.avi", "settings", "is no film or picture"),
+    ("view {log} -o a.mp4 --span now", "settings", "'now' is no span"),
+    ("view . -o a.mp4", "log", "cannot be read"),
+    ("convert {log} --out {log}", "settings", "would overwrite the log"),
+    ("init mine --arm none.urdf", "settings", "no such file"),
+    ("nonsense", "usage", "nonsense"),
+]
+"""a command, the kind of its error, and what it says"""
+
+
+@pytest.mark.parametrize(("command", "kind", "says"), WRONG, ids=[command for command, *_ in WRONG])
+def test_what_the_user_can_correct_is_one_line_and_exit_2(
+    hydroid_cli: Run, tmp_path: Path, command: str, kind: str, says: str
+):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    words = command.format(log=LOG, root=ROOT).split()
+    plain = hydroid_cli(*words, code=2)
+    assert says in plain.err
+    asides = ("note:", "compiling", "left out:")
+    lines = [line for line in plain.err.splitlines() if line.startswith("hydroid: ")]
+    assert kind == "usage" or len([line for line in lines if not any(a in line for a in asides)]) == 1
+    error = json.loads(hydroid_cli(*words, "--json", code=2).out)["error"]
+    assert set(error) == {"kind", "what", "where", "hint"}
+    assert error["kind"] == kind
+    assert {path.name for path in tmp_path.iterdir()} == set(FILES)  # nothing half-written

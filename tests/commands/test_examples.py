@@ -1,0 +1,95 @@
+"""The examples in the docstrings of the public names run, on a small fit."""
+
+import inspect
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import hydroid
+from hydroid.commands import runs
+from hydroid.report import drawing, page_file
+
+ROOT = Path(__file__).parents[2]
+NAMES = [
+    name
+    for name in hydroid.__all__
+    if re.search(r"^ {4}\S*.*hydroid\.", inspect.getdoc(getattr(hydroid, name)) or "", re.MULTILINE)
+]
+ELSEWHERE = {"view", "report", "convert", "init", "study"}
+"""a window or a film needs OpenGL, report pages, which are not written here, the others files of one's own;
+they have tests of their own"""
+WRITES = {"fit": "a", "fit_mech": "mech", "fit_hyd": "hyd"}
+"""the run folder that an example makes"""
+SMALL = {"population": 6, "generations": 2}
+QUICK: dict[str, object] = {
+    "search.ga": SMALL,
+    "search.nsga2": SMALL,
+    "refinement": None,
+    "joint_refinement": False,
+    "design": {"effort": 3, "poses": "any"},
+}
+
+
+def example(name: str) -> str:
+    """Return the indented code of a docstring."""
+    lines = (inspect.getdoc(getattr(hydroid, name)) or "").splitlines()
+    end = next((i for i, line in enumerate(lines) if line.strip() in ("Args:", "Raises:")), len(lines))
+    return textwrap.dedent("\n".join(line for line in lines[1:end] if line.startswith(" " * 4)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Logs and runs as the examples name them."""
+    folder = tmp_path_factory.mktemp("examples")
+    text = (ROOT / "examples" / "logs" / "rig_shoulder_1.csv").read_text().splitlines()
+    for name in ("a.csv", "b.csv", "commands.csv"):
+        (folder / name).write_text("\n".join(text[:401]) + "\n")
+    for seed in (1, 2):
+        settings = hydroid.load_settings("fit-mech", QUICK | {"search.algorithm": "ga", "search.seed": seed})
+        logs = hydroid.read_logs([folder / "a.csv"], settings)
+        out = folder / "runs" / "array" / f"seed-{seed}"
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(drawing, "write_page", lambda *_: [])  # figures take longest
+            hydroid.fit(settings, logs, out)
+    for name in ("a", "mech"):
+        (folder / "runs" / name).symlink_to(folder / "runs" / "array" / "seed-1")
+    values = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+    fixed = {f"parameters.{name}.fixed": value for name, value in values.items()}
+    hydraulic = hydroid.load_identified(None, "fit-hyd", fixed, nominal=True)
+    hydroid.Plant(hydraulic).save(folder / "runs" / "hyd")
+    return folder
+
+
+def test_every_function_has_an_example():
+    functions = {n for n in hydroid.__all__ if callable(getattr(hydroid, n)) and n[0].islower()}
+    own = {
+        "identified",
+        "start_values",
+        "load_identified",
+        "write_log",
+        "open_workers",
+    }
+    assert functions - own - {"load_plant"} <= set(NAMES)
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n not in ELSEWHERE])
+def test_an_example_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    code = example(name)
+    assert f"hydroid.{name}(" in code
+    (tmp_path / "runs").mkdir()
+    for file in (*folder.glob("*.csv"), *folder.glob("runs/*")):
+        (tmp_path / file.relative_to(folder)).symlink_to(file)
+    monkeypatch.chdir(tmp_path)
+    if name in WRITES:
+        (tmp_path / "runs" / WRITES[name]).unlink()
+    original = hydroid.load_settings
+
+    def quick(config: str, overrides: dict[str, object] | None = None):
+        return original(config, QUICK | (overrides or {}))
+
+    monkeypatch.setattr(runs, "load_settings", quick)
+    monkeypatch.setattr("hydroid.load_settings", quick)
+    monkeypatch.setattr(page_file, "write_page", lambda *_: [])
+    exec(compile(code, name, "exec"), {"hydroid": hydroid})

@@ -1,0 +1,60 @@
+"""The examples of other arms: their READMEs' commands run, and their files are what they say."""
+
+import glob
+import re
+import runpy
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from hydroid.commands.app import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SHORT = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", "--no-refinement"]
+"""for a fit: as the README has it, but for a step only"""
+
+
+@pytest.fixture
+def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of both examples, as the working folder."""
+    for name in ("boom", "urdf"):
+        shutil.copytree(EXAMPLES / name, tmp_path / "examples" / name, ignore=shutil.ignore_patterns("mine"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "examples"
+
+
+def commands(readme: Path) -> list[list[str]]:
+    """The hydroid commands of a README, with its patterns expanded."""
+    (block,) = re.findall(r"```sh\n(.*?)```", readme.read_text(encoding="utf-8"), re.DOTALL)
+    found: list[list[str]] = []
+    for line in block.splitlines():
+        if line.startswith("hydroid "):
+            words = shlex.split(line)[1:]
+            found.append([f for word in words for f in (sorted(glob.glob(word)) if "*" in word else [word])])
+    return found
+
+
+@pytest.mark.parametrize(("name", "count"), [("boom", 3), ("urdf", 4)])
+def test_the_readmes_commands_run(name: str, count: int, copied: Path, monkeypatch: pytest.MonkeyPatch):
+    if name == "urdf":
+        monkeypatch.chdir(copied / "urdf")
+    run = commands(copied / name / "README.md")
+    assert len(run) == count
+    for words in run:
+        done = CliRunner().invoke(app, [*words, *(SHORT if words[0].startswith("fit-") else [])])
+        assert done.exit_code == 0, (words, done.output[-2000:], done.exception)
+
+
+def test_the_urdf_and_its_meshes_are_what_the_script_makes():
+    script = runpy.run_path(str(EXAMPLES / "urdf" / "make_example.py"))
+    assert (EXAMPLES / "urdf" / "robot.urdf").read_text(encoding="utf-8") == script["urdf"]()
+    for name in script["SIZES"]:
+        assert (EXAMPLES / "urdf" / "meshes" / f"{name}.stl").read_bytes() == script["mesh"](name)
+
+
+@pytest.mark.parametrize(("name", "words"), [("boom", "**Virtual.**"), ("urdf", "**No machine.**")])
+def test_what_is_made_up_is_called_so(name: str, words: str):
+    assert words in (EXAMPLES / name / "README.md").read_text(encoding="utf-8")

@@ -1,0 +1,95 @@
+"""What stage 2 takes from stage 1, and what it says about it."""
+
+import logging
+from pathlib import Path
+
+import pytest
+import yaml
+
+import hydroid
+from hydroid.commands.stage_one import with_mechanics
+from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
+from hydroid.identified_model import write_settings
+
+ROOT = Path(__file__).parents[2]
+VALUES = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+def test_a_mass_that_stage_1_moved_without_knowing_it_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    """The arm's file has 5.1 and 22.5 kg: M2 was moved, M3 stayed, and the logs know M4."""
+    flags = {
+        "M2": (8.0, "weakly identifiable"),
+        "M3": (22.6, "not identifiable"),
+        "M4": (3.0, "identifiable"),
+    }
+    flags |= dict.fromkeys(("M1", "M5", "M6"), (4.4, "fixed"))
+    known = {n: ParameterEstimate(value=v, unit="kg", flag=flag) for n, (v, flag) in flags.items()}
+    known["D"] = ParameterEstimate(value=300.0, unit="N·m·s/rad", flag="not identifiable")
+    write_estimate(tmp_path, FitSummary(stage="mech", estimate=known))
+    with caplog.at_level(logging.WARNING, "hydroid"):
+        changes = with_mechanics(tmp_path, "fit-hyd", {}, [])
+    assert changes["parameters.M2.fixed"] == 8.0
+    assert len(caplog.messages) == 1
+    assert caplog.messages[0].startswith(
+        "M2 is held at 8 kg: stage 1 moved it from 5.1 kg, but its logs do not"
+    )
+
+
+def stage_one(folder: Path, **overrides: object) -> Path:
+    """A run folder of stage 1 without its search."""
+    settings = hydroid.load_settings("fit-mech", overrides)
+    write_settings(folder, settings)
+    estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in VALUES.items()}
+    write_estimate(folder, FitSummary(stage="mech", estimate=estimate, final="best"))
+    return folder
+
+
+def test_stage_two_reads_logs_as_stage_one_did(tmp_path: Path):
+    mech = stage_one(tmp_path / "mech", **{"log.time.column": "t", "log.delay_s": 0.1})
+    changes = with_mechanics(mech, "fit-hyd", {"log.delay_s": 0.2}, ["a.csv"])
+    settings = hydroid.load_settings("fit-hyd", changes)
+    assert settings.log.time.column == "t"
+    assert settings.log.delay_s == 0.2  # what is asked for has the last word
+    assert settings.arm.model == (tmp_path / "mech" / "model" / "arm.xml").resolve()
+    # the masses hold; the damping and the spring of stage 2 have a start and a value of their own
+    masses = {name: value for name, value in VALUES.items() if name.startswith("M")}
+    assert {name: settings.parameters[name].fixed for name in masses} == masses
+    assert settings.parameters["D"].fixed is None
+    assert settings.parameters["S"].fixed == 0.0
+
+
+def test_a_config_that_names_its_own_layout_and_arm_keeps_them(tmp_path: Path):
+    mech = stage_one(tmp_path / "mech", **{"log.time.column": "t", "log.delay_s": 0.1})
+    own = yaml.safe_load((ROOT / "configs" / "fit-hyd.yaml").read_text())
+    own |= {"arm": "hydrolek", "log": {"time": {"column": "clock"}}}
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
+    changes = with_mechanics(mech, tmp_path / "own.yaml", {}, ["a.csv"])
+    settings = hydroid.load_settings(tmp_path / "own.yaml", changes)
+    assert settings.log.time.column == "clock"
+    assert settings.log.delay_s == 0.1
+    assert settings.arm.model == (ROOT / "models" / "hydrolek.xml").resolve()
+
+
+def test_the_masses_of_an_own_arm_come_from_stage_one(tmp_path: Path):
+    text = (ROOT / "models" / "hydrolek.xml").read_text().replace('body name="link3"', 'body name="forearm"')
+    (tmp_path / "arm.xml").write_text(text.replace('meshdir="../meshes"', f'meshdir="{ROOT / "meshes"}"'))
+    arm = yaml.safe_load((ROOT / "configs" / "hydrolek.yaml").read_text()) | {
+        "model": "arm.xml",
+        "pair": None,
+    }
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(arm))
+    settings = yaml.safe_load((ROOT / "configs" / "fit-mech.yaml").read_text())
+    settings["arm"] = str(tmp_path / "arm.yaml")
+    settings["parameters"]["M_forearm"] = settings["parameters"].pop("M3") | {"link": "forearm"}
+    (tmp_path / "mech.yaml").write_text(yaml.safe_dump(settings))
+    first = hydroid.load_settings(tmp_path / "mech.yaml")
+    write_settings(tmp_path / "mech", first)
+    values = {name.replace("M3", "M_forearm"): value for name, value in VALUES.items()} | {"K": 1.0}
+    estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in values.items()}
+    write_estimate(tmp_path / "mech", FitSummary(stage="mech", estimate=estimate, final="best"))
+    second = hydroid.load_settings("fit-hyd", with_mechanics(tmp_path / "mech", "fit-hyd", {}, ["a.csv"]))
+    assert "M3" not in second.parameters
+    assert second.parameters["M_forearm"].link == "forearm"
+    assert second.parameters["M_forearm"].fixed == VALUES["M3"]

@@ -1,0 +1,146 @@
+"""`view` beyond its window: films, actuators, collisions, two arms."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+
+import hydroid
+from hydroid import load_settings
+from hydroid.errors import LogError, RunError, SettingsError
+from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.log import Log
+from hydroid.settings.arm import Arm
+from hydroid.settings.two_arms import columns_of
+
+ROOT = Path(__file__).parents[2]
+LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
+VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+@pytest.fixture(scope="module")
+def model() -> IdentifiedModel:
+    return identified(load_settings("article-mech", {"start_pose": "study"}), VALUES, "truth")
+
+
+def crossing(arm: Arm) -> Log:
+    """A trajectory in which the azimuth turns 45 deg to the other arm and back; the arm is stretched."""
+    time = 0.01 * np.arange(401)
+    angle = np.tile(arm.pose("home"), (401, 1))
+    angle[:, 0] = np.radians(45) * np.sin(np.pi * time / 4) ** 2
+    return Log("crossing", time, np.zeros((401, 7)), angle, 0.01)
+
+
+def test_an_actuator_is_drawn_with_the_settings_beside_the_estimate(hydroid_cli: Run, tmp_path: Path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "config.yaml").write_text((ROOT / "configs" / "fit-hyd.yaml").read_text())
+    (tmp_path / "run" / "estimate.yaml").write_text("parameters: {A_A: 900, F1: 7.5}\n")
+    done = hydroid_cli("view", "--actuator", 2, "--fit", "run/estimate.yaml", "--out", "out")
+    assert done.out == f"{Path('out') / 'actuator.html'}\n"
+    assert "note: nominal values for" in done.err
+    assert (tmp_path / "out" / "figures" / "actuator.svg").stat().st_size > 0
+    assert (tmp_path / "out" / "figures" / "actuator.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a display")
+def test_without_a_display_the_viewer_says_so_and_names_the_other_way(tmp_path: Path):
+    blind = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "hydroid", "view", "-q"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, env=blind)
+    assert done.returncode == 2
+    assert done.stderr.startswith("hydroid: no window can be opened")
+    assert "hydroid view RUN -o arm.mp4" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_motion_is_written_where_pictures_can_be_rendered(tmp_path: Path):
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join(LOG.read_text().splitlines()[:101]) + "\n")
+    try:
+        hydroid.view(short, out=tmp_path / "a.gif")
+    except RunError as error:
+        if "can be rendered" not in str(error):
+            raise
+        pytest.skip("no OpenGL on this machine")
+    from PIL import Image
+
+    with Image.open(tmp_path / "a.gif") as picture:
+        frames = []
+        for k in range(picture.n_frames):
+            picture.seek(k)
+            frames.append(picture.convert("RGB").tobytes())
+    assert len(frames) == 10
+    assert len(set(frames)) > 5  # it moves
+
+
+def test_one_log_moves_both_arms_as_mirror_images(model: IdentifiedModel, study_log: Log, tmp_path: Path):
+    both = hydroid.simulate(study_log, fit=model, arm="both", out=tmp_path / "both.csv").logs
+    alone = hydroid.simulate(study_log, fit=model, out=None).log
+    for side in ("right", "left"):
+        np.testing.assert_array_equal(both[side].angle, alone.angle)
+    header = (tmp_path / "both.csv").read_text().partition("\n")[0].split(",")
+    assert {"time_s", "right_u2_pct", "left_u2_pct", "left_q7_deg"} <= set(header)
+    again = hydroid.simulate(tmp_path / "both.csv", fit=model, arm="left", out=None).logs
+    assert list(again) == ["left"]
+    np.testing.assert_allclose(again["left"].angle, alone.angle, atol=1e-9)
+
+
+def test_each_arm_has_its_own_columns(model: IdentifiedModel, tmp_path: Path):
+    rows = np.zeros((200, 3))
+    rows[:, 0] = 0.01 * np.arange(200)
+    rows[:100, 1:] = 50.0, -50.0
+    header = "time_s,right_u2_pct,left_u3_pct"
+    np.savetxt(tmp_path / "own.csv", rows, "%.9g", ",", header=header, comments="")
+    both = hydroid.simulate(tmp_path / "own.csv", fit=model, arm="both", out=None).logs
+    assert [np.flatnonzero(log.driven).tolist() for log in both.values()] == [[1], [2]]
+    np.testing.assert_array_equal(both["left"].command[:, 2], rows[:, 2])
+    with pytest.raises(LogError, match="u1_pct"):
+        hydroid.simulate(tmp_path / "own.csv", fit=model, out=None)
+
+
+def test_columns_of_single_joints_are_named_too():
+    changed = load_settings("fit-mech", {"log.joints": {2: {"command": {"column": ["up", "down"]}}, 4: None}})
+    left = columns_of(changed.log, "left")
+    command, angle, none = left.columns("command", 2), left.columns("angle", 3), left.columns("command", 4)
+    assert command is not None
+    assert command.column == ("left_up", "left_down")
+    assert angle is not None
+    assert angle.column == "left_q3_deg"
+    assert none is None
+
+
+def test_an_arm_that_is_none_is_refused(model: IdentifiedModel, study_log: Log):
+    with pytest.raises(SettingsError, match=r"'middle' is no arm of a pair.*right, left or both"):
+        hydroid.simulate(study_log, fit=model, arm="middle", out=None)
+
+
+def test_a_crossing_is_found_and_only_beside_another_arm(arm: Arm):
+    alone, beside, both = (
+        hydroid.view(crossing(arm), collisions=True, config="fit-mech", arm=which).result
+        for which in (None, "right", "both")
+    )
+    assert not alone.meetings
+    assert {beside.meetings[0].first[:5], beside.meetings[0].second[:4]} == {"right", "left"}
+    assert beside.distance == pytest.approx(beside.distance[::-1], abs=1e-6)  # there and back
+    # mirror images meet in the middle, so sooner, and half as far round
+    assert both.meetings[0].begins < beside.meetings[0].begins
+
+
+def test_the_exit_status_says_whether_bodies_meet(arm: Arm, hydroid_cli: Run):
+    log = crossing(arm)
+    degrees = np.column_stack([log.time, np.degrees(log.angle[:, :2])])
+    np.savetxt("a.csv", degrees, "%.9g", ",", header="time_s,q1_deg,q2_deg", comments="")
+    assert json.loads(hydroid_cli("view", "a.csv", "--collisions", "--json").out)["free"] is True
+    beside = ("view", "a.csv", "--collisions", "--arm", "right")
+    met = hydroid_cli(*beside, "--out", "found", code=1)
+    assert "Bodies meet once, first" in " ".join(met.out.split())
+    assert {path.name for path in Path("found").iterdir()} >= {"collisions.html", "tables"}
+    content = json.loads(hydroid_cli(*beside, "--json", code=1).out)
+    assert content["clearance_m"] == -max(each["depth_m"] for each in content["collisions"])
+    Path("b.csv").write_text("time_s,x\n" + "".join(f"{k / 100},0\n" for k in range(200)))
+    assert "lacks 'q1_deg'" in hydroid_cli("view", "b.csv", "--collisions", code=2).err

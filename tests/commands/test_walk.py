@@ -1,0 +1,137 @@
+"""The commands as a user meets them: from logs to fits, errors on other logs, predictions."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from command_line import Run
+
+import hydroid
+
+QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
+GA = ["--algorithm", "ga"]
+VALUES = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+
+
+def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, tmp_path: Path):
+    done = hydroid_cli("fit-mech", short, *GA, "--out", "run", "--json", *QUICK)
+    found = json.loads(done.out)
+    assert set(found["estimate"]) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
+    assert [name for name, p in found["estimate"].items() if p["flag"] == "no effect"] == ["M1"]
+    run = tmp_path / "run"
+    estimate = yaml.safe_load((run / "estimate.yaml").read_text())
+    assert estimate | {"out": "run"} == found
+    for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.tex", "result.npz"):
+        assert (run / name).stat().st_size > 0
+    described = json.loads((run / "run.json").read_text())
+    assert described["status"] == "done"
+    assert set(described["seconds"]) == {"search", "refinement", "uncertainty", "report"}
+    # a refinement that ends at its limit of one step says so
+    assert found["converged"] is False
+    assert "least-squares refinement did not converge: it reached the iteration limit" in done.err
+
+    (row,) = json.loads(hydroid_cli("validate", short, "--fit=run", "--json", "--out=val").out)["results"]
+    assert set(row) >= {"fit", "log", "joint", "mae_deg", "rms_deg", "max_deg", "fit_percent"}
+    assert 0 <= row["inside_percent"] <= 100
+    assert row["rms_deg"] == pytest.approx(found["estimates"]["refined"]["rms_deg"], rel=1e-9)
+
+    done = hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "sim.csv")
+    assert done.out == "sim.csv\n"
+    done = hydroid_cli("validate", "sim.csv", "--fit", "run", "--json", "--out", "val2")
+    assert json.loads(done.out)["results"][0]["max_deg"] < 1e-6  # its own prediction
+    assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
+    assert (run / "responses" / "sim_joint_2.csv").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
+
+
+def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cli: Run):
+    arguments = ["fit-mech", short, *GA, "--runs", 2, "--seed", 5, "--no-refinement", *QUICK[:2]]
+    printed = hydroid_cli(*arguments, "--out", "many").out
+    assert "median" in printed
+    assert {"seed-5", "seed-6", "tables"} <= {p.name for p in Path("many").iterdir()}
+    small = {"search.ga.population": 6, "search.ga.generations": 2}
+    fitted = hydroid.fit_mech(
+        short, algorithm="ga", runs=2, seed=5, refinement=False, set=small, out="python"
+    )
+    own = (Path("many") / "seed-6" / "estimate.yaml").read_bytes()
+    assert (Path("python") / "seed-6" / "estimate.yaml").read_bytes() == own
+    one = fitted.best
+    assert len(repr(one)) < 200
+    assert all(f"<td>{name}</td>" in one._repr_html_() for name in one.summary.values)
+    assert [run["seed"] for run in fitted.plain()["runs"]] == [5, 6]
+
+
+def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_path: Path):
+    values = tmp_path / "values.yaml"
+    values.write_text("{K: 1.5, D: 400, S: 80, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4.0, M6: 4.7}")
+    how = ["--fit", values, "--profile", "S", "--over", "K,D", "--points", 3, "--sensitivity"]
+    done = hydroid_cli("analyse", short, *how, "--set", "objective.noise_deg=0.5", "--out", "told", "--json")
+    found = json.loads(done.out)
+    assert ["M1"] in [f["subjects"] for f in found["findings"] if f["kind"] == "no effect"]
+    rows = found["estimate"]
+    assert set(rows) == {"K", "D", "S", "M1", "M2", "M3", "M4", "M5", "M6"}
+    assert rows["M1"]["flag"] == "no effect"
+    assert rows["M1"]["source"] == "prior only"
+    assert rows["M1"]["data_share"] == 0
+    assert rows["S"]["profile_interval"] is not None
+    assert {row["parameter"] for row in found["sensitivity"]} == set(rows)
+    assert found["surface"][0]["parameters"] == "K, D"
+    for name in ("analysis.html", "tables/parameters.csv", "surface_K_D.csv"):
+        assert (tmp_path / "told" / name).stat().st_size > 0
+
+
+def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path: Path):
+    (tmp_path / "mech.yaml").write_text(yaml.safe_dump(VALUES))
+    arguments = ["fit-hyd", short, "--mech", "mech.yaml", *GA, "--out", "run", "--both-stages", *QUICK]
+    measured = "free_start=false"  # the errors below are those from the measured start
+    found = json.loads(hydroid_cli(*arguments, "--set", measured, "--json").out)
+    assert list(found["estimates"]) == ["best", "refined", "joint"]
+    held = found["estimates"]["refined"]["values"]
+    assert all(held[name] == value for name, value in VALUES.items() if name != "D")
+    rms = [found["estimates"][name]["rms_deg"] for name in ("best", "refined", "joint")]
+    assert rms == sorted(rms, reverse=True)
+    hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "s.csv", "--trace", "t.csv")
+    header, *rows = (tmp_path / "t.csv").read_text().splitlines()
+    assert header == "time_s,pA2_bar,pB2_bar,qA2_Lmin,qB2_Lmin,spool2_mm,force2_N"
+    assert len(rows) == 1000
+    (row,) = json.loads(hydroid_cli("validate", "s.csv", "--fit", "run", "--json", "--out", "v").out)[
+        "results"
+    ]
+    assert row["max_deg"] < 1e-6
+
+
+def test_check_prints_json_and_says_by_its_status_that_a_log_is_unusable(short: Path, hydroid_cli: Run):
+    Path("broken.csv").write_text("time_s,u1_pct\n0,1\n0.01,x\n")
+    good, bad = json.loads(hydroid_cli("check", short, "broken.csv", "--json", code=2).out)["logs"]
+    assert (good["usable"], good["driven_joints"]) == (True, [2])
+    assert not bad["usable"]
+    assert {finding["level"] for finding in bad["findings"]} >= {"error"}
+
+
+@pytest.mark.slow
+def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, hydroid_cli: Run, tmp_path: Path):
+    arguments = ["fit-mech", short, *GA, "--no-refinement", "--quiet", "--set", "search.ga.generations=60"]
+    hydroid_cli(*arguments, "--out", "whole")
+    command = [sys.executable, "-m", "hydroid", *map(str, arguments), "--out", "parts"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "parts" / "run.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130, errors
+    assert "--resume" in errors
+    assert json.loads((tmp_path / "parts" / "run.json").read_text())["status"] == "interrupted"
+    hydroid_cli(*arguments, "--out", "parts", code=2)  # not twice by mistake
+    other = hydroid_cli("fit-hyd", "--resume", "--out", "parts", code=2)
+    assert "is a run of fit-mech, not of fit-hyd" in other.err
+    hydroid_cli("fit-mech", "--resume", "--out", "parts", "--quiet")
+    for name in ("history.csv", "estimate.yaml", "pareto.csv", "tables/parameters.csv"):
+        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

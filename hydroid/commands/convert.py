@@ -108,7 +108,7 @@ def convert(
     settings = None if config is None else load_settings(config, changes)
     layout = LogSettings() if settings is None else settings.log
     table = open_table(path, layout)
-    if settings is None or (layout == LogSettings() and layout.time.column not in table.names):
+    if settings is None or (_is_default(layout) and layout.time.column not in table.names):
         joints = None if settings is None else settings.arm.joint_names
         guess, layout = _guessed(table, joints, {} if settings else changes)
     if settings is None:
@@ -118,6 +118,15 @@ def convert(
     read, findings = read_log(path, layout, ranges, repair=repair)
     write_log(target, read, _plain_layout(read), exact=True)
     return Conversion(replace(read, source=str(out)), findings, guess)
+
+
+def _is_default(layout: LogSettings) -> bool:
+    """Whether settings name the columns that they have without a section `log`."""
+    columns = [
+        [own.columns(kind, joint) for kind in ("command", "angle") for joint in range(1, MOST_JOINTS + 1)]
+        for own in (layout, LogSettings())
+    ]
+    return layout.time == LogSettings().time and columns[0] == columns[1]
 
 
 def _guessed(

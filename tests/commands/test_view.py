@@ -110,7 +110,7 @@ def test_columns_of_single_joints_are_named_too():
     assert command is not None
     assert command.column == ("left_up", "left_down")
     assert angle is not None
-    assert angle.column == "left_q3_deg"
+    assert angle.column == ("left_q3_deg",)
     assert none is None
 
 

@@ -10,7 +10,6 @@ import yaml
 from hydroid.assets import find_config
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
 from hydroid.files import is_file, write_atomic
-from hydroid.mjcf import copy_models
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
@@ -122,6 +121,8 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     Raises:
         RunError: the folder cannot be written, or a mesh cannot be read.
     """
+    from hydroid.mjcf import copy_models  # imports MuJoCo
+
     file = settings.arm.file
     models = {MODEL: file.model} | ({PAIR: file.pair} if file.pair else {})
     copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)

@@ -155,17 +155,18 @@ def linkages(
         one["kind"] = ROTARY
         if isinstance(actuator, LinearActuator):
             one["kind"], one["stroke"] = LINEAR, 1e-3 * actuator.stroke
-            own = actuator.a, actuator.b, math.radians(actuator.theta0)
+            sides, bars = actuator.triangle, actuator.settings.four_bar
+            own = sides.a, sides.b, math.radians(sides.theta0)
             if parameters is not None:
                 p = parameters[:, place]
                 own = p["pivot_distance_1"], p["pivot_distance_2"], p["pivot_angle"]
             one["a"], one["b"], one["theta0"] = own[0], own[1], actuator.sense * own[2]
             ends = np.radians(arm.joints[j].range)
             retracted = float(ends[int(np.argmin(actuator.length(ends)))])
-            if actuator.four_bar is not None:
+            if bars is not None:
                 for name in BARS:
-                    one[name] = getattr(actuator.four_bar, name)
-                retracted = four_bar(retracted, actuator.four_bar)[0]
+                    one[name] = getattr(bars, name)
+                retracted = four_bar(retracted, bars)[0]
             one["shortest"] = triangle(retracted, one["a"], one["b"], one["theta0"])[0]
     return table.view(np.recarray)
 

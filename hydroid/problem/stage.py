@@ -59,7 +59,7 @@ class Stage:
         """
         if self._hydraulics is not None:
             for joint in sorted({*np.flatnonzero(driven).tolist(), *outputs}):
-                if joint < len(self._arm.joints) and self._arm.joints[joint].actuator is None:
+                if joint < len(self._arm.joints) and self._arm.actuators[joint] is None:
                     raise without_actuator(self._arm, joint)
             return
         for quantity in ("gain", "damping"):

@@ -4,10 +4,10 @@ The MJCF has links, joints, ranges, masses and meshes; its keyframes are the nam
 actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,12 @@ from pydantic import AfterValidator, Field, Strict, ValidationInfo, model_valida
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
+from hydroid.settings.arm_outline import Outline, read_outline
 from hydroid.settings.linkage import Cylinder, LinearActuator, RotaryActuator
 from hydroid.settings.load import Settings, load
+
+if TYPE_CHECKING:
+    from hydroid.settings.arm_model import ArmModel
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -72,24 +76,22 @@ class Joint:
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm as its MJCF and its YAML file describe it.
+    """An arm as its MJCF and its YAML file describe it; the MJCF is compiled when that is first needed.
 
     Attributes:
         file: the YAML's settings.
-        name: of the model.
-        joints: in the order of the model, J of them.
-        link_names: bodies that move and have mass, L of them: those of the joints in their order, then parts
-            that are fixed to them.
-        link_masses: of these [kg].
-        poses: angle of each joint by the pose's name [rad].
+        outline: names and ranges of the model.
+        where: begins messages about the settings.
     """
 
     file: ArmFile
-    name: str
-    joints: tuple[Joint, ...]
-    link_names: tuple[str, ...]
-    link_masses: tuple[float, ...]
-    poses: dict[str, tuple[float, ...]]
+    outline: Outline
+    where: str = field(default="the arm's file", compare=False)
+
+    @property
+    def name(self) -> str:
+        """Of the model."""
+        return self.outline.name
 
     @property
     def model(self) -> Path:
@@ -108,23 +110,54 @@ class Arm:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joint names, (J,), from the base outwards."""
-        return tuple(joint.name for joint in self.joints)
+        """Joint names, (J,), in the order of the model."""
+        return self.outline.joint_names
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Bodies that move and have mass, (L,)."""
+        return self.outline.link_names
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float] | None, ...]:
+        """Of the joints [deg], (J,); None: no stops."""
+        return self.outline.ranges
+
+    @property
+    def actuators(self) -> tuple[Cylinder | RotaryActuator | None, ...]:
+        """Settings of what turns the joints, (J,)."""
+        return tuple(self.file.actuators.get(name) for name in self.joint_names)
+
+    @cached_property
+    def _compiled(self) -> "ArmModel":
+        from hydroid.settings.arm_model import read_model  # imports MuJoCo
+
+        return read_model(self)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """With their actuators, J of them."""
+        return self._compiled.joints
 
     @property
     def masses(self) -> NDArray[np.float64]:
-        """Nominal masses [kg], shape (L,)."""
-        return np.array(self.link_masses)
+        """Nominal masses of the links [kg], shape (L,)."""
+        return np.array(self._compiled.masses)
+
+    @property
+    def poses(self) -> dict[str, tuple[float, ...]]:
+        """Angle of each joint by the pose's name [rad]."""
+        return self._compiled.poses
 
     @property
     def lower(self) -> NDArray[np.float64]:
         """Lower joint stops [rad], shape (J,); -inf where there is none."""
-        return np.array([-np.inf if j.continuous else math.radians(j.range[0]) for j in self.joints])
+        return np.radians([-np.inf if limits is None else limits[0] for limits in self.ranges])
 
     @property
     def upper(self) -> NDArray[np.float64]:
         """Upper joint stops [rad], shape (J,); inf where there is none."""
-        return np.array([np.inf if j.continuous else math.radians(j.range[1]) for j in self.joints])
+        return np.radians([np.inf if limits is None else limits[1] for limits in self.ranges])
 
     def pose(self, name: str) -> NDArray[np.float64]:
         """Return a named pose [rad], shape (J,).
@@ -138,13 +171,23 @@ class Arm:
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML, found as `find_config` does, and its MJCF.
+    """Read an arm's YAML, found as `find_config` does, and names in its MJCF.
 
     Raises:
-        SettingsError: no such file, a setting that is not allowed, or one that the model contradicts.
-        ModelError: an MJCF that hydroid cannot simulate.
+        SettingsError: no such file, a setting that is not allowed, or a name that the model lacks.
+        ModelError: no MJCF.
     """
-    from hydroid.settings.arm_model import make_arm  # imports MuJoCo
-
     path = find_config(name, beside, kind="arm")
     return make_arm(load(path, ArmFile), str(path))
+
+
+def make_arm(file: ArmFile, where: str) -> Arm:
+    """Return the arm of an arm file's settings; `where` begins messages about them."""
+    arm = Arm(file, read_outline(file.model), where)
+    for name in file.actuators:
+        if name not in arm.joint_names:
+            hint = f"the model's joints: {', '.join(arm.joint_names)}"
+            raise SettingsError(f"actuators.{name}: no such joint", where=where, hint=hint)
+    if file.payload is not None and file.payload not in arm.outline.sites:
+        raise SettingsError(f"payload: the model has no site {file.payload!r}", where=where)
+    return arm

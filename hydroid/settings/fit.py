@@ -13,10 +13,11 @@ from pydantic import (
     model_validator,
 )
 
-from hydroid.parameters import ParameterSet
-from hydroid.settings.arm import Arm, ArmFile, load_arm
+from hydroid.errors import SettingsError
+from hydroid.parameters import Parameter, ParameterSet
+from hydroid.settings.arm import Arm, ArmFile, load_arm, make_arm
 from hydroid.settings.experiment import DesignSettings
-from hydroid.settings.hydraulics import TARGETS, HydraulicSettings
+from hydroid.settings.hydraulics import OF_THE_PIVOTS, TARGETS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, parameter, prior
@@ -32,8 +33,6 @@ def _read_arm(value: Any, info: ValidationInfo) -> Any:
         return load_arm(value, folder)
     if not isinstance(value, dict):
         return value
-    from hydroid.settings.arm_model import make_arm  # imports MuJoCo
-
     return make_arm(validate(value, ArmFile, "arm", folder=folder), "arm")
 
 
@@ -110,6 +109,8 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
+            if own.quantity in ("mass", *OF_THE_PIVOTS):
+                continue  # their nominal values need the compiled model: `parameter_set` looks at them
             try:
                 prior(self, own)
             except ValueError as error:
@@ -117,10 +118,19 @@ class FitSettings(Settings):
         return self
 
     def parameter_set(self) -> ParameterSet:
-        """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
+        """Return the parameters with units, bounds, priors and fixed values, in the order of theta.
+
+        Raises:
+            SettingsError: a prior of a mass or a pivot that its nominal value contradicts.
+        """
         starts = any(p.states_start for p in self.parameters.values() if p.fixed is None)
-        log = self.scale == "log"
-        return ParameterSet(tuple(parameter(self, n, p, log, starts) for n, p in self.parameters.items()))
+        found: list[Parameter] = []
+        for name, own in self.parameters.items():
+            try:
+                found.append(parameter(self, name, own, self.scale == "log", starts))
+            except ValueError as error:
+                raise SettingsError(f"parameters.{name}: {error}") from None
+        return ParameterSet(tuple(found))
 
     def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
         """Return the settings with parameters changed, or further ones behind their own."""

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from hydroid.settings.linkage import LinearActuator, RotaryActuator
+from hydroid.settings.linkage import Cylinder, LinearActuator, RotaryActuator
 from hydroid.settings.load import NotNegative, Positive, Settings
 
 SI_FACTORS = {
@@ -235,6 +235,8 @@ def _quantities() -> dict[str, Quantity]:
 QUANTITIES = _quantities()
 """the quantities by name; the kernel's arrays use these names"""
 
+OF_THE_PIVOTS = ("pivot_distance_1", "pivot_distance_2", "pivot_angle")
+"""quantities whose nominal values are the model's"""
 OF_THE_PUMP = tuple(name for name in QUANTITIES if name.startswith("pump_") or name == "line_volume")
 """quantities that all actuators share, since they have one pump"""
 
@@ -245,23 +247,26 @@ TARGETS = {name: (name,) for name in QUANTITIES} | {
 
 
 def actuator_values(
-    actuator: LinearActuator | RotaryActuator | None, settings: HydraulicSettings
+    actuator: LinearActuator | Cylinder | RotaryActuator | None, settings: HydraulicSettings
 ) -> dict[str, float | None]:
     """Return the value of every quantity of one actuator, in the units of QUANTITIES; None: no limit.
 
-    A joint without an actuator has sizes of 1, which nothing uses: it is never driven in stage 2.
+    A joint without an actuator has sizes of 1, which nothing uses: it is never driven in stage 2. Of a
+    cylinder's settings alone the pivots are not known, and 0.
     """
     values: dict[str, float | None] = settings.model_dump()
-    values["pivot_distance_1"] = values["pivot_distance_2"] = values["pivot_angle"] = 0.0
-    if actuator is None:
-        sizes = dict.fromkeys(("opening_a", "opening_b", "area_a", "area_b"), 1.0)
-        return {name: (values | sizes)[name] for name in QUANTITIES}
-    values["opening_a"] = values["opening_b"] = actuator.max_opening
+    values |= dict.fromkeys(OF_THE_PIVOTS, 0.0)
     if isinstance(actuator, LinearActuator):
-        values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
-        values["pivot_distance_1"], values["pivot_distance_2"] = actuator.a, actuator.b
-        values["pivot_angle"] = actuator.theta0
-    else:
-        values["area_a"] = values["area_b"] = actuator.displacement
-        values["dead_volume"] = settings.rotary_volume
+        sides, actuator = actuator.triangle, actuator.settings
+        values |= zip(OF_THE_PIVOTS, (sides.a, sides.b, sides.theta0), strict=True)
+    match actuator:
+        case None:
+            sizes = 1.0, 1.0, 1.0
+        case Cylinder():
+            sizes = actuator.area_a, actuator.area_b, actuator.max_opening
+        case RotaryActuator():
+            sizes = actuator.displacement, actuator.displacement, actuator.max_opening
+            values["dead_volume"] = settings.rotary_volume
+    values["area_a"], values["area_b"], values["opening_a"] = sizes
+    values["opening_b"] = values["opening_a"]
     return {name: values[name] for name in QUANTITIES}

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.settings.arm_outline import DIGITS
 from hydroid.settings.load import Positive, Settings
 
 Vector = tuple[float, float, float]
@@ -23,8 +24,6 @@ PIVOT_SKEW = 0.1
 and errs by half the square of it"""
 STROKE_TOLERANCE = 0.02
 """part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
-DIGITS = 9
-"""of lengths in m and angles in deg that are read off a model: what is finer is its rounding"""
 
 
 def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:
@@ -153,31 +152,22 @@ class LinearActuator:
     """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
 
     Attributes:
-        a, b: distances of its pivots from the axis, the longer one first [m].
-        theta0: angle between them at angle 0 [deg].
-        extends: direction in which the joint turns when the rod runs out.
+        settings: areas, valve opening and linkage.
+        triangle: of its pivots, `a` at least `b`.
         stroke: of the rod [mm].
-        area_a, area_b, max_opening: as the settings have them [mm²].
-        four_bar: linkage between cylinder and joint.
         pivots: on the parent and on the moved link, in their frames [m]; None where only distances are given.
     """
 
     kind: ClassVar[str] = "linear"
-    a: float
-    b: float
-    theta0: float
-    extends: Literal["positive", "negative"]
+    settings: Cylinder
+    triangle: Triangle
     stroke: float
-    area_a: float
-    area_b: float
-    max_opening: float
-    four_bar: FourBar | None = None
     pivots: tuple[Vector, Vector] | None = None
 
     @property
     def sense(self) -> float:
         """1 if the rod runs out towards positive angles, else -1."""
-        return 1.0 if self.extends == "positive" else -1.0
+        return 1.0 if self.triangle.extends == "positive" else -1.0
 
     def length(self, angle: Any) -> Any:
         """Distance between the pivots [m] at joint angles [rad] of any shape."""
@@ -188,11 +178,9 @@ class LinearActuator:
         return self._cylinder(angle)[1]
 
     def _cylinder(self, angle: Any) -> tuple[Any, Any]:
-        theta0 = self.sense * math.radians(self.theta0)
-        if self.four_bar is None:
-            return triangle(angle, self.a, self.b, theta0)[:2]
-        psi, first, _ = four_bar(angle, self.four_bar)
-        length, arm, _ = triangle(psi, self.a, self.b, theta0)
+        sides, bars = self.triangle, self.settings.four_bar
+        psi, first, _ = (angle, 1.0, 0.0) if bars is None else four_bar(angle, bars)
+        length, arm, _ = triangle(psi, sides.a, sides.b, self.sense * math.radians(sides.theta0))
         return length, arm * first
 
 
@@ -204,11 +192,8 @@ def make_cylinder(
     Raises:
         ValueError: a dead centre in the range, a linkage that does not reach, or a stroke that is too short.
     """
-    sizes = settings.area_a, settings.area_b, settings.max_opening
-    far, near = max(found.a, found.b), min(found.a, found.b)
-    cylinder = LinearActuator(
-        far, near, found.theta0, found.extends, 0.0, *sizes, four_bar=settings.four_bar, pivots=pivots
-    )
+    sides = found.model_copy(update={"a": max(found.a, found.b), "b": min(found.a, found.b)})
+    cylinder = LinearActuator(settings, sides, 0.0, pivots)
     angles = np.radians(np.linspace(*limits, 181))
     with np.errstate(all="ignore"):
         arm = np.asarray(cylinder.moment_arm(angles))

@@ -8,7 +8,7 @@ from annotated_types import Gt
 
 from hydroid.parameters import Parameter, Prior
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import TARGETS, HydraulicSettings, actuator_values
+from hydroid.settings.hydraulics import OF_THE_PIVOTS, TARGETS, HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
 
@@ -87,11 +87,15 @@ def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | Non
         return parameter.nominal
     arm = machine.arm
     if parameter.link is not None:
-        return dict(zip(arm.link_names, arm.link_masses, strict=True)).get(parameter.link)
+        return dict(zip(arm.link_names, arm.masses.tolist(), strict=True)).get(parameter.link)
     if parameter.quantity not in TARGETS:
         return None
-    joints = parameter.joints or range(1, len(arm.joints) + 1)
-    actuators = [arm.joints[j - 1].actuator for j in joints if j <= len(arm.joints)]
+    among = arm.actuators
+    if parameter.quantity in OF_THE_PIVOTS:
+        among = tuple(joint.actuator for joint in arm.joints)
+    actuators = (
+        among if parameter.joints is None else [among[j - 1] for j in parameter.joints if j <= len(among)]
+    )
     tables = [actuator_values(a, machine.hydraulics) for a in actuators if a is not None]
     values = {table[side] for table in tables for side in TARGETS[parameter.quantity]}
     return values.pop() if len(values) == 1 else None
@@ -138,8 +142,8 @@ def parameter(machine: Machine, name: str, own: ParameterSettings, log: bool, st
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
     """The unit of a parameter; areas and dry friction of rotary actuators have their own."""
-    joints = [arm.joints[j - 1] for j in own.joints or () if j <= len(arm.joints)]
-    rotary = bool(joints) and all(isinstance(joint.actuator, RotaryActuator) for joint in joints)
+    actuators = [arm.actuators[j - 1] for j in own.joints or () if j <= len(arm.joint_names)]
+    rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
     return ROTARY_UNITS[own.unit] if rotary and sized else own.unit
 

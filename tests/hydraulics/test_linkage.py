@@ -7,20 +7,33 @@ import pytest
 from hydraulic_arm import lone_wheel
 from recovery import assert_recovered, duties, recover, settings_of
 
+from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.records import linkages, nominal_parameters, with_values
-from hydroid.settings.arm import Arm, Joint
+from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.linkage import Cylinder, four_bar, make_cylinder
+from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
 SETTINGS = HydraulicSettings()
 SHOULDER = 1
 
 
-def mirrored(joint: Joint) -> Joint:
-    """The same joint with its angle counted the other way round: its cylinder extends to negative angles."""
-    low, high = joint.range
-    return replace(joint, range=(-high, -low), actuator=replace(joint.actuator, extends="negative"))
+def with_cylinder(arm: Arm, **changes) -> Arm:
+    """The arm with other settings of the shoulder's cylinder; its triangle is given, not its pivots."""
+    joint = arm.joints[SHOULDER]
+    cylinder = joint.actuator
+    changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
+    actuators = arm.file.actuators | {joint.name: cylinder.settings.model_copy(update=changes)}
+    return replace(arm, file=arm.file.model_copy(update={"actuators": actuators}))
+
+
+def mirrored(arm: Arm) -> Arm:
+    """The same with the shoulder's angle counted the other way: its cylinder extends to negative angles."""
+    low, high = arm.ranges[SHOULDER]
+    triangle = arm.joints[SHOULDER].actuator.triangle.model_copy(update={"extends": "negative"})
+    turned = with_cylinder(arm, triangle=triangle)
+    ranges = (*arm.ranges[:SHOULDER], (-high, -low), *arm.ranges[SHOULDER + 1 :])
+    return replace(turned, outline=replace(arm.outline, ranges=ranges))
 
 
 def motion(arm: Arm, command: np.ndarray, start: float) -> np.ndarray:
@@ -32,9 +45,7 @@ def motion(arm: Arm, command: np.ndarray, start: float) -> np.ndarray:
 
 
 def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm):
-    joints = list(arm.joints)
-    joints[SHOULDER] = mirrored(joints[SHOULDER])
-    other = replace(arm, joints=tuple(joints))
+    other = mirrored(arm)
     command = np.repeat([60.0, -80.0, 40.0, 0.0, 100.0], 60)
     here, there = motion(arm, command, 0.3), motion(other, command, -0.3)
     assert np.ptp(here) > 0.2
@@ -55,19 +66,15 @@ BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_de
 """a bucket's linkage; ours"""
 
 
-def bucket(joint: Joint, **bars: float) -> Joint:
+def bucket(arm: Arm, **bars: float) -> Arm:
     """The shoulder moved by a four-bar linkage."""
-    triangle = {"a": 0.8, "b": 0.45, "theta0": 10.0}
-    settings = {"kind": "linear", "triangle": triangle, "four_bar": BARS | bars, "stroke": 560.0}
-    settings |= {name: getattr(joint.actuator, name) for name in ("area_a", "area_b", "max_opening")}
-    cylinder = Cylinder.model_validate(settings)
-    assert cylinder.triangle is not None
-    return replace(joint, actuator=make_cylinder(cylinder, cylinder.triangle, joint.range, None))
+    sides = Triangle(a=0.8, b=0.45, theta0=10.0)
+    return with_cylinder(arm, triangle=sides, four_bar=FourBar.model_validate(BARS | bars), stroke=560.0)
 
 
 def test_the_coupler_of_a_four_bar_linkage_keeps_its_length(arm: Arm):
-    actuator = bucket(arm.joints[SHOULDER]).actuator
-    bars = actuator.four_bar
+    actuator = bucket(arm).joints[SHOULDER].actuator
+    bars = actuator.settings.four_bar
     q = np.radians(np.linspace(-30, 90, 25))
     psi, first, second = four_bar(q, bars)
     pin = bars.ground + bars.rocker * np.exp(1j * psi)
@@ -81,11 +88,9 @@ def test_the_coupler_of_a_four_bar_linkage_keeps_its_length(arm: Arm):
 
 
 def test_a_bucket_turns_by_flow_over_area_and_moment_arm(arm: Arm):
-    joints = list(arm.joints)
-    joints[SHOULDER] = bucket(joints[SHOULDER])
-    other = replace(arm, joints=tuple(joints))
+    other = bucket(arm)
     angle = motion(other, np.full(150, 60.0), 0.0)
-    length = joints[SHOULDER].actuator.length(angle)
+    length = other.joints[SHOULDER].actuator.length(angle)
     rod = np.diff(length)[60:] / 0.01
     plain = np.diff(arm.joints[SHOULDER].actuator.length(motion(arm, np.full(150, 60.0), 0.0)))[60:] / 0.01
     # without much load the rod's speed is that of the valve's flow, whatever it moves
@@ -94,8 +99,8 @@ def test_a_bucket_turns_by_flow_over_area_and_moment_arm(arm: Arm):
 
 
 def test_a_linkage_that_does_not_reach_is_refused(arm: Arm):
-    with pytest.raises(ValueError, match="four-bar linkage does not reach all of its range"):
-        bucket(arm.joints[SHOULDER], coupler=0.05)
+    with pytest.raises(SettingsError, match="four-bar linkage does not reach all of its range"):
+        bucket(arm, coupler=0.05).joints  # noqa: B018
 
 
 def test_pivots_are_recovered():

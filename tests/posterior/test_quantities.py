@@ -162,11 +162,15 @@ def test_quantities_are_smooth_in_the_parameters(shoulder):
 
 def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(shoulder):
     one = model()
-    joints = list(one.settings.arm.joints)
-    cylinder = joints[1].actuator
-    turned = replace(cylinder, extends="negative", theta0=180 - cylinder.theta0, area_a=750.0, area_b=1000.0)
-    joints[1] = replace(joints[1], actuator=turned)
-    arm = replace(one.settings.arm, joints=tuple(joints))
+    arm = one.settings.arm
+    cylinder = arm.joints[1].actuator
+    changes = {"extends": "negative", "theta0": 180 - cylinder.triangle.theta0}
+    turned = {
+        "triangle": cylinder.triangle.model_copy(update=changes), "area_a": 750.0, "area_b": 1000.0,
+        "stroke": cylinder.stroke,
+    }  # fmt: skip
+    actuators = arm.file.actuators | {"shoulder": cylinder.settings.model_copy(update=turned)}
+    arm = replace(arm, file=arm.file.model_copy(update={"actuators": actuators}))
     settings = one.settings.model_copy(update={"arm": arm})
     found = measured(*shoulder_bench(replace(one, settings=settings)))
     assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)

@@ -144,8 +144,7 @@ def analyse(
         model = open_model(fit, config, set)
     problem = problem_of(model, logs or run_logs(model), repair=repair)
     from hydroid.posterior import sweep as sweeps
-    from hydroid.report.objectives import surface_page
-    from hydroid.report.sensitivity_report import sensitivity_page
+    from hydroid.report.analysis_report import analysis_page
     from hydroid.report.uncertainty_report import uncertainty_page
 
     grid = points, None if around is None else around / 100
@@ -154,15 +153,7 @@ def analyse(
         theta = study.uncertainty.theta
         sweep = sweeps.sweep(problem, theta, progress) if sensitivity else None
         surfaces = [sweeps.surface(problem, theta, pair, *grid, progress) for pair in pairs]
-    pages = [uncertainty_page(study)]
-    pages += [sensitivity_page(problem, theta, sweep)] if sweep else []
-    pages += [surface_page(surfaces, model.settings.objective)] if surfaces else []
-    page = replace(
-        pages[0],
-        name="analysis",
-        sections=tuple(section for page in pages for section in page.sections),
-        data={name: text for page in pages for name, text in page.data.items()},
-    )
+    page = analysis_page(problem, theta, uncertainty_page(study), sweep, surfaces)
     return AnalyseResult(Analysis(study, sweep, surfaces), page, as_path(out)).write()
 
 

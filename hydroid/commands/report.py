@@ -66,6 +66,9 @@ def report(
         typer.Option(metavar="NAME", help="Leave out a validation of the run; repeat for several."),
         list[str] | None,
     ] = (),
+    figures: Annotated[
+        bool, typer.Option(help="Also write every chart as PNG and SVG, to figures/.")
+    ] = False,
     out: Annotated[
         "Source", typer.Option(metavar="DIR", help="Folder for the page of several."), Path
     ] = "runs/report",
@@ -93,5 +96,5 @@ def report(
         return MergedRuns(collected, spread_page(collected), Path(out)).write()
     from hydroid.report.drawing import draw
 
-    page = str(draw(as_list(runs), out, without or ()))
+    page = str(draw(as_list(runs), out, without or (), figures=figures))
     return Files({"out": page}, (page,))

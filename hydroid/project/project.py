@@ -18,8 +18,8 @@ from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
-from hydroid.report.arm_figure import arm_figure
-from hydroid.report.style import rendered, style
+from hydroid.report.arm_chart import arm_chart
+from hydroid.report.figure import rendered
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
@@ -96,8 +96,8 @@ def write_project(folder: Path, sources: Sources) -> Project:
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
             arm = _write_arm(stage, imported, sources.robot, arm.joint_names, sizes)
-        with style():
-            write_atomic(stage / PICTURE, rendered(arm_figure(arm))[0])
+        title = f"{arm.name}, near to 0: does it look and turn like your arm?"
+        write_atomic(stage / PICTURE, rendered(arm_chart(arm), title)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)

@@ -46,6 +46,10 @@
         fill_alpha: alpha, line_color: mark.look === "dash" ? paint : color("paper"), angle: mark.look === "dash" ? Math.PI / 2 : 0 })];
     else if (mark.kind === "band")
       made = [figure.varea({ x, y1: y, y2: end, fill_color: paint, fill_alpha: alpha })];
+    else if (mark.kind === "area")
+      made = [figure.patch({ x, y, fill_color: paint, fill_alpha: alpha, line_color: null })];
+    else if (mark.kind === "text")
+      made = [figure.text({ x, y, text: mark.texts, text_color: paint, text_font_size: "12px", x_offset: 4, y_offset: -4, angle: Math.PI / 6 })];
     else if (mark.kind === "bars")
       made = [figure.segment({ x0: x, x1: end, y0: y, y1: y, ...line })];
     else {
@@ -75,9 +79,16 @@
     Object.assign(figure, { background_fill_color: null, border_fill_color: null, outline_line_color: null });
   }
 
-  function addPanel(panel, shared, shown, narrow) {
+  function addPanel(panel, shared, shown, width) {
     const xs = panel.x_limits ?? extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
     const x_range = shared ?? new Bokeh.Range1d({ start: xs[0], end: xs[1] });
+    if (panel.equal) { // a unit is as long on both axes
+      const scale = Math.max((xs[1] - xs[0]) / (width - 90), (ys[1] - ys[0]) / (panel.height - 60));
+      for (const [ends, size] of [[xs, width - 90], [ys, panel.height - 60]]) {
+        const room = (scale * size - (ends[1] - ends[0])) / 2;
+        ends[0] -= room; ends[1] += room;
+      }
+    }
     const n = panel.names.length;
     const y_range = new Bokeh.Range1d(n ? { start: n - 0.4, end: -0.6 } : { start: ys[0], end: ys[1] });
     const figure = Bokeh.Plotting.figure({
@@ -92,7 +103,7 @@
       axis.ticker = new Bokeh.FixedTicker({ ticks: panel.names.map((_, i) => i) });
       axis.major_label_overrides = new Map(panel.names.map((name, i) => [i, name]));
     }
-    if (narrow) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
+    if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
     if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
     if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
     axisLook(figure);
@@ -107,10 +118,11 @@
     const cells = host.querySelector(".panels");
     cells.replaceChildren();
     cells.style.setProperty("--columns", chart.columns);
-    const narrow = host.clientWidth < 560;
+    const columns = getComputedStyle(cells).gridTemplateColumns.split(" ").length;
+    const each = host.clientWidth / columns;
     let shared = null;
     const panels = chart.panels.filter((panel) => panel.marks.length).map((panel) => {
-      const one = addPanel(panel, shared, shown, narrow);
+      const one = addPanel(panel, shared, shown, each);
       if (chart.linked) {
         if (!shared) {
           const all = chart.panels.map((p) => p.x_limits ?? extent(p, "x", shown));
@@ -229,8 +241,6 @@
   async function start() {
     document.querySelectorAll("[role=tablist]").forEach(tabs);
     const content = JSON.parse(await unpack("content"));
-    for (const image of document.querySelectorAll("img[data-image]"))
-      image.src = "data:image/svg+xml," + encodeURIComponent(content.images[image.dataset.image]);
     for (const host of document.querySelectorAll("[data-moving]")) moveArm(host, content.moving[host.dataset.moving]);
     charts = content.charts;
     if (charts.length) {

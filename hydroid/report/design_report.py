@@ -9,7 +9,6 @@ from hydroid.advice.design import Design
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
-from hydroid.report import style
 from hydroid.report.chart import Chart, Mark, Panel
 from hydroid.report.page import Light, Page, Plot, Section, Step, Verdict
 from hydroid.report.table import Cell, Table
@@ -23,6 +22,7 @@ _LIMITS = (
     "The limits were checked only in simulation, at the present estimate. The machine moves differently as "
     "far as it differs from the model."
 )
+_UNCHECKED = "Collisions were not checked: design.clearance_m is null."
 _COLLISIONS = (
     "Collisions were checked with the shapes of the model, which knows no hoses, no cylinders and nothing "
     "that stands around the machine."
@@ -31,48 +31,41 @@ _COLLISIONS = (
 
 def safety(settings: DesignSettings) -> str:
     """Return what the limits are worth."""
-    unchecked = "Collisions were not checked: design.clearance_m is null."
-    collisions = unchecked if settings.clearance_m is None else _COLLISIONS
+    collisions = _UNCHECKED if settings.clearance_m is None else _COLLISIONS
     return f"{_LIMITS} {collisions} Watch the first run with a hand on the emergency stop."
 
 
 def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mapping[str, float]) -> Page:
     """Return the page of a designed experiment at parameters by name; its table is `design`."""
-    table = design_table(settings, design, theta)
     margin = np.radians(settings.margin_deg)
     limits = np.column_stack([arm.lower + margin, arm.upper - margin])
-    moving = "Commands and the motion that the present estimate predicts."
-    precise = "Predicted relative standard deviations, assuming ±100 % on each parameter before any log."
-    weakest = f"{100 * design.weakest(design.after)[0]:.2g}"
     known = int(np.sum(design.after.deviations <= WEAK_ABOVE))
+    weakest = f"{100 * design.weakest(design.after)[0]:.2g} %"
     lead = (
         f"The designed experiment determines {known} of {len(design.names)} parameters to "
-        f"{100 * WEAK_ABOVE:.0f} %; the weakest combination to {weakest} %."
+        f"{100 * WEAK_ABOVE:.0f} %; the weakest combination to {weakest}."
     )
-    drawn = f"It is the best of {len(design.random)} random experiments and their variations, in simulation."
+    tried = len(design.random)
+    drawn = f"It is the best of {tried} random experiments and their variations, in simulation."
+    near = f"None within {settings.clearance_m:g} m, with the model's shapes only."
     lights = (
         Light("Range, speed and command", "fair", "Within their limits, in simulation only."),
-        Light("Collisions", "open", "Not checked: design.clearance_m is null.")
+        Light("Collisions", "open", _UNCHECKED)
         if settings.clearance_m is None
-        else Light(
-            "Collisions", "fair", f"None within {settings.clearance_m:g} m, with the model's shapes only."
-        ),
+        else Light("Collisions", "fair", near),
     )
     steps = (
         Step("Run commands.csv on the machine, with a hand on the emergency stop.", safety(settings)),
         Step("Fit again with the new log beside the old ones.", "The table predicts how precise it will be."),
     )
+    moving = "Commands and the motion that the present estimate predicts."
+    precise = "Predicted relative standard deviations, assuming ±100 % on each parameter before any log."
+    motion = Plot("motion", moving, partial(motion_chart, design.predicted, arm.joint_names, limits), True)
+    precision = Plot("precision", precise, partial(precision_chart, design))
     sections = (
         Section("Do next", steps=steps),
-        Section(
-            "Motion",
-            plots=(Plot("motion", moving, partial(motion, design.predicted, arm.joint_names, limits), True),),
-        ),
-        Section(
-            "Precision",
-            tables={"design": table},
-            plots=(Plot("precision", precise, partial(precision, design)),),
-        ),
+        Section("Motion", plots=(motion,)),
+        Section("Precision", tables={"design": design_table(settings, design, theta)}, plots=(precision,)),
     )
     return Page("design", "The next experiment", lead, sections, verdict=Verdict(lead, drawn, lights))
 
@@ -93,11 +86,11 @@ def design_table(settings: DesignSettings, design: Design, theta: Mapping[str, f
 def _design_note(settings: DesignSettings, design: Design) -> str:
     before, _ = design.weakest(design.known)
     weakest, direction = design.weakest(design.after)
-    order = [
-        i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= _SHOWN * np.abs(direction).max()
-    ]
+    order = np.argsort(-np.abs(direction))
+    shares = direction[order] / direction[order[0]]
+    shown = order[np.abs(shares) >= _SHOWN]
     sign = np.sign(direction[order[0]])
-    parts = " ".join(f"{sign * direction[i]:+.2f} {design.names[i]}" for i in order).replace("-", "−")
+    parts = " ".join(f"{sign * direction[i]:+.2f} {design.names[i]}" for i in shown).replace("-", "−")
     total, some = len(design.names), design.directions.shape[1]
     lost = "" if some == total else f" (of the {some} of {total} that random experiments depend on)"
     time = settings.noise_correlation_s
@@ -115,63 +108,38 @@ def _deviations(design: Design) -> tuple[Array, Array, Array]:
     return design.known.deviations, design.random_deviations, design.after.deviations
 
 
-def motion(log: Log, names: tuple[str, ...], limits: Array) -> Chart:
+def motion_chart(log: Log, names: tuple[str, ...], limits: Array) -> Chart:
     """Draw commands and predicted angles of the joints that move.
 
     `limits` are the lowest and highest angle allowed [rad], shape (J, 2); infinite where there is none.
     """
-    panels: list[Panel] = []
+    panels, limit = list[Panel](), "limit (range less margin)"
     for joint in np.flatnonzero(log.driven | (np.ptp(log.angle, axis=0) > 0)).tolist():
-        angle = np.degrees(log.angle[:, joint])
+        angle, ends = np.degrees(log.angle[:, joint]), np.degrees(limits[joint])
         reach = max(0.15 * float(np.ptp(angle)), 1.0)
-        ends = np.degrees(limits[joint])
-        marks = (
-            Mark("line", *style.decimated(log.time, angle), color="orange", label="predicted angle", width=2),
-            Mark(
-                "rule",
-                y=ends[np.isfinite(ends)],
-                color="ink",
-                label="limit (range less margin)",
-                width=1,
-                look="dashed",
-            ),
-        )
         across = float(angle.min()) - reach, float(angle.max()) + reach
-        panels.append(
-            Panel("", "angle [deg]", marks, f"Joint {joint + 1}, {names[joint]}", 190, y_limits=across)
+        marks = (
+            Mark("line", log.time, angle, color="orange", label="predicted angle", width=2),
+            Mark("rule", y=ends[np.isfinite(ends)], color="ink", label=limit, width=1, look="dashed"),
         )
-        command = Mark(
-            "step", *style.decimated(log.time, log.command[:, joint]), color="grey", label="command"
-        )
+        title = f"Joint {joint + 1}, {names[joint]}"
+        panels.append(Panel("", "angle [deg]", marks, title, 190, y_limits=across))
+        command = Mark("step", log.time, log.command[:, joint], color="grey", label="command")
         panels.append(Panel("time [s]", "command [%]", (command,), height=120, y_limits=(-108.0, 108.0)))
     return Chart(tuple(panels), linked=True)
 
 
-def precision(design: Design) -> Chart:
+def precision_chart(design: Design) -> Chart:
     """Draw standard deviations before, after a random (the median) and after the designed experiment."""
     before, random, designed = (100 * values for values in _deviations(design))
-    at = np.arange(len(design.names), dtype=float)
+    at, limit = np.arange(len(design.names), dtype=float), np.array([100 * WEAK_ABOVE])
+    after, identifiable = "after the designed experiment", f"{100 * WEAK_ABOVE:.0f} %: identifiable below"
     marks = (
         Mark("bars", designed, at, random, color="pale", width=4),
         Mark("points", before, at, color="grey", label="before", width=12, look="dash"),
-        Mark("points", random, at, color="blue", label="after a random experiment (median)", width=9),
-        Mark(
-            "points",
-            designed,
-            at,
-            color="orange",
-            label="after the designed experiment",
-            width=9,
-            look="diamond",
-        ),
-        Mark(
-            "rule",
-            np.array([100 * WEAK_ABOVE]),
-            color="ink",
-            label=f"{100 * WEAK_ABOVE:.0f} %: identifiable below",
-            width=1,
-            look="dashed",
-        ),
+        Mark("points", random, at, label="after a random experiment (median)", width=9),
+        Mark("points", designed, at, color="orange", label=after, width=9, look="diamond"),
+        Mark("rule", limit, color="ink", label=identifiable, width=1, look="dashed"),
     )
     title, across = "Predicted precision of each parameter", "predicted relative standard deviation [%]"
     height = 90 + 26 * len(at)

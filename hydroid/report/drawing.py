@@ -5,17 +5,20 @@ from pathlib import Path
 
 from hydroid.report.comparison import comparison_page
 from hydroid.report.fit_report import fit_page
-from hydroid.report.page_file import write_page
+from hydroid.report.page_file import write_figures, write_page
 from hydroid.run.record import load_record
 
 
-def draw(runs: Sequence[str | Path], out: str | Path, without: Collection[str] = ()) -> Path:
+def draw(
+    runs: Sequence[str | Path], out: str | Path, without: Collection[str] = (), *, figures: bool = False
+) -> Path:
     """Draw the report of one run in its folder, or one page in `out` that compares several; return the page.
 
     Args:
         runs: folders of finished runs.
         out: folder for the page of several.
         without: names of validations that are left out.
+        figures: write every chart as PNG and SVG too, to figures/ beside the page.
 
     Raises:
         RunError: a folder holds no finished run of this version, or the page cannot be written.
@@ -26,6 +29,8 @@ def draw(runs: Sequence[str | Path], out: str | Path, without: Collection[str] =
     else:
         folder, page = Path(out), comparison_page(dict(zip(_names(runs), records, strict=True)))
     write_page(page, folder)
+    if figures:
+        write_figures(page, folder / "figures")
     return folder / f"{page.name}.html"
 
 

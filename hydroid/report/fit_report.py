@@ -21,7 +21,7 @@ from hydroid.posterior.posterior import stored_posterior
 from hydroid.problem.stage import Stage
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
 from hydroid.report.objectives import learning, pareto
-from hydroid.report.page import PAGE, Light, Page, Plot, Section, Step, Tab, Verdict, log_names
+from hydroid.report.page import Light, Page, Plot, Section, Step, Tab, Verdict, log_names
 from hydroid.report.parameters_report import parameter_section
 from hydroid.report.phrases import ALGORITHMS, norm_label, prior_phrase
 from hydroid.report.predictions import motion, prediction_section, response_data
@@ -185,7 +185,7 @@ def _actuators(record: Record) -> tuple[Section, ...]:
                 return joint_records(arm, stage.candidates(values), joint)
 
             actuator = replace(actuator, known=KnownActuator(known, records))
-        plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}", where=PAGE)
+        plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}")
         tabs.append(Tab(actuator.title, (plot,)))
     return (Section("The actuator", tabs=tuple(tabs)),) if tabs else ()
 
@@ -206,7 +206,7 @@ def _search(record: Record) -> Section:
         effort = f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}"
         facts.append((f"least squares: {one.name}", effort))
     caption = "Best candidate so far, and the median of each population."
-    plot = Plot("learning", caption, partial(learning, result.history, objective), where=PAGE)
+    plot = Plot("learning", caption, partial(learning, result.history, objective))
     return Section("How the search went", facts=tuple(facts), plots=(plot,))
 
 
@@ -216,7 +216,7 @@ def _front(record: Record) -> Section:
     segments = {name: result.segments[name] for name in order}
     draw = partial(pareto, result.front[1], segments, record.settings.objective)
     caption = "Each grey line is one candidate of the Pareto set. A lower line fits that segment better."
-    return Section("Pareto set", plots=(Plot("pareto", caption, draw, where=PAGE),))
+    return Section("Pareto set", plots=(Plot("pareto", caption, draw),))
 
 
 def _facts(record: Record) -> tuple[tuple[str, str], ...]:

@@ -4,34 +4,33 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import Any, Protocol
 
 from hydroid.log import Log
-from hydroid.report.chart import Chart
-from hydroid.report.moving_arm import MovingArm
 from hydroid.report.table import Table
 
-PAGE, FILE = frozenset({"page"}), frozenset({"file"})
-"""where a figure is shown"""
-Drawing = Figure | Chart | MovingArm
 _LONGEST_NAME = 40
+
+
+class Drawing(Protocol):
+    """A `Chart` or a `MovingArm`."""
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        ...
 
 
 @dataclass(frozen=True)
 class Plot:
     """A figure: the name of its files, what it shows in words, and the function that draws it.
 
-    A `Chart` is drawn by the page, with buttons to zoom it if `zoom`. A `MovingArm` is drawn there only. A
-    matplotlib figure is an image there. `where` says where it is shown: in the page, as a file, or both.
+    The page draws it, a chart with buttons to zoom it if `zoom`; `write_figures` makes files of charts.
     """
 
     name: str
     caption: str
     draw: Callable[[], Drawing]
     zoom: bool = False
-    where: frozenset[str] = PAGE | FILE
 
 
 @dataclass(frozen=True)
@@ -121,12 +120,11 @@ class Light:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer in a sentence on the prediction and one on the parameters, lights, and a picture (SVG)."""
+    """The answer in a sentence on the prediction and one on the parameters, and lights."""
 
     prediction: str
     parameters: str = ""
     lights: tuple[Light, ...] = ()
-    picture: str = ""
 
 
 @dataclass(frozen=True)

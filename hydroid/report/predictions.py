@@ -11,11 +11,9 @@ import numpy as np
 from hydroid.files import file_name
 from hydroid.fitting.validation import ErrorIndices, Prediction, pooled_indices
 from hydroid.parameters import Array
-from hydroid.report import style
-from hydroid.report.chart import SERIES, Chart, Mark, Panel
-from hydroid.report.motion_report import motion_section
-from hydroid.report.moving_arm import Movement
-from hydroid.report.page import PAGE, Plot, Section, Tab, log_names, short_name, unique
+from hydroid.report.chart import SERIES, Chart, Mark, Panel, finite
+from hydroid.report.moving_arm import Movement, motion_section
+from hydroid.report.page import Plot, Section, Tab, log_names, short_name, unique
 from hydroid.report.table import Cell, Table, numbers_csv
 from hydroid.settings.arm import Arm
 from hydroid.words import number
@@ -117,7 +115,6 @@ def prediction_section(predictions: Sequence[Prediction], arm: Arm) -> Section:
             f"{one.name} in {one.log}. {_CAPTION}",
             partial(draw, one, bins),
             True,
-            PAGE,
         )
         logs.setdefault(one.log, []).append(plot)
     tabs = tuple(Tab(log, tuple(plots), notes[log]) for log, plots in logs.items())
@@ -177,28 +174,27 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
     """Draw the measured angle of one joint, every model's response and residual, command and pressures."""
     log, measured = response.of.log, np.degrees(response.measured)
     time = log.time
-    upper = [_curve(time, measured, bins, color="ink", label="measured", width=5, alpha=0.35)]
+    upper = [_curve(time, measured, color="ink", label="measured", width=5, alpha=0.35)]
     middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
     reach = _RUNAWAY * max(float(np.ptp(measured)), _LEAST_RANGE)
     low, high = float(measured.min()) - reach, float(measured.max()) + reach
     colors = SERIES * (1 + len(response.simulated))
     for color, (name, angle) in zip(colors, response.simulated.items(), strict=False):
-        simulated = np.degrees(style.finite(angle))
+        simulated = np.degrees(finite(angle))
         residual = measured - simulated
         rms = float(np.sqrt(np.mean(residual**2)))
         off = name != next(iter(response.simulated))
         label = f"{name} ({number(rms)}° rms)" if np.isfinite(rms) else f"{name} (diverged)"
         look = {"color": color, "label": label, "off": off}
         # a response that runs away must not flatten the others
-        upper.append(_curve(time, _within(simulated, low, high), bins, width=1.6, **look))
-        middle.append(_curve(time, _within(residual, -reach, reach), bins, width=1, **look))
+        upper.append(_curve(time, _within(simulated, low, high), width=1.6, **look))
+        middle.append(_curve(time, _within(residual, -reach, reach), width=1, **look))
         if name in response.bands:
             # a band that the parameters leave open must not flatten the residual either
             widest = _WIDEST * float(np.nanmax(np.abs(residual), initial=_LEAST_RESIDUAL))
             half = np.degrees(np.fmin(response.bands[name], np.radians(widest)))
-            at, edge = style.decimated(time, half, bins)
             band = {"color": color, "label": f"95 % band of {name}", "alpha": 0.18, "off": off}
-            middle.insert(0, Mark("band", at, -edge, edge, **band))  # pyright: ignore[reportArgumentType]
+            middle.insert(0, Mark("band", time, -half, half, **band))  # pyright: ignore[reportArgumentType]
     panels = [
         Panel("", "angle [deg]", tuple(upper), f"{response.name} in {response.log}", 280),
         Panel("", "residual [deg]", tuple(middle), height=190),
@@ -206,16 +202,16 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
     pressure = None if log.pressure is None else log.pressure[:, response.joint - 1]
     if pressure is not None and np.isfinite(pressure).any():
         chambers = zip(("chamber A", "chamber B"), ("green", "pink"), 1e-5 * pressure.T, strict=True)
-        marks = tuple(_curve(time, p, bins, color=color, label=name) for name, color, p in chambers)
+        marks = tuple(_curve(time, p, color=color, label=name) for name, color, p in chambers)
         panels.append(Panel("", "pressure [bar]", marks, height=150))
-    command = Mark("step", *style.decimated(time, log.command[:, response.joint - 1], bins), color="grey")
+    command = Mark("step", time, log.command[:, response.joint - 1], color="grey")
     panels.append(Panel("time [s]", "command [%]", (command,), height=140, y_limits=(-108, 108)))
-    return Chart(tuple(panels), linked=True)
+    return Chart(tuple(panels), linked=True, bins=bins)
 
 
 def _within(values: Array, low: float, high: float) -> Array:
     return np.where((values > low) & (values < high), values, np.nan)
 
 
-def _curve(time: Array, values: Array, bins: int, **look: object) -> Mark:
-    return Mark("line", *style.decimated(time, values, bins), **look)  # pyright: ignore[reportArgumentType]
+def _curve(time: Array, values: Array, **look: object) -> Mark:
+    return Mark("line", time, values, **look)  # pyright: ignore[reportArgumentType]

@@ -9,9 +9,8 @@ import numpy as np
 from hydroid.advice.proposals import UNITS
 from hydroid.advice.residuals import Binned, Regressor, ResidualCheck
 from hydroid.parameters import Array
-from hydroid.report import style
 from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.page import PAGE, Plot, Tab
+from hydroid.report.page import Plot, Tab
 
 _HEIGHT = 190
 _BINS = 300
@@ -24,7 +23,7 @@ _CAPTION = (
 def residual_tabs(checks: Sequence[ResidualCheck], places: Sequence[str]) -> tuple[Tab, ...]:
     """Return a tab for each residual; `places` names joint and log of each."""
     return tuple(
-        Tab(place, (Plot(f"residual_{i + 1}", _CAPTION, partial(residual_panels, check), where=PAGE),))
+        Tab(place, (Plot(f"residual_{i + 1}", _CAPTION, partial(residual_panels, check)),))
         for i, (check, place) in enumerate(zip(checks, places, strict=True))
     )
 
@@ -33,13 +32,11 @@ def residual_panels(check: ResidualCheck) -> Chart:
     """Draw a residual over time, angle, velocity and command, and its autocorrelation."""
     regressed = (_over(what, check.binned[what]) for what in Regressor if what in check.binned)
     period = float(check.time[1] - check.time[0])
-    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3)
+    return Chart((_over_time(check), *regressed, _correlation(check, period)), columns=3, bins=_BINS)
 
 
 def _over_time(check: ResidualCheck) -> Panel:
-    line = Mark(
-        "line", *style.decimated(check.time, np.degrees(check.residual), _BINS), color="orange", width=1.2
-    )
+    line = Mark("line", check.time, np.degrees(check.residual), color="orange", width=1.2)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], check.at_stop, [False]]).astype(int)))
     starts, ends = edges[::2], np.minimum(edges[1::2], len(check.time) - 1)
     stops = Mark(

@@ -14,7 +14,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.progress import Progress, no_progress
 from hydroid.viewer.motion import Motion
 from hydroid.viewer.opengl import make_renderer
-from hydroid.viewer.panel import Panel
+from hydroid.viewer.panel import SignalPanel
 
 Picture = NDArray[np.uint8]
 Direction = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Stage:
         self._data = mujoco.MjData(self._model), mujoco.MjData(self._model)
         self._camera = _camera(motion, wide / height)
         self._seen = mujoco.MjvOption(), mujoco.MjvPerturb()
-        self._panel = Panel(motion, (width - wide, height), height / 1080) if wide < width else None
+        self._panel = SignalPanel(motion, (width - wide, height), height / 1080) if wide < width else None
 
     def __enter__(self) -> "Stage":
         return self

@@ -2,31 +2,26 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hydroid.parameters import Array
-from hydroid.report import style
+from hydroid.report.chart import Chart, Mark, Panel
+from hydroid.report.figure import figure, style
 from hydroid.viewer.motion import JointSignals, Motion
 
 MOST_JOINTS = 7
 """joints that are drawn; the others move in the picture only"""
-SIMULATED, MEASURED = "#D95F02", "#1F6FD0"
-"""colours of the simulated arm and of its ghost, in panel and picture"""
-CHAMBERS = ("#7B3294", "#008837")
+FEW = 2
+"""joints up to which the panels stand below each other, with more of them side by side"""
 NOW = (200, 30, 30)
-HEAD = 0.085
-"""part of the panel's height above the axes, for time and legend"""
 
 
-class Panel:
+class SignalPanel:
     """Signals of a motion on a white panel.
 
     Args:
@@ -36,94 +31,60 @@ class Panel:
     """
 
     def __init__(self, motion: Motion, size: tuple[int, int], scale: float = 1.0) -> None:
-        self._motion, self._size, self._scale = motion, size, scale
-        with style.style(), mpl.rc_context({"font.size": 9.0, "axes.titlesize": 9.5, "axes.labelsize": 8.5}):
-            drawing = Figure(figsize=(size[0] / (100 * scale), size[1] / (100 * scale)), dpi=100 * scale)
+        self._motion, self._scale = motion, scale
+        with style():
+            drawing = figure(_signals(motion.signals[:MOST_JOINTS], motion.time), "\n")
+            drawing.set_size_inches(size[0] / (100 * scale), size[1] / (100 * scale))
+            drawing.set_dpi(100 * scale)
             canvas = FigureCanvasAgg(drawing)
-            self._axes = _draw(drawing, motion.signals[:MOST_JOINTS], motion.time)
             canvas.draw()
             self._picture = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        letters = Path(mpl.get_data_path()) / "fonts" / "ttf"
-        self._large = ImageFont.truetype(str(letters / "DejaVuSans-Bold.ttf"), round(26 * scale))
-        self._small = ImageFont.truetype(str(letters / "DejaVuSans.ttf"), round(15 * scale))
+        self._axes = drawing.axes
+        bold = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans-Bold.ttf"
+        self._font = ImageFont.truetype(str(bold), round(22 * scale))
 
     def at(self, times: Sequence[float]) -> NDArray[np.uint8]:
         """Return the panel with a line at each time [s] as RGB, shape (height, width, 3), 0 to 255."""
         picture = Image.fromarray(self._picture)
-        pen, height, thick = ImageDraw.Draw(picture), self._size[1], max(1, round(2 * self._scale))
+        pen, thick = ImageDraw.Draw(picture), max(1, round(2 * self._scale))
         for axes in self._axes:
             box = axes.get_window_extent()
             for time in times:
                 x = axes.transData.transform((time, 0.0))[0]
-                pen.line([(x, height - box.y1), (x, height - box.y0)], fill=NOW, width=thick)
-        left, unit = 18 * self._scale, self._scale
+                pen.line([(x, picture.height - box.y1), (x, picture.height - box.y0)], NOW, thick)
         words = ", ".join(f"{time:.1f}" for time in times) if len(times) > 1 else f"{times[0]:.2f}"
-        pen.text((left, 14 * unit), f"{words} s", fill="black", font=self._large)
-        self._legend(pen, left, 56 * unit)
+        error = f", rms error {self._motion.error:.2f} deg" if np.isfinite(self._motion.error) else ""
+        pen.text((18 * self._scale, 12 * self._scale), f"{words} s{error}", "black", self._font)
         return np.asarray(picture)
 
-    def _legend(self, pen: ImageDraw.ImageDraw, left: float, top: float) -> None:
-        entries = [(SIMULATED, "simulated")]
-        if self._motion.measured is not None:
-            entries.append((MEASURED, "measured"))
-        if any(signals.pressure is not None for signals in self._motion.signals):
-            entries += [(CHAMBERS[0], "pressure A"), (CHAMBERS[1], "B")]
-        for color, label in entries:
-            side = 14 * self._scale
-            pen.rectangle([left, top + 2, left + side, top + 2 + side], fill=color)
-            pen.text((left + 1.5 * side, top), label, fill="#333333", font=self._small)
-            left += 1.5 * side + pen.textlength(label, font=self._small) + 2 * side
-        if np.isfinite(self._motion.error):
-            error = f"rms {self._motion.error:.2f} deg"
-            pen.text((left, top), error, fill="#333333", font=self._small)
+
+def _signals(signals: Sequence[JointSignals], time: Array) -> Chart:
+    """Draw commands, angles and pressures, a row for each of many joints."""
+    rows = [_joint(joint, time) for joint in signals]
+    few = len(rows) <= FEW
+    most = max(map(len, rows))
+    panels = [
+        panel for row in rows for panel in (*row, *([] if few else [Panel("", "", ())] * (most - len(row))))
+    ]
+    return Chart(tuple(panels), 1 if few else most, linked=True)
 
 
-def _draw(drawing: Figure, signals: Sequence[JointSignals], time: Array) -> list[Axes]:
-    """Draw few joints below each other with large panels, or one row for each of many."""
-    kinds = ["command", "angle", *(["pressure"] if any(s.pressure is not None for s in signals) else [])]
-    few = len(signals) <= 2
-    rows, columns = (len(kinds) * len(signals), 1) if few else (len(signals), len(kinds))
-    heights = [1.0 if kind == "command" else 1.6 for kind in kinds] * len(signals) if few else [1.0] * rows
-    room = {"left": 0.1 if few else 0.07, "right": 0.97, "top": 1 - HEAD - 0.03, "bottom": 0.055}
-    room |= {"hspace": 0.3 if few else 0.5, "wspace": 0.3}
-    grid = drawing.add_gridspec(rows, columns, height_ratios=heights, **room)
-    made: list[Axes] = []
-    for j, joint in enumerate(signals):
-        for k, kind in enumerate(kinds):
-            row, column = (j * len(kinds) + k, 0) if few else (j, k)
-            axes: Any = drawing.add_subplot(grid[row, column])
-            _KINDS[kind](axes, joint, time)
-            axes.set_xlim(time[0], time[-1])
-            axes.locator_params(axis="y", nbins=4)
-            if row < rows - 1:
-                axes.set_xticklabels([])
-            else:
-                axes.set_xlabel("time [s]")
-            made.append(axes)
-    return made
-
-
-def _command(axes: Axes, joint: JointSignals, time: Array) -> None:
-    axes.step(*style.decimated(time, joint.command), where="post", color="#555555", linewidth=1.2)
-    axes.set_ylim(-108, 108)
-    axes.set_title(f"{joint.name}: command [%]")
-
-
-def _angle(axes: Axes, joint: JointSignals, time: Array) -> None:
+def _joint(joint: JointSignals, time: Array) -> list[Panel]:
+    command = Mark("step", time, joint.command, color="grey")
+    angles = [Mark("line", time, joint.simulated, color="orange", label="simulated")]
     if joint.measured is not None:
-        axes.plot(*style.decimated(time, joint.measured), color=MEASURED, linewidth=2.6, alpha=0.75)
-    axes.plot(*style.decimated(time, joint.simulated), color=SIMULATED, linewidth=1.4)
-    axes.set_title(f"{joint.name}: angle [deg]")
-
-
-def _pressure(axes: Axes, joint: JointSignals, time: Array) -> None:
-    for chamber, color in enumerate(CHAMBERS):
-        if joint.measured_pressure is not None:
-            values = style.decimated(time, joint.measured_pressure[:, chamber])
-            axes.plot(*values, color=color, linewidth=2.6, alpha=0.35)
-        if joint.pressure is not None:
-            axes.plot(*style.decimated(time, joint.pressure[:, chamber]), color=color, linewidth=1.1)
-    axes.set_title(f"{joint.name}: pressure [bar]")
-
-
-_KINDS = {"command": _command, "angle": _angle, "pressure": _pressure}
+        measured = Mark("line", time, joint.measured, label="measured", width=2.6, alpha=0.75)
+        angles.insert(0, measured)
+    pressures: list[Mark] = []
+    for bar, width, alpha in ((joint.measured_pressure, 2.6, 0.35), (joint.pressure, 1.1, 1.0)):
+        for chamber, color in enumerate(("green", "pink") if bar is not None else ()):
+            assert bar is not None
+            at, label = bar[:, chamber], f"chamber {'AB'[chamber]}"
+            pressures.append(Mark("line", time, at, color=color, label=label, width=width, alpha=alpha))
+    ends = float(time[0]), float(time[-1])
+    panels = [
+        Panel("", "", (command,), f"{joint.name}: command [%]", 130, ends, (-108.0, 108.0)),
+        Panel("", "", tuple(angles), f"{joint.name}: angle [deg]", 220, ends),
+        Panel("", "", tuple(pressures), f"{joint.name}: pressure [bar]", 220, ends),
+    ]
+    return panels if pressures else panels[:2]

@@ -8,9 +8,8 @@ import pytest
 from report_fits import make_problem
 
 from hydroid.arm.model import load_model
-from hydroid.report.arm_picture import side_view, sticks
-from hydroid.report.motion_report import motion_section
-from hydroid.report.moving_arm import MOST, Movement, MovingArm, moving_arm
+from hydroid.report.moving_arm import MOST, Movement, MovingArm, motion_section, moving_arm, side_view
+from hydroid.report.outlines import shapes
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 ARM = PROBLEM.settings.arm
@@ -76,7 +75,7 @@ def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     assert len(arm.time) == 20
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
     worst = arm.plain()["start"]
-    assert abs(arm.errors[2][worst]) == np.abs(arm.errors[2]).max()
+    assert abs(arm.errors["shoulder"][worst]) == np.abs(arm.errors["shoulder"]).max()
 
 
 def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
@@ -84,7 +83,7 @@ def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
     stick = f'<body pos="2 0 0">{inertial}<joint name="stick" axis="0 -1 0"/></body>'
     boom = f'<body>{inertial}<joint name="boom" axis="0 -1 0"/>{stick}</body>'
     bare = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boom}</worldbody></mujoco>")
-    lengths = [np.linalg.norm(np.diff(line, axis=0)) for _, line in sticks(bare)]
+    lengths = [np.linalg.norm(np.diff(line, axis=0)) for line in [shape.corners for shape in shapes(bare)]]
     assert lengths == pytest.approx([2.0, 0.5])
     movement = Movement.of("a.csv", LOG, (1, 2), LOG.angle[:, :2])
     two = replace(movement, measured=LOG.angle[:, 1:3], simulated=LOG.angle[:, 1:3])

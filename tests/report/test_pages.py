@@ -5,18 +5,19 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.errors import RunError
 from hydroid.fitting.search import HISTORY
 from hydroid.report.comparison import comparison_page, validation_page
 from hydroid.report.fit_report import fit_page
-from hydroid.report.page import Page, Plot, Section
-from hydroid.report.page_file import write_page
+from hydroid.report.page import Page, Section
+from hydroid.report.page_file import write_figures, write_page
+from hydroid.report.table import Table
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -63,6 +64,14 @@ def test_writing_again_changes_no_byte(written):
     write_page(fit_page(record), path)
     assert files(path) == before
     assert {"report.html", "tables/parameters.csv", "tables/errors.tex", "history.csv"} <= set(before)
+
+
+def test_every_chart_becomes_a_figure_well_formed_and_undated(written, tmp_path: Path):
+    files = write_figures(fit_page(written[-1]), tmp_path)
+    assert {file.stem for file in files} == {"response_1", "speed", "learning", "pareto"}
+    for file in files[1::2]:
+        ElementTree.fromstring(file.read_bytes())
+        assert b"dc:date" not in file.read_bytes()
 
 
 def test_history_and_front_come_back_to_the_last_bit(written):
@@ -163,7 +172,7 @@ def test_a_validation_says_whether_the_error_is_as_expected(error: float, state:
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):
-    (tmp_path / "figures").write_text("in the way")
-    page = Page("p", "t", "l", (Section("s", plots=(Plot("name", "caption", Figure),)),))
+    (tmp_path / "tables").write_text("in the way")
+    page = Page("p", "t", "l", (Section("s", tables={"t": Table("t", ("a",), ((1,),))}),))
     with pytest.raises(RunError, match="cannot be written"):
         write_page(page, tmp_path)

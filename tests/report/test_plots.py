@@ -6,7 +6,6 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 from report_fits import make_fit, make_problem, make_uncertainty
 
@@ -15,10 +14,11 @@ from hydroid.posterior.directions import identifiability
 from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.posterior.sweep import Surface
 from hydroid.problem.problem import Evaluation
-from hydroid.report.chart import Chart, Mark, Panel, figure
-from hydroid.report.objectives import contours, learning, pareto
+from hydroid.report.analysis_report import landscape
+from hydroid.report.chart import Chart, Mark, Panel
+from hydroid.report.figure import figure, rendered, style
+from hydroid.report.objectives import learning, pareto
 from hydroid.report.predictions import JointResponse, draw, joint_responses
-from hydroid.report.style import MAX_BINS, decimated, rendered, style
 from hydroid.report.uncertainty_report import UncertaintyStudy, draw_profiles
 from hydroid.settings.problem import ObjectiveSettings
 
@@ -42,7 +42,7 @@ def drawn_front(problem, fit) -> Chart:
     return pareto(objectives, segments, problem.settings.objective)
 
 
-def draw_all(problem, fit) -> list[Figure | Chart]:
+def draw_all(problem, fit) -> list[Chart]:
     objective = problem.settings.objective
     return [
         *(draw(response) for response in responses(problem, fit)),
@@ -51,10 +51,9 @@ def draw_all(problem, fit) -> list[Figure | Chart]:
     ]
 
 
-def check(drawn: Figure | Chart) -> None:
-    if isinstance(drawn, Chart):
-        json.dumps(drawn.plain(), allow_nan=False)
-        drawn = figure(drawn)
+def check(chart: Chart) -> None:
+    json.dumps(chart.plain(), allow_nan=False)
+    drawn = figure(chart)
     drawn.draw_without_rendering()
     for axes in drawn.axes:
         assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
@@ -97,7 +96,7 @@ def test_any_fit_can_be_drawn(shape: str):
     fit = make_fit(problem, **of_fit)
     for drawn in draw_all(problem, fit):
         if shape == "names without glyphs":
-            rendered(figure(drawn) if isinstance(drawn, Chart) else drawn)  # with boxes, without a warning
+            rendered(drawn)  # with boxes, without a warning
         else:
             check(drawn)
 
@@ -165,7 +164,7 @@ def test_the_front_is_one_line_with_gaps_and_estimates_on_top():
     (panel,) = drawn_front(problem, fit).panels
     front, *others = panel.marks
     order = np.argsort(fit.front[1].overall, kind="stable")
-    drawn = front.y.reshape(9, -1)
+    drawn = np.append(front.y, np.nan).reshape(9, -1)
     assert drawn[:, :-1] == pytest.approx(np.degrees(fit.front[1].segments)[order])
     assert np.isnan(drawn[:, -1]).all()
     assert len({mark.label for mark in others if mark.label}) == len(fit.estimates)
@@ -201,8 +200,8 @@ def test_a_file_leaves_out_what_is_off_and_has_every_label_once():
     drawn = figure(chart, "A title")
     assert [len(axes.lines) for axes in drawn.axes] == [1, 1]
     apart = Chart((Panel("x", "y", (shown,)), Panel("x", "y", (replace(shown, label="c"),))))
-    assert apart.legends_apart
-    assert not chart.legends_apart
+    assert apart.apart
+    assert not chart.apart
 
 
 def test_every_kind_of_mark_can_be_drawn():
@@ -215,6 +214,8 @@ def test_every_kind_of_mark_can_be_drawn():
         Mark("spans", x[:1], end=x[1:2]),
         Mark("rule", y=x[:1], look="dashed"),
         Mark("rule", x[:1], look="dotted"),
+        Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
+        Mark("text", x, x, texts=("a", "b", "c")),
     )
     check(
         Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4], names=("a", "b"))), columns=2)
@@ -225,8 +226,7 @@ def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
     fit = make_fit(make_problem())
 
     def drawn() -> tuple[bytes, bytes]:
-        with style():
-            return rendered(figure(drawn_front(make_problem(), fit)))
+        return rendered(drawn_front(make_problem(), fit))
 
     plain = drawn()
     with mpl.rc_context({"font.size": 30.0, "svg.fonttype": "none", "axes.grid": False}):
@@ -243,17 +243,20 @@ def test_a_dollar_in_a_name_is_a_dollar():
     assert not any(text.get_parse_math() for text in named)
 
 
-@pytest.mark.parametrize("samples", [1, 7, 2 * MAX_BINS, 2 * MAX_BINS + 1, 100_003])
-def test_a_decimated_curve_keeps_its_ends_extremes_and_gaps(samples: int):
+@pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])
+def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     rng = np.random.default_rng(0)
     time, curve = np.arange(samples) * 0.01, rng.normal(size=samples).cumsum()
-    at, kept = decimated(time, curve)
-    assert len(kept) <= max(2 * MAX_BINS + 2, 3)
-    assert np.array_equal(curve[np.searchsorted(time, at)], kept)
+    thin = Mark("line", time, curve).thinned(1000)
+    kept = thin.y
+    assert len(kept) <= 2002
+    assert np.array_equal(curve[np.searchsorted(time, thin.x)], kept)
     assert (kept[0], kept[-1], kept.min(), kept.max()) == (curve[0], curve[-1], curve.min(), curve.max())
+    band = Mark("band", time, -np.abs(curve), np.abs(curve)).thinned(1000)
+    assert (band.y.min(), band.end.min()) == (-np.abs(curve).max(), np.abs(curve).min())
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
-        assert np.isnan(decimated(time, gap)[1]).any()
+        assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
 
 
 def make_surface(estimate: tuple[float, float]) -> Surface:
@@ -266,11 +269,11 @@ def make_surface(estimate: tuple[float, float]) -> Surface:
 def test_a_surface_marks_the_estimate_and_the_lowest_point_where_they_are():
     for estimate in ((0.2, 200.0), (0.21, 260.0)):
         surface = make_surface(estimate)
-        drawn = contours(surface, ObjectiveSettings())
-        check(drawn)
-        marks = {line.get_label().split(" (")[0]: line for line in drawn.axes[0].lines}
+        chart = landscape(surface, ObjectiveSettings())
+        check(chart)
+        marks = {mark.label.split(" (")[0]: mark for mark in chart.panels[0].marks}
         for label, (x, y, *_) in (("estimate", estimate), ("lowest point drawn", surface.lowest)):
-            assert (marks[label].get_xdata()[0], marks[label].get_ydata()[0]) == pytest.approx((x, y))
+            assert (marks[label].x[0], marks[label].y[0]) == pytest.approx((x, y))
         assert surface.lowest[2] <= surface.estimate_error
 
 

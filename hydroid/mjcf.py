@@ -20,7 +20,7 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     """
     where = str(path)
     if not is_file(path):
-        raise ModelError("no such model", where=where, hint="give the arm's MJCF; `hydroid init` writes one")
+        raise ModelError("no such model", where=where)
     with mujoco_errors(where):
         spec = mujoco.MjSpec.from_file(where)
     if not spec.joints:

@@ -101,20 +101,10 @@ class CollisionChecker:
             angle: of all joints in the model's order [rad], shape (T, nq).
         """
         distance, nearest, inside = np.empty(len(time)), list[int](), dict[int, list[tuple[int, float]]]()
-        known = np.full(len(self._pairs), -np.inf)
-        turned = np.abs(np.diff(angle, axis=0, prepend=angle[:1]))
-        for sample in range(len(time)):
-            known -= turned[sample] @ self._sweep
-            least, which = FARTHEST, 0
-            self._place(angle[sample])
-            for pair in np.argsort(known).tolist():
-                if known[pair] >= max(least, 0.0):
-                    break
-                known[pair] = distance_here = self._distance(pair)
-                if distance_here < 0:
-                    inside.setdefault(pair, []).append((sample, distance_here))
-                if distance_here < least:
-                    least, which = distance_here, pair
+        for sample, (near, least, which) in enumerate(self._walk(angle, FARTHEST)):
+            for pair, here in near:
+                if here < 0:
+                    inside.setdefault(pair, []).append((sample, here))
             distance[sample] = least
             nearest.append(which)
         names = [self._names(pair) for pair in range(len(self._pairs))]
@@ -129,23 +119,33 @@ class CollisionChecker:
         Returns:
             The sample and the names of the bodies; None where every distance keeps the margin.
         """
-        turned = np.abs(np.diff(angle, axis=0, prepend=angle[:1]))
-        found, end = None, len(angle)
-        for pair in range(len(self._pairs)):
-            path, sample = np.cumsum(turned @ self._sweep[:, pair]), 0
-            while sample < end:
-                self._place(angle[sample])
-                spare = self._distance(pair) - margin
-                if spare < 0:
-                    found, end = (sample, self._names(pair)), sample
-                    break
-                # the first sample that may be too near
-                sample = max(sample + 1, int(np.searchsorted(path, path[sample] + spare, side="right")))
-        return found
+        for sample, (_, least, which) in enumerate(self._walk(angle, margin)):
+            if least < margin:
+                return sample, self._names(which)
+        return None
 
-    def _place(self, angle: Array) -> None:
-        self._data.qpos[:] = angle
-        mujoco.mj_kinematics(self._model, self._data)
+    def _walk(self, angle: Array, within: float) -> Generator[tuple[list[tuple[int, float]], float, int]]:
+        """Yield of each sample the pairs looked at with their distances [m], the least, and whose it is.
+
+        Pairs farther apart than `within` [m] are not looked for, and where there are none nearer it is the
+        least. All pairs inside each other are looked at.
+        """
+        known = np.full(len(self._pairs), -np.inf)  # lower bounds of the distances
+        turned = np.abs(np.diff(angle, axis=0, prepend=angle[:1]))
+        for pose, change in zip(angle, turned, strict=True):
+            known -= change @ self._sweep
+            near, least, which = list[tuple[int, float]](), within, 0
+            if known.min() < max(within, 0.0):
+                self._data.qpos[:] = pose
+                mujoco.mj_kinematics(self._model, self._data)
+            for pair in np.argsort(known).tolist():
+                if known[pair] >= max(least, 0.0):
+                    break
+                known[pair] = here = self._distance(pair)
+                near.append((pair, here))
+                if here < least:
+                    least, which = here, pair
+            yield near, least, which
 
     def _distance(self, pair: int) -> float:
         first, second = self._pairs[pair].tolist()

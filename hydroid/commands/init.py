@@ -103,7 +103,6 @@ def init(
     for path in (*logs, *([] if robot is None else [robot])):
         if not is_file(path):
             raise SettingsError("no such file", where=str(path))
-    from hydroid.project import Sources, write_project
+    from hydroid.project import write_project
 
-    sources = Sources(robot, tuple(logs), tuple(names(joints)), tip)
-    return InitResult(write_project(Path(folder), sources))
+    return InitResult(write_project(Path(folder), robot, logs, names(joints), tip))

@@ -51,30 +51,17 @@ class Project:
     commands: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Sources:
-    """What a project is made from.
+def write_project(
+    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), tip: str | None = None
+) -> Project:
+    """Write a project to a folder, new or with other things in it.
 
-    Attributes:
+    Args:
+        folder: where.
         robot: URDF, MJCF or YAML file of the arm; None: a template of boxes.
         logs: the first tells the columns; the last of several is kept to validate on.
         joints: names of the arm's joints as the log counts them; by default in the arm's order.
         tip: link at which the arm ends; None: the tip that fits the log, or the longest branch.
-    """
-
-    robot: Path | None = None
-    logs: tuple[Path, ...] = ()
-    joints: tuple[str, ...] = ()
-    tip: str | None = None
-
-    @property
-    def arm_file(self) -> Path | None:
-        """The arm's YAML file, where the user has one."""
-        return self.robot if self.robot and self.robot.suffix.lower() in (".yaml", ".yml") else None
-
-
-def write_project(folder: Path, sources: Sources) -> Project:
-    """Write a project to a folder, new or with other things in it.
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the given names.
@@ -84,24 +71,25 @@ def write_project(folder: Path, sources: Sources) -> Project:
     taken = [name for name in FILES if os.path.lexists(folder / name)]
     if taken:
         raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint="name another folder")
-    table = open_table(sources.logs[0]) if sources.logs else None
-    imported, file, reference = None, sources.arm_file, ARM
-    if file is not None:
-        reference = Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
-    elif sources.robot is not None:
-        imported = import_arm(sources.robot, table.names if table else (), sources.tip)
+    table = open_table(logs[0]) if logs else None
+    own = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
+    imported, reference = None, ARM
+    if robot is not None and own:
+        reference = Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
+    elif robot is not None:
+        imported = import_arm(robot, table.names if table else (), tip)
     with _stage(folder) as stage:
-        arm = load_arm(file) if file is not None else _write_arm(stage, imported, sources.robot)
-        layout = find_layout(table, arm, sources.joints) if table is not None else None
+        arm = load_arm(robot) if robot is not None and own else _write_arm(stage, imported, robot)
+        layout = find_layout(table, arm, joints) if table is not None else None
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
-            arm = _write_arm(stage, imported, sources.robot, arm.joint_names, sizes)
+            arm = _write_arm(stage, imported, robot, arm.joint_names, sizes)
         title = f"{arm.name}, near to 0: does it look and turn like your arm?"
         write_atomic(stage / PICTURE, rendered(arm_chart(arm), title)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
-        steps = next_steps(folder, sources.logs)
+        steps = next_steps(folder, logs)
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
         write_atomic(stage / STEPS, steps_page(arm.name, folder, steps, notes, reasons))
         written = _move(stage, folder)

@@ -85,28 +85,6 @@ def test_a_row_does_not_depend_on_its_neighbours_to_the_last_bit(moving):
             assert some[field].tobytes() == value[rows].tobytes()
 
 
-def test_with_all_joints_moving_the_bodies_are_the_links():
-    locked = lock(SPEC, ARM, ARM.joint_names, np.zeros(J))
-    inertials = locked.inertials(NOMINAL[None])
-    np.testing.assert_allclose(inertials["body_mass"][0, 1:6], NOMINAL[:5])
-    assert inertials["body_mass"][0, 6] == pytest.approx(
-        NOMINAL[5] + NOMINAL[7]
-    )  # the fixed jaw is part of link 6
-    assert inertials["body_mass"][0].sum() == pytest.approx(45.0)
-    np.testing.assert_allclose(inertials["body_ipos"][0, 1:6], FULL.body_ipos[LINKS[:5]], atol=1e-12)
-    np.testing.assert_allclose(
-        np.sort(inertials["body_inertia"][0, 3]), np.sort(FULL.body_inertia[LINKS[2]]), rtol=1e-9
-    )
-
-
-def test_links_that_cannot_move_have_no_effect():
-    locked = lock(SPEC, ARM, ["elbow"], ARM.pose("study"))
-    heavier = NOMINAL * np.where(np.isin(ARM.link_names, ["link1", "link2"]), 7.0, 1.0)
-    other = locked.inertials(heavier[None])
-    for field, value in locked.inertials(NOMINAL[None]).items():
-        np.testing.assert_array_equal(other[field], value)
-
-
 def test_only_what_moves_is_left():
     locked = lock(SPEC, ARM, ["wrist", "shoulder"], ARM.pose("study"))
     model = locked.model

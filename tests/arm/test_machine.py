@@ -66,17 +66,6 @@ def vertices(model: mujoco.MjModel, data: mujoco.MjData, side: str) -> np.ndarra
     return np.vstack(found)
 
 
-def test_an_arm_rests_beside_a_moving_one(machine: Machine):
-    model = machine.model
-    still = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, still, model.key("study").id)
-    mujoco.mj_forward(model, still)
-    hold = still.qfrc_bias[7:]
-    _, angle = stepped(machine, np.hstack([torques(200), np.tile(hold, (200, 1))]))
-    assert np.ptp(angle[:, :7], axis=0).max() > 0.1
-    assert np.abs(angle[:, 7:] - still.qpos[7:]).max() < 1e-9
-
-
 def test_each_arm_is_the_one_that_stands_alone(machine: Machine, arm: Arm, spec: mujoco.MjSpec):
     """Its gravity and inertia, on both sides."""
     alone, data = spec.compile(), mujoco.MjData(machine.model)

@@ -89,42 +89,56 @@ def test_turned_frames_move_as_mujocos_own_import_does(tmp_path):
             np.testing.assert_allclose(getattr(here, name), getattr(there, name), atol=1e-6)
 
 
-def test_the_base_link_is_the_fixed_base(tmp_path):
-    said(import_arm(write_robot(tmp_path)), "the root link track is the fixed base: its mass does not matter")
+FORK = (
+    link("stick").replace('"stick"', '"hammer"')
+    + robots.PARTS["stick"].replace('"stick"', '"chisel"')
+    + joint("hammer_joint", "boom", "hammer", at="1 0 0")
+    + joint("chisel_joint", "hammer", "chisel", at="1 0 0")
+)
+MIMIC = LIMIT.format(-1, 1) + '<mimic joint="boom_joint" multiplier="-1"/>'
+NO_LIMITS = "joint swing_joint has no limits: it turns without stops, unless you give it a range"
 
 
-def test_a_joint_that_mimics_another_is_held(tmp_path):
-    limit = LIMIT.format(-1, 1) + '<mimic joint="boom_joint" multiplier="-1"/>'
-    arm = import_arm(write_robot(tmp_path, stick_joint=joint("stick_joint", "boom", "stick", limit=limit)))
-    said(arm, "joint stick_joint mimics boom_joint, which hydroid does not model: it is held at 0")
+def swing(kind, limit):
+    return {"swing_joint": joint("swing_joint", "track", "house", kind=kind, axis="0 0 1", limit=limit)}
+
+
+def stick(**changes):
+    return {"stick_joint": joint("stick_joint", "boom", "stick", **changes)}
+
+
+TRAPS = [
+    ({}, "the root link track is the fixed base: its mass does not matter", [800, 200, 90]),
+    ({}, "no joint has damping: a fit estimates it", [800, 200, 90]),
+    (stick(limit=MIMIC), "joint stick_joint mimics boom_joint, which hydroid does not model", [800, 290]),
+    *(
+        (stick(kind=k), f"joint stick_joint {HELD[k]}: hydroid moves", [800, 290])
+        for k in ("prismatic", "floating")
+    ),
+    (swing("continuous", ""), NO_LIMITS, [800, 200, 90]),
+    (swing("revolute", LIMIT.format(0, 0)), NO_LIMITS, [800, 200, 90]),
+    (
+        {"boom": link("boom", mesh="package://other/meshes/lost.stl")},
+        "mesh package://other/meshes/lost.stl is not there; looked for FOLDER/digger/urdf/other/",
+        [800, 200, 90],
+    ),
+    (
+        {"more": FORK},
+        "of 2 branches the arm is swing_joint - boom_joint - hammer_joint - chisel_joint (the longest "
+        "branch); held at 0: stick_joint. Choose another with --tip: stick, chisel",
+        [800, 290, 90, 90],
+    ),
+]
+"""changes of a URDF, the beginning of the note on them, and the masses of the moving bodies [kg]"""
+
+
+@pytest.mark.parametrize(("changes", "note", "masses"), TRAPS, ids=[note[:30] for _, note, _ in TRAPS])
+def test_a_trap_is_said_in_one_line(tmp_path, changes, note, masses):
+    arm = import_arm(write_robot(tmp_path, **changes))
+    said(arm, note.replace("FOLDER", str(tmp_path)))
     model, _ = compiled(arm)
-    assert model.body_mass.tolist() == [0.0, 800.0, 290.0]
-
-
-@pytest.mark.parametrize("kind", ["prismatic", "floating"])
-def test_a_joint_that_is_no_hinge_is_held(tmp_path, kind):
-    more = joint("stick_joint", "boom", "stick", kind=kind)
-    arm = import_arm(write_robot(tmp_path, stick_joint=more))
-    said(arm, f"joint stick_joint {HELD[kind]}: hydroid moves hinges only, so it is held at 0")
-    assert compiled(arm)[0].njnt == 2
-
-
-@pytest.mark.parametrize(("kind", "limit"), [("continuous", ""), ("revolute", LIMIT.format(0, 0))])
-def test_a_joint_without_limits_turns_without_stops(tmp_path, kind, limit):
-    more = joint("swing_joint", "track", "house", kind=kind, axis="0 0 1", limit=limit)
-    arm = import_arm(write_robot(tmp_path, swing_joint=more))
-    said(arm, "joint swing_joint has no limits: it turns without stops, unless you give it a range")
-    assert compiled(arm)[0].jnt_limited.tolist() == [False, True, True]
-
-
-def test_a_missing_mesh_says_where_it_was_looked_for(tmp_path):
-    arm = import_arm(write_robot(tmp_path, boom=link("boom", mesh="package://other/meshes/lost.stl")))
-    line = said(arm, "mesh package://other/meshes/lost.stl is not there; looked for ")
-    assert f"{tmp_path}/digger/urdf/other/meshes/lost.stl" in line
-    assert "lost.stl below" in line
-    model, _ = compiled(arm)
-    assert model.body("boom").geomnum[0] == 0
-    assert model.body("boom").mass[0] == 200
+    assert model.body_mass.tolist() == pytest.approx([0, *masses])
+    assert model.jnt_limited.all() == (note != NO_LIMITS)
 
 
 @pytest.mark.parametrize(
@@ -174,10 +188,6 @@ def test_an_open_mesh_counts_by_its_hull(tmp_path):
     assert "the inertia of its mesh's hull" in said(import_arm(path), "link boom: its inertia is 0")
 
 
-def test_no_damping_is_said(tmp_path):
-    said(import_arm(write_robot(tmp_path)), "no joint has damping: a fit estimates it")
-
-
 def test_meshes_in_millimetres_are_scaled(tmp_path):
     arm = import_arm(write_robot(tmp_path, scale=1000.0))
     line = said(arm, "mesh boom.stl would be 2000 m long: all meshes are taken to be in mm")
@@ -210,21 +220,6 @@ def test_a_mesh_that_cannot_be_read_is_said(tmp_path):
     arm = import_arm(tmp_path / "digger/urdf/digger.urdf")
     assert "pip install pycollada" in said(arm, "mesh boom.dae cannot be read")
     assert compiled(arm)[0].body("boom").mass[0] == 200.0
-
-
-FORK = (
-    link("stick").replace('"stick"', '"hammer"')
-    + robots.PARTS["stick"].replace('"stick"', '"chisel"')
-    + joint("hammer_joint", "boom", "hammer", at="1 0 0")
-    + joint("chisel_joint", "hammer", "chisel", at="1 0 0")
-)
-
-
-def test_of_several_branches_the_longest_is_taken_and_said(tmp_path):
-    arm = import_arm(write_robot(tmp_path, more=FORK))
-    line = said(arm, "of 2 branches the arm is swing_joint - boom_joint - hammer_joint - chisel_joint")
-    assert "(the longest branch); held at 0: stick_joint. Choose another with --tip: stick, chisel" in line
-    assert compiled(arm)[0].body("boom").mass[0] == 290.0
 
 
 def test_the_branch_that_the_log_names_is_taken(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -140,14 +141,6 @@ def test_nothing_is_overwritten(place: Path):
     }
 
 
-def test_a_folder_with_other_things_in_it_will_do(tmp_path: Path):
-    robot = write_robot(tmp_path)
-    project = init(tmp_path / "digger", robot)
-    assert (tmp_path / "digger" / "arm.yaml").is_file()
-    assert (tmp_path / "digger" / "meshes" / "boom.stl").is_file()
-    assert set(project.files) >= {"arm.yaml", "arm.xml", "arm.png", "fit.yaml", "links"}
-
-
 def test_an_error_leaves_nothing_behind(tmp_path: Path):
     robot, log = write_robot(tmp_path), tmp_path / "log.csv"
     log.write_text("name,colour\nboom,red\nstick,blue\n")
@@ -173,31 +166,62 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     assert {"area_A_boom", "area_B_boom", "open_A_boom"} <= set(settings.parameters)
 
 
-def changed_log(place: Path, tmp_path: Path, change) -> Path:
-    """The first log with its numbers changed."""
+def swapped(lines: list[str]) -> list[str]:
+    """Two valves' columns exchanged under their names."""
+    cells = [line.split(";") for line in lines]
+    return [lines[0], *(";".join([c[0], c[2], c[1], *c[3:]]) for c in cells[1:])]
+
+
+def scaled(column: int, factor: float, shift: float) -> Callable[[list[str]], list[str]]:
+    """One column's numbers changed."""
+
+    def change(lines: list[str]) -> list[str]:
+        cells = [line.split(";") for line in lines]
+        for row in cells[1:]:
+            row[column] = f"{factor * float(row[column]) + shift:.6g}"
+        return [";".join(row) for row in cells]
+
+    return change
+
+
+CHANGED_LOGS = {
+    "a command against its angle is turned round": (
+        scaled(2, -1, 0),
+        {"boom_joint moves against its command (for ": "of the command is reversed"},
+        [10, -10, 10],
+    ),
+    "angles outside the range": (
+        scaled(5, 1, 2),
+        {
+            "boom_joint: the angles in the log run from": (
+                "but the arm allows -28.6479 to 68.7549: give the angle an offset"
+            )
+        },
+        [10, 10, 10],
+    ),
+    "commands of another joint": (
+        swapped,
+        {
+            "swing_joint follows the command of boom_joint": "check which columns belong together",
+            "boom_joint follows the command of swing_joint": "check which columns belong together",
+        },
+        [-10, -10, 10],
+    ),
+}
+"""change of a log's lines, the notes by their beginnings with what they say, and the commands' scales"""
+
+
+@pytest.mark.parametrize("case", CHANGED_LOGS)
+def test_what_the_numbers_of_a_log_tell_is_said(place: Path, tmp_path: Path, case: str):
+    change, notes, scales = CHANGED_LOGS[case]
     lines = (place / "move_0.csv").read_text().splitlines()
-    values = np.array([[float(cell) for cell in line.split(";")] for line in lines[1:]])
-    path = tmp_path / "changed.csv"
-    np.savetxt(path, change(values), fmt="%.6g", delimiter=";", header=lines[0], comments="")
-    return path
-
-
-def test_a_command_that_acts_against_its_angle_is_turned_round(place: Path, tmp_path: Path):
-    log = changed_log(place, tmp_path, lambda v: v * [1, 1, -1, 1, 1, 1, 1])
-    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    (tmp_path / "log.csv").write_text("\n".join(change(lines)))
+    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
+    for start, text in notes.items():
+        (line,) = [line for line in project.columns if line.startswith(start)]
+        assert text in line
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
-    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, -10, 10]
-    (line,) = [line for line in project.columns if "of the command is reversed" in line]
-    assert line.startswith("boom_joint moves against its command (for ")
-
-
-def test_angles_outside_the_arms_range_are_said(place: Path, tmp_path: Path):
-    log = changed_log(place, tmp_path, lambda v: v + np.array([0, 0, 0, 0, 0, 2.0, 0]))
-    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
-    (line,) = [
-        line for line in project.columns if line.startswith("boom_joint: the angles in the log run from")
-    ]
-    assert "but the arm allows -28.6479 to 68.7549: give the angle an offset" in line
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == scales
 
 
 def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
@@ -240,13 +264,3 @@ def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]
     with pytest.raises(SettingsError, match=r"--joints: no joint 'bom'; the arm's joints: swing_joint, boom"):
         init(tmp_path / "fourth", arm, [tmp_path / "log.csv"], joints=["bom"])
-
-
-def test_commands_of_another_joint_are_said(place: Path, tmp_path: Path):
-    log = changed_log(place, tmp_path, lambda v: v[:, [0, 2, 1, 3, 4, 5, 6]])
-    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
-    lines = [line for line in project.columns if "check which columns belong together" in line]
-    assert [line.split(" (")[0] for line in lines] == [
-        "swing_joint follows the command of boom_joint",
-        "boom_joint follows the command of swing_joint",
-    ]

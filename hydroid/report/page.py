@@ -140,7 +140,6 @@ class Page:
         versions: of the software, printed at the foot.
         data: further files by name, such as CSV for scripts.
         verdict: stands above all sections.
-        numbers: values by name for comparisons (`comparison`).
     """
 
     name: str
@@ -151,7 +150,6 @@ class Page:
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
     data: Mapping[str, str] = field(default_factory=dict[str, str])
     verdict: Verdict | None = None
-    numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def plots(self) -> Iterator[Plot]:

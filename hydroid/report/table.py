@@ -172,11 +172,6 @@ def shown(cell: Cell) -> str:
     return number(cell) if isinstance(cell, float) else str(cell)
 
 
-def unless_nan(value: float) -> float | None:
-    """Return the number, or an empty cell for NaN; an infinite number stays."""
-    return None if math.isnan(value) else float(value)
-
-
 _MARKDOWN = {ord(c): f"\\{c}" for c in r"\`*_<>|&$~"} | {ord(c): " " for c in "\r\n"}
 _LATEX = str.maketrans(
     {c: f"\\{c}" for c in "&%$#_{}"}

@@ -1,6 +1,6 @@
 """What the window shows: a plant under its sliders, or a simulated motion beside the measured one."""
 
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
 
 import mujoco
 import numpy as np
@@ -12,42 +12,53 @@ from hydroid.viewer.film import add_ghost, place
 from hydroid.viewer.motion import Motion
 
 
-class Playback(Protocol):
+class Playback(ABC):
     """Something that moves in a window.
 
-    Attributes:
+    Args:
         model: in MuJoCo.
         data: its state, drawn as it is.
+        ghost: the state of what was measured, drawn behind it; None: nothing was measured.
     """
 
-    model: mujoco.MjModel
-    data: mujoco.MjData
+    duration = np.inf
+    """time after which it stands still [s]"""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, ghost: mujoco.MjData | None = None
+    ) -> None:
+        self.model, self.data, self._ghost = model, data, ghost
+        self._seen = mujoco.MjvOption(), mujoco.MjvPerturb()
+        self.restart()
 
     @property
+    @abstractmethod
     def time(self) -> float:
         """Since the start [s]."""
-        ...
 
-    @property
-    def duration(self) -> float:
-        """Until it stands still [s]; inf: never."""
-        ...
+    @abstractmethod
+    def advance(self, until: float) -> None:
+        """Go on to the sample before `until` [s].
+
+        Raises:
+            RunError: the simulation diverged.
+        """
+
+    @abstractmethod
+    def captions(self) -> tuple[str, str]:
+        """Return two columns of text: what moves, and how."""
 
     def restart(self) -> None:
         """Go back to the start."""
+        self.advance(0.0)
 
-    def advance(self, until: float) -> None:
-        """Go on to the sample before `until` [s]."""
-
-    def captions(self) -> tuple[str, str]:
-        """Return two columns of text: what moves, and how."""
-        ...
-
-    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
+    def draw_ghost(self, scene: mujoco.MjvScene, away: NDArray[np.float64]) -> None:
         """Add what was measured to a scene; `away` is the direction of sight, shape (3,)."""
+        if self._ghost is not None:
+            add_ghost(self.model, self._ghost, scene, self._seen, away)
 
 
-class Sliders:
+class Sliders(Playback):
     """A plant with all joints on the viewer's sliders; its physics can be pushed about.
 
     Args:
@@ -55,12 +66,9 @@ class Sliders:
         pose: where it begins, a pose of the arm's file; by default the settings' start pose.
     """
 
-    duration = np.inf
-
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
         self.plant, self._start = plant, pose
-        self.restart()
-        self.model, self.data = plant.model, plant.data
+        super().__init__(plant.model, plant.data)
 
     @property
     def time(self) -> float:
@@ -91,15 +99,12 @@ class Sliders:
         first = ["time", *(names[j - 1] for j in plant.joints)]
         return "\n".join(first), "\n".join([f"{plant.time:.1f} s", *lines])
 
-    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
-        """Nothing was measured."""
-
     def _refresh(self) -> None:
         """Bring what is drawn up to the angles: `mj_step` leaves it a step behind."""
         place(self.plant.model, self.plant.data, self.plant.data.qpos)
 
 
-class Replay:
+class Replay(Playback):
     """A simulated motion from its start to its end.
 
     Args:
@@ -107,24 +112,15 @@ class Replay:
     """
 
     def __init__(self, motion: Motion) -> None:
-        self.model = motion.machine.model
-        self.data, self._ghost = mujoco.MjData(self.model), mujoco.MjData(self.model)
-        self._motion, self._seen = motion, (mujoco.MjvOption(), mujoco.MjvPerturb())
-        self.restart()
+        model, self._motion = motion.machine.model, motion
+        self.duration = float(motion.time[-1])
+        ghost = None if motion.measured is None else mujoco.MjData(model)
+        super().__init__(model, mujoco.MjData(model), ghost)
 
     @property
     def time(self) -> float:
         """Since the start [s]."""
         return float(self._motion.time[self._sample])
-
-    @property
-    def duration(self) -> float:
-        """Of the motion [s]."""
-        return float(self._motion.time[-1])
-
-    def restart(self) -> None:
-        """Go back to the start."""
-        self.advance(0.0)
 
     def advance(self, until: float) -> None:
         """Go on to the sample before `until` [s]."""
@@ -132,7 +128,7 @@ class Replay:
         self._sample = motion.sample(until)
         place(self.model, self.data, motion.simulated[self._sample])
         self.data.time = self.time
-        if motion.measured is not None:
+        if self._ghost is not None and motion.measured is not None:
             place(self.model, self._ghost, motion.measured[self._sample])
 
     def captions(self) -> tuple[str, str]:
@@ -147,11 +143,6 @@ class Replay:
             first.append(signals.name)
             second.append(line)
         return "\n".join(first), "\n".join(second)
-
-    def draw_ghost(self, scene: Any, away: NDArray[np.float64]) -> None:
-        """Add the measured machine."""
-        if self._motion.measured is not None:
-            add_ghost(self.model, self._ghost, scene, self._seen, away)
 
 
 def make_sliders(model: IdentifiedModel, pose: str | None = None) -> Sliders:

@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 from hydroid.errors import RunError
 from hydroid.viewer.film import sight
@@ -27,24 +27,15 @@ def show(playback: Playback) -> None:
         play(playback, viewer)
 
 
-class Viewer(Protocol):
-    """What is used of `mujoco.viewer.Handle`."""
-
-    user_scn: Any
-    cam: Any
-
-    def is_running(self) -> bool: ...  # noqa: D102
-    def sync(self) -> None: ...  # noqa: D102
-    def set_texts(self, texts: Any) -> None: ...  # noqa: D102
-
-
 def play(
     playback: Playback,
-    viewer: Viewer,
+    viewer: Any,
     clock: Callable[[], float] = time.perf_counter,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
     """Show what moves in real time until the window is closed; the viewer's reset starts it again.
+
+    `viewer` is a `mujoco.viewer.Handle`, or what behaves like one.
 
     Raises:
         RunError: the simulation diverged.
@@ -67,7 +58,7 @@ def play(
 
 
 @contextmanager
-def window(playback: Playback) -> Generator[Viewer]:
+def window(playback: Playback) -> Generator[Any]:
     """Open MuJoCo's viewer on what moves; it closes with the context.
 
     Raises:

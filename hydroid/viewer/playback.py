@@ -68,6 +68,7 @@ class Sliders(Playback):
 
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
         self.plant, self._start = plant, pose
+        plant.reset(pose)  # it builds another model where it holds other joints in place
         super().__init__(plant.model, plant.data)
 
     @property

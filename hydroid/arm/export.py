@@ -7,14 +7,13 @@ cameras and lights of a fused body hang on the body that carries it; contacts ar
 import math
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
-from hydroid.arm.locked import Array, Frame, LockedArm, copy_joints
+from hydroid.arm.locked import LockedArm, copy_joints
 from hydroid.files import write_atomic
 from hydroid.mjcf import quiet_mujoco
 
@@ -44,9 +43,6 @@ mechanics.xml is the fitted arm without its hydraulics: masses, dampers and spri
 moving joints are {joints}; the others are fused in the start pose, which is the keyframe `start`.
 actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm before the fit.
 """
-_LEFT_OUT = ("contact", "equality", "sensor", "keyframe", "actuator", "deformable", "size")
-_COMPILER = ("angle", "autolimits", "eulerseq", "meshdir", "texturedir", "strippath")
-_OF_A_LINK = ("inertial", "joint", "freejoint")
 _BODY_FIELDS = ("pos", "quat", "ipos", "iquat", "mass", "inertia", "simple", "sameframe")
 
 
@@ -84,102 +80,61 @@ def arm_mjcf(
             None: no motors.
     """
     source = spec.copy()
-    source.compiler.savecompiled = source.compiler.savecanonical = False  # canonical is six digits
-    root = ElementTree.fromstring(source.to_xml())
-    for name in _LEFT_OUT:
-        for section in root.findall(name):
-            root.remove(section)
-    compiler = _section(root, "compiler")
-    for name in compiler.attrib.keys() - _COMPILER:  # what changes weights or fuses bodies
-        del compiler.attrib[name]
-    compiler.set("inertiafromgeom", "false")
-    option = _section(root, "option")
-    option.set("timestep", repr(float(model.opt.timestep)))
-    _section(option, "flag").set("contact", "disable")
-    _fuse(root, locked.frames, model)
-    _keep_drawn_tendons(root)
+    forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
+    for part in [part for section in (*forces, source.flexes, source.skins) for part in section]:
+        source.delete(part)
+    _draw_tendons(source)
+    for name, (position, turn) in locked.held.items():
+        body = source.body(name)
+        body.set_frame(body.parent.add_frame())  # its own one is part of the place
+        body.pos, body.quat, body.alt.type = position, turn, mujoco.mjtOrientation.mjORIENTATION_QUAT
+        source.delete(body.first_joint())
+    source.fuse_static()
+    compiler = source.compiler
+    compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = False, 0.0, 0.0
+    compiler.settotalmass, compiler.fusestatic = -1.0, False
+    compiler.savecompiled = compiler.savecanonical = False  # canonical is six digits
+    source.option.timestep = model.opt.timestep
+    source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    for j, name in enumerate(locked.joints):
+        _set_joint(source.joint(name), model, j, degrees=bool(compiler.degree))
     if motors is not None:
-        actuators = _section(root, "actuator")
         for name, gain, bias in zip(locked.joints, *np.asarray(motors), strict=True):
-            values = {"gainprm": _text([gain]), "biastype": "affine", "biasprm": _text([bias, 0, 0])}
-            limits = {"ctrllimited": "true", "ctrlrange": "-100 100"}
-            ElementTree.SubElement(actuators, "general", {"name": name, "joint": name} | values | limits)
-    pose = {"name": "start", "qpos": _text(model.qpos_spring)}
-    ElementTree.SubElement(_section(root, "keyframe"), "key", pose)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+            source.add_actuator(
+                name=name,
+                target=name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                gainprm=[gain] + [0.0] * 9,
+                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+                biasprm=[bias] + [0.0] * 9,
+                ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                ctrlrange=[-100.0, 100.0],
+            )
+    source.add_key(name="start", qpos=model.qpos_spring)
+    return source.to_xml()
 
 
-def _fuse(root: ElementTree.Element, frames: tuple[Frame, ...], model: mujoco.MjModel) -> None:
-    """Put the locked arm's bodies in the place of all; what hangs on the others moves to them in frames."""
-    world, degrees = _section(root, "worldbody"), _section(root, "compiler").get("angle") != "radian"
-    above, bodies = {child: part for part in world.iter() for child in part}, list(world.iter("body"))
-    kept = [ElementTree.Element("worldbody", world.attrib)]
-    homes = [(kept[0], world)]
-    for body, frame in zip(bodies, frames[1:], strict=True):  # in the order of their numbers
-        inherited, k = _default_class(body, above), frame.body
-        if k < len(kept):
-            placed = _frame(frame.position, frame.turn)
-            home = ElementTree.SubElement(kept[k], "frame", placed | inherited)
-        else:
-            named = {"name": body.get("name", "")} | _frame(model.body_pos[k], model.body_quat[k])
-            home = ElementTree.SubElement(kept[model.body_parentid[k]], "body", named | inherited)
-            mass = {"mass": _text([model.body_mass[k]]), "diaginertia": _text(model.body_inertia[k])}
-            placed = _frame(model.body_ipos[k], model.body_iquat[k])
-            ElementTree.SubElement(home, "inertial", placed | mass)
-            home.append(_joint(body, model, k - 1, degrees))
-            kept.append(home)
-        homes.append((home, body))
-    for body in bodies:
-        above[body].remove(body)
-    for home, body in homes:
-        home.extend([part for part in body if part.tag not in _OF_A_LINK])
-    root[list(root).index(world)] = kept[0]
+def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees: bool) -> None:
+    """Give a joint and its body the inertia, damping and spring of the locked arm."""
+    body, k, slack = joint.parent, int(model.jnt_bodyid[j]), float(model.qpos_spring[j])
+    body.explicitinertial, body.mass, body.ipos = True, model.body_mass[k], model.body_ipos[k]
+    body.iquat, body.ialt.type = model.body_iquat[k], mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
+    joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
+    joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
+    joint.springref = math.degrees(slack) if degrees else slack
 
 
-def _default_class(
-    body: ElementTree.Element, above: dict[ElementTree.Element, ElementTree.Element]
-) -> dict[str, str]:
-    """The default class of a body's parts: its own, or that of what it is in."""
-    part: ElementTree.Element | None = body
-    while part is not None:
-        if name := part.get("childclass"):
-            return {"childclass": name}
-        part = above.get(part)
-    return {}
-
-
-def _joint(body: ElementTree.Element, model: mujoco.MjModel, j: int, degrees: bool) -> ElementTree.Element:
-    joint, slack = body.findall("joint")[0], float(model.qpos_spring[j])
-    joint.set("damping", _text([model.dof_damping[j]]))
-    joint.set("stiffness", _text([model.jnt_stiffness[j]]))
-    joint.set("frictionloss", _text([model.dof_frictionloss[j]]))
-    joint.set("armature", _text([model.dof_armature[j]]))
-    joint.set("springref", _text([math.degrees(slack) if degrees else slack]))
-    return joint
-
-
-def _keep_drawn_tendons(root: ElementTree.Element) -> None:
+def _draw_tendons(spec: mujoco.MjSpec) -> None:
     """Keep tendons as drawings of cylinders: none of their forces is simulated."""
-    for section in root.findall("tendon"):
-        for tendon in list(section):
-            if tendon.tag != "spatial":
-                section.remove(tendon)
-            for name in tendon.attrib.keys() - {"name", "width", "rgba", "material", "group"}:
-                del tendon.attrib[name]
-
-
-def _section(root: ElementTree.Element, name: str) -> ElementTree.Element:
-    found = root.find(name)
-    return ElementTree.SubElement(root, name) if found is None else found
-
-
-def _frame(position: Array, turn: Array) -> dict[str, str]:
-    return {"pos": _text(position), "quat": _text(turn)}
-
-
-def _text(values: Array | list[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    for tendon in list(spec.tendons):
+        if any(wrap.type == mujoco.mjtWrap.mjWRAP_JOINT for wrap in tendon.path):
+            spec.delete(tendon)
+            continue
+        tendon.limited = tendon.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+        tendon.stiffness = tendon.damping = np.zeros(3)
+        tendon.frictionloss = tendon.armature = 0.0
 
 
 def write_fitted(

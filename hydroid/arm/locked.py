@@ -48,7 +48,7 @@ class _Part:
     """about its centre, for 1 kg [m²], shape (3, 3)"""
 
 
-class Frame(NamedTuple):
+class _Frame(NamedTuple):
     """Where a body of the whole arm is in the locked arm."""
 
     body: int
@@ -72,8 +72,8 @@ class LockedArm:
     pose: Array
     """where they start [rad], shape (V,)"""
     parts: tuple[_Part, ...]
-    frames: tuple[Frame, ...]
-    """of all bodies of the whole arm; a moving joint's body comes before those that are fused with it"""
+    held: dict[str, tuple[Array, Array]]
+    """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y, z)"""
 
     def inertials(self, masses: Array) -> dict[str, Array]:
         """Fuse links of some masses [kg], shape (n, L); row k depends on masses[k] alone, to the last bit.
@@ -124,10 +124,15 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
         if name not in joints:
             data.joint(name).qpos[0] = angle
     mujoco.mj_kinematics(full, data)
+    held = {
+        full.body(full.joint(name).bodyid[0]).name: _place(data, int(full.joint(name).bodyid[0]))
+        for name in arm.joint_names
+        if name not in joints
+    }
     kept = [0, *(int(full.joint(name).bodyid[0]) for name in joints)]
     frames = _frames(full, data, kept)
     model = _skeleton(full, joints, kept, frames)
-    locked = LockedArm(model, joints, columns, pose[columns], _parts(full, data, arm, kept, frames), frames)
+    locked = LockedArm(model, joints, columns, pose[columns], _parts(full, data, arm, kept, frames), held)
     masses = np.array([full.body(name).mass[0] for name in arm.link_names])
     for name, value in locked.inertials(masses[None]).items():
         getattr(model, name)[:] = value[0]
@@ -145,19 +150,24 @@ def copy_joints(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
         setattr(target.opt, name, getattr(source.opt, name))
 
 
-def _frames(full: mujoco.MjModel, data: mujoco.MjData, kept: list[int]) -> tuple[Frame, ...]:
-    frames: list[Frame] = []
+def _place(data: mujoco.MjData, body: int, above: int | None = None) -> tuple[Array, Array]:
+    """Position and quaternion of a body in another, its parent by default."""
+    above = int(data.model.body_parentid[body]) if above is None else above
+    turn = np.empty(4)
+    mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
+    return data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above]), turn
+
+
+def _frames(full: mujoco.MjModel, data: mujoco.MjData, kept: list[int]) -> tuple[_Frame, ...]:
+    frames: list[_Frame] = []
     for body, parent in enumerate(full.body_parentid):
         above = kept[frames[parent].body] if body else 0  # its carrier, or its parent's
-        turn = np.empty(4)
-        mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
-        position = data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above])
-        frames.append(Frame(kept.index(body if body in kept else above), position, turn))
+        frames.append(_Frame(kept.index(body if body in kept else above), *_place(data, body, above)))
     return tuple(frames)
 
 
 def _parts(
-    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: list[int], frames: tuple[Frame, ...]
+    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: list[int], frames: tuple[_Frame, ...]
 ) -> tuple[_Part, ...]:
     """Every body that moves and has mass, seen from the body that it is part of."""
     column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
@@ -180,7 +190,7 @@ def _parts(
 
 
 def _skeleton(
-    full: mujoco.MjModel, joints: tuple[str, ...], kept: list[int], frames: tuple[Frame, ...]
+    full: mujoco.MjModel, joints: tuple[str, ...], kept: list[int], frames: tuple[_Frame, ...]
 ) -> mujoco.MjModel:
     """The chain of kept bodies with the joints' properties; what it weighs is still to be written."""
     spec = mujoco.MjSpec()

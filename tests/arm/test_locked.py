@@ -1,11 +1,12 @@
 import mujoco
 import numpy as np
 import pytest
-from arms import write_arm
+from arms import BOOM, write_arm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mujoco.batch import Batch
 
+from hydroid.arm.export import arm_mjcf
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.errors import ModelError
@@ -145,6 +146,29 @@ def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
     batch.forward()
     per_mass = [(x**2 + z**2) / 12 for x, _, z in (blocks["a"], blocks["b"])]
     np.testing.assert_allclose(acceleration[:, 0], 1 / (masses @ per_mass), rtol=1e-6)
+
+
+@pytest.mark.parametrize("moving", [["lift"], ["tilt"]])
+def test_the_export_stands_where_the_whole_arm_does(tmp_path, moving):
+    """Also bodies in frames, turned by angles; only drawings are left of tendons."""
+    bar = BOOM[BOOM.index('<body name="bar"') : BOOM.index("</body>\n      </body>")] + "</body>"
+    turned = bar.replace('name="bar" pos="6 0 0"', 'name="bar" pos="1 0 0" euler="0 20 0"')
+    frame = f'<frame pos="5 0 1" euler="30 0 0"><site name="eye"/>{turned}</frame>'
+    fixed = '<tendon><fixed><joint joint="tilt" coef="1"/></fixed></tendon></mujoco>'
+    arm = write_arm(tmp_path, BOOM.replace(bar, frame).replace("</mujoco>", fixed))
+    spec, pose = load_model(arm), np.array([0.3, -0.4])
+    locked, whole = lock(spec, arm, moving, pose), spec.compile()
+    model = mujoco.MjModel.from_xml_string(arm_mjcf(spec, locked, locked.model))
+    here, there = mujoco.MjData(model), mujoco.MjData(whole)
+    here.qpos[:], there.qpos[:] = locked.pose, pose
+    mujoco.mj_forward(model, here)
+    mujoco.mj_forward(whole, there)
+    assert (model.njnt, model.ntendon) == (1, 0)
+    np.testing.assert_allclose(
+        *(d.geom_xpos[np.argsort(d.geom_xpos[:, 0])] for d in (here, there)), atol=1e-9
+    )
+    np.testing.assert_allclose(here.site_xpos, there.site_xpos, atol=1e-9)
+    np.testing.assert_allclose(here.qfrc_bias, there.qfrc_bias[locked.columns], atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -60,14 +60,14 @@ def main() -> None:
     problem = Problem(settings, [clean])
     truth, free = problem.parameters.vector(TRUTH, "truth"), problem.parameters.free
     # planned at the truth once: every fit then states the same quantities
-    measure = joint_measure(make_bench(settings, [clean], 2), problem.stage.candidates(truth[None]))
-    columns, actual = zip(*measure(problem.stage.candidates(truth[None])), strict=True)
+    measure = joint_measure(make_bench(settings, [clean], 2), problem.bindings.candidates(truth[None]))
+    columns, actual = zip(*measure(problem.bindings.candidates(truth[None])), strict=True)
     labels = [f"{c.label}{f' at {c.at:.0f}' if c.along else ''} [{c.unit}]" for c in columns]
     true = np.array([float(value[0]) for value in actual])
     positive = np.array([column.positive for column in columns])
 
     def values(theta: np.ndarray) -> np.ndarray:
-        return np.stack([value for _, value in measure(problem.stage.candidates(theta))], axis=1)
+        return np.stack([value for _, value in measure(problem.bindings.candidates(theta))], axis=1)
 
     intervals, estimates, sds, unknown = [], [], [], []
     assert settings.refinement is not None

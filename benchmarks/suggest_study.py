@@ -33,11 +33,10 @@ from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import simulate_log
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem, make_simulation
-from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
-from hydroid.simulation import HydraulicSimulation
 
 NOISE = np.deg2rad(0.1)
 REST = 100
@@ -102,8 +101,7 @@ def make_log(present: dict[str, float], seconds: float, seed: int) -> Log:
 def largest_flow(truth: FitSettings, log: Log) -> float:
     """Flow from the pump that the true arm exceeds for 1 % of a log [L/min]."""
     simulation = make_simulation(load_model(truth.arm), log, [1], truth)
-    assert isinstance(simulation, HydraulicSimulation)
-    stage = Stage(truth)
+    stage = Bindings(truth)
     flow = simulation.trace(stage.candidates(stage.parameters.vector(TRUTH, "truth")[None])).flow[:, 0]
     return 6e4 * float(np.quantile(np.maximum(flow[:, 0], -flow[:, 1]), 0.99))
 

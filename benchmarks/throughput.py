@@ -39,7 +39,7 @@ def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm
 
 def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
-    log, candidates = problem.logs[0], problem.stage.candidates(theta)
+    log, candidates = problem.logs[0], problem.bindings.candidates(theta)
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
@@ -47,15 +47,15 @@ def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], 
     batch = Batch(reduced.model, nsim=len(theta))
     for name, value in reduced.inertials(candidates.mass).items():
         batch.expand(name)[:] = value
-    batch.expand("dof_damping")[:] = candidates.damping[:, moving]
-    batch.expand("jnt_stiffness")[:] = candidates.stiffness[:, moving]
+    batch.expand("dof_damping")[:] = candidates.joints.damping[:, moving]
+    batch.expand("jnt_stiffness")[:] = candidates.joints.stiffness[:, moving]
     batch.set_const()
     steps = len(log.time) - 1
     batch.reset()
     batch.bind("qpos")[:] = log.angle[0, moving]
     bias = batch.bind("qfrc_bias")
     batch.forward()
-    torque = bias[:, None] + candidates.gain[:, None, moving] * log.command[:-1, moving]
+    torque = bias[:, None] + candidates.joints.gain[:, None, moving] * log.command[:-1, moving]
     out = {"qpos": np.empty((len(theta), steps, len(moving)))}
     applied = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
 

@@ -12,10 +12,10 @@ from hydroid.errors import RunError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
-from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import HydraulicSimulation, Response
+from hydroid.simulation import Response
 
 TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool", "mm"), ("force", "N"))
 """columns of a trace for each joint"""
@@ -70,13 +70,12 @@ def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], sou
 
 def trace_csv(model: IdentifiedModel, log: Log) -> str:
     """Return a CSV of the driven joints' actuators, in bar, L/min, mm and N (N·m of a rotary actuator)."""
-    settings, stage = model.settings, Stage(model.settings)
+    settings, bindings = model.settings, Bindings(model.settings)
     outputs = [int(j) for j in np.flatnonzero(log.driven)]
     simulation = make_simulation(load_model(settings.arm), log, outputs, settings)
-    assert isinstance(simulation, HydraulicSimulation)
-    observed = simulation.trace(stage.candidates(model.theta[None]))
+    observed = simulation.trace(bindings.candidates(model.theta[None]))
     names, columns = ["time_s"], [log.time]
-    for k, joint in enumerate(observed.joints):
+    for k, joint in enumerate(simulation.joints + 1):
         names += [f"{what}{joint}_{unit}" for what, unit in TRACED]
         columns += [
             *(observed.pressure[:, k].T / 1e5),
@@ -93,10 +92,10 @@ def _respond(
     model: IdentifiedModel, log: Log, joints: Sequence[int], pressures: Sequence[int] = ()
 ) -> Response:
     """Simulate the angles of `joints`, 1-based, and the pressures of some joints, 0-based."""
-    settings, stage = model.settings, Stage(model.settings)
+    settings, bindings = model.settings, Bindings(model.settings)
     spec, outputs = load_model(settings.arm), [j - 1 for j in joints]
     simulation = make_simulation(spec, log, outputs, settings, pressures)
-    response = simulation.simulate(stage.candidates(model.theta[None]))
+    response = simulation.simulate(bindings.candidates(model.theta[None]))
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=model.source)
     return response

@@ -11,8 +11,10 @@ import pytest
 from hypothesis import settings
 
 from hydroid.arm.model import load_model
+from hydroid.hydraulics.records import nominal_joints
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation import Candidates
 
 # an example's time says nothing on a machine that is busy with something else
@@ -44,10 +46,19 @@ def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: i
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def candidates(arm: Arm, n: int, seed: int = 0) -> Candidates:
+def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | None = None) -> Candidates:
     """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
     rng = np.random.default_rng(seed)
     joints = np.ones((1, len(arm.joint_names)))
-    shared = [rng.uniform(0.5, 2.0, (n, 1)) * value * joints for value in (0.2, 231.8, 53.4)]
-    mass = rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses
-    return Candidates(*shared, friction=np.zeros((n, len(arm.joint_names))), mass=mass)
+    values = np.tile(nominal_joints(arm, hydraulics or HydraulicSettings()), (n, 1)).view(np.recarray)
+    for name, value in (("gain", 0.2), ("damping", 231.8), ("stiffness", 53.4)):
+        values[name] = rng.uniform(0.5, 2.0, (n, 1)) * value * joints
+    return Candidates(values, rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses)
+
+
+def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:
+    """The candidates with some quantities of their joints replaced, in SI."""
+    values = candidates.joints.copy()
+    for name, value in joints.items():
+        values[name] = value
+    return Candidates(values, candidates.mass)

@@ -10,7 +10,7 @@ import hydroid
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, read_estimate, write_estimate
 from hydroid.identified_model import load_identified, start_values, write_settings
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
 
 VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -18,7 +18,7 @@ VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4
 
 def nominal(source: Path | None = None, **overrides: object):
     model = load_identified(source, None, overrides, default="fit-hyd", nominal=True)
-    return model, Stage(model.settings).candidates(model.theta[None])
+    return model, Bindings(model.settings).candidates(model.theta[None])
 
 
 def run_folder(folder: Path, final: str) -> Path:
@@ -38,16 +38,13 @@ def test_values_are_taken_and_what_is_not_named_is_nominal(tmp_path: Path, arm: 
     file.write_text("A_A: 900\nM3: 20\n")
     model, found = nominal(file)
     _, plain = nominal()
-    assert found.actuators is not None
-    assert plain.actuators is not None
-    assert found.actuators.area_a[0] == pytest.approx([8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4])
-    assert (found.actuators.area_b == plain.actuators.area_b).all()
+    assert found.joints.area_a[0] == pytest.approx([8e-4, 9e-4, 1e-3, 1e-5, 5e-4, 8e-6, 3e-4])
+    assert (found.joints.area_b == plain.joints.area_b).all()
     assert found.mass[0] == pytest.approx(np.where(np.arange(8) == 2, 20.0, arm.masses))
     assert (plain.mass[0] == arm.masses).all()
     assert "A_B" in model.nominal
     assert "A_A" not in model.nominal
-    fixed = nominal(None, **{"parameters.A_A.fixed": 700})[1].actuators
-    assert fixed is not None
+    fixed = nominal(None, **{"parameters.A_A.fixed": 700})[1].joints
     assert fixed.area_a[0, 1] == 7e-4
 
 

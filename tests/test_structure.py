@@ -18,6 +18,7 @@ LAYERS = [
         "mjcf",
         "parameters",
         "progress",
+        "quantity_table",
         "settings",
         "units",
         "words",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
@@ -184,7 +184,7 @@ def _driven_joints(settings: FitSettings) -> list[int]:
     if joints[-1] > len(settings.arm.joints):
         raise SettingsError(f"the arm has joints 1 to {len(settings.arm.joints)}", where="design.joints")
     driven = np.isin(np.arange(len(settings.arm.joints)) + 1, joints)
-    Stage(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
+    Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
     return [j - 1 for j in joints]
 
 

@@ -18,9 +18,9 @@ from hydroid.parameters import Array
 from hydroid.posterior.covariance import uncertainty
 from hydroid.posterior.jacobian import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.posterior import Posterior
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem
-from hydroid.problem.stage import Stage
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.fit import FitSettings
 
@@ -104,7 +104,7 @@ def design(
     Raises:
         SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
     """
-    effort, parameters = settings.design.effort, Stage(settings).parameters
+    effort, parameters = settings.design.effort, Bindings(settings).parameters
     rng = np.random.default_rng(seed)
     if logs:
         fitted = uncertainty(Problem(settings, logs), theta).posterior

@@ -25,8 +25,8 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.noise import Noise
 from hydroid.posterior.posterior import Posterior
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
-from hydroid.problem.stage import Stage
 from hydroid.search.axes import differentiate
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
@@ -94,7 +94,7 @@ class ExperimentSimulator:
             simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
             settings = settings.model_copy(update={"simulation": simulation})
         self._settings, self._outputs = settings, [j - 1 for j in settings.outputs]
-        self._period, self._stage = settings.log.period_s, Stage(settings)
+        self._period, self._bindings = settings.log.period_s, Bindings(settings)
         self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)
         arm, self._machine = settings.arm, None
         if settings.design.clearance_m is not None:
@@ -156,7 +156,7 @@ class ExperimentSimulator:
         passive = self._settings.simulation.other_joints == "passive"
         moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
         simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
-        response = simulation.simulate(self._stage.candidates(theta))
+        response = simulation.simulate(self._bindings.candidates(theta))
         angle = np.tile(log.angle, (len(theta), 1, 1))
         angle[:, :, moving] = response.angle
         angle[~response.feasible] = np.nan

@@ -15,8 +15,8 @@ from hydroid.advice.suggest import Suggestions
 from hydroid.estimate import finite
 from hydroid.findings import Finding
 from hydroid.problem.problem import Problem
+from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.problem import MECHANICAL_UNITS
 from hydroid.words import plain
 
 UNITS = {Regressor.ANGLE: "deg", Regressor.VELOCITY: "deg/s", Regressor.COMMAND: "%"}
@@ -191,7 +191,7 @@ def _proposed(test: TermTest) -> dict[str, Any]:
 
 def _start(test: TermTest) -> dict[str, float]:
     """The start value of a mechanical parameter, within the proposed bounds."""
-    if test.term.settings.quantity not in MECHANICAL_UNITS:
+    if test.term.settings.quantity not in MECHANICAL:
         return {}
     low, high = proposed_bounds(test)
     return {"start": min(max(test.term.value, low), high)}

@@ -11,9 +11,10 @@ from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.parameters import Array
 from hydroid.posterior.open_start import with_open_start
 from hydroid.problem.problem import Problem, make_simulation
-from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, SPANS, TARGETS, actuator_values
-from hydroid.settings.problem import MECHANICAL_SPANS, ParameterSettings
-from hydroid.simulation.hydraulic import STOP_REACH, HydraulicSimulation
+from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS
+from hydroid.settings.hydraulics import actuator_values
+from hydroid.settings.problem import ParameterSettings
+from hydroid.simulation.chain import STOP_REACH
 
 HELD_SPAN = 4.0
 """a parameter that is held without bounds is tested from a quarter to four times its value"""
@@ -89,13 +90,13 @@ def terms(problem: Problem, theta: Array, *, sides: bool = True) -> tuple[Term, 
     taken = {
         (target, joint)
         for p in settings.parameters.values()
-        for target in TARGETS.get(p.quantity, (p.quantity,))
+        for target in TARGETS[p.quantity]
         for joint in p.joints or everyone
     }
     off: list[Term] = []
     joints = problem.active_joints
     for quantity, (targets, span) in _spans(settings.stage, sides=sides).items():
-        pump = quantity in OF_THE_PUMP
+        pump = CHOICES[quantity].of_the_pump
         if pump and len(joints) == 1:
             continue  # the pump of one actuator is no more than its flow limit
         if quantity == "start_pressure" and any(log.pressure is not None for log in problem.logs):
@@ -127,9 +128,8 @@ def _trapped(problem: Problem, theta: Array, joint: int) -> Term | None:
         if log.driven[j] and room.min() <= STOP_REACH:
             spec = load_model(arm)
             simulation = make_simulation(spec, log, problem.outputs, problem.settings)
-            assert isinstance(simulation, HydraulicSimulation)
-            traced = simulation.trace(problem.stage.candidates(theta[None]))
-            carried = float(traced.pressure[0, traced.joints == joint, 0][0]) / most.factor
+            traced = simulation.trace(problem.bindings.candidates(theta[None]))
+            carried = float(traced.pressure[0, simulation.joints == j, 0][0]) / most.factor
             # chamber A lifts off the lower stop, unless the cylinder runs out towards negative angles
             less = (room[0] < room[1]) == (getattr(actuator, "sense", 1.0) > 0)
             span = (0.0, carried) if less else (carried, problem.settings.hydraulics.supply_pressure)
@@ -143,13 +143,11 @@ def _trapped(problem: Problem, theta: Array, joint: int) -> Term | None:
 
 def _spans(stage: str, *, sides: bool) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
     """Targets and span of each quantity to test, by name: both sides of an actuator, then each."""
-    spans: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {
-        name: ((name,), span) for name, span in MECHANICAL_SPANS.items()
-    }
-    if stage == "hyd":
-        for name, span in SPANS.items():
-            spans[name] = (TARGETS[name], span)
-            spans |= {side: ((side,), span) for side in TARGETS[name] if side != name and sides}
+    spans: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {}
+    for row in ROWS:
+        if row.span and (stage == "hyd" or row.name in MECHANICAL):
+            spans[row.name] = (TARGETS[row.name], row.span)
+            spans |= {side: ((side,), row.span) for side in TARGETS[row.name] if side != row.name and sides}
     return spans
 
 
@@ -170,8 +168,6 @@ def unused(name: str, taken: Collection[str]) -> str:
 
 
 def _nominal(problem: Problem, quantity: str, joint: int) -> float:
-    if quantity not in QUANTITIES:
-        return 0.0
     settings = problem.settings
     value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
     if quantity == "start_pressure" and value is None:
@@ -194,7 +190,7 @@ class ExtendedModel:
         parts: list[list[str]] = []
         for term in self.terms:
             joint = (term.settings.joints or (0,))[0]
-            targets = TARGETS.get(term.settings.quantity, (term.settings.quantity,))
+            targets = TARGETS[term.settings.quantity]
             parts.append([term.name] if term.named else [f"{target}_of_{joint}" for target in targets])
             for part, target in zip(parts[-1], targets, strict=False):
                 if not term.named:

@@ -12,10 +12,10 @@ from hydroid.estimate import ParameterEstimate, estimate_file, read_values
 from hydroid.files import is_file
 from hydroid.identified_model import ARM, CONFIG
 from hydroid.posterior.flags import Flag
+from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
 from hydroid.settings.parameters import nominal_value
-from hydroid.settings.problem import MECHANICAL_UNITS
 
 MOVED = 0.1
 """relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""
@@ -116,5 +116,5 @@ def _parameters(first: FitSettings, own: Any) -> dict[str, Any]:
 
 def _mechanical(settings: FitSettings) -> list[str]:
     """Names of the parameters that both stages have."""
-    quantities = [name for name in MECHANICAL_UNITS if name != "gain"]
+    quantities = [name for name in MECHANICAL if name != "gain"]
     return [name for name, p in settings.parameters.items() if p.quantity in quantities]

@@ -9,7 +9,8 @@ limit.
 What is stored is not pressure but *oil*: y = p + β ln(V/V_0) (for a rotary chamber y = p ± β D_m q/V_0). It
 changes by valve flow alone, ẏ = β Q / V, whatever the joint does, so that shut chambers conserve their oil to
 the last digit and pressures come back with the angle. Where oil alone does not fill the chamber, the
-pressure rests at vapour pressure and y remembers the missing volume: no oil is made or lost.
+pressure rests at vapour pressure, which is taken for 0, and y remembers the missing volume: no oil is made or
+lost.
 """
 
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, select
+from hydroid.hydraulics.records import LINEAR, Array
 from hydroid.settings import linkage
 
 SLIDING = 1e-3
@@ -36,10 +38,37 @@ def volume(travel: Any, area: Any, dead: Any) -> Any:
     return np.maximum(dead + area * travel, SMALLEST * dead)
 
 
-@compilable
-def oil_pressure(oil: Any, fill: Any, bulk: Any, vapour: Any) -> Any:
-    """Pressure [Pa] of oil y [Pa] in a chamber of fill ln(V/V_0) or ± D_m q/V_0: at least vapour pressure."""
-    return np.maximum(oil - bulk * fill, vapour)
+def fills(angle: Array, c: Any) -> tuple[Array, Array]:
+    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
+    travel, linear = rod_motion(angle, c)[0], c.kind == LINEAR
+    sides = (c.a, travel, angle), (c.b, c.stroke - travel, -angle)
+    a, b = (
+        np.where(
+            linear,
+            np.log(volume(np.where(linear, out, 0.0), side.area, c.dead_volume) / c.dead_volume),
+            turn * side.area / c.dead_volume,
+        )
+        for side, out, turn in sides
+    )
+    return a, b
+
+
+def rod_motion(angle: Array, c: Any) -> tuple[Array, Array, Array]:
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
+
+    Of a rotary actuator x means nothing, and r is 1.
+    """
+    linear = c.kind == LINEAR
+    # joints without a triangle get a harmless one
+    a, b = np.where(linear, c.pivot_distance_1, 2.0), np.where(linear, c.pivot_distance_2, 1.0)
+    psi, first, second = angle, 1.0, 0.0
+    if (rocks := c.rocker > 0).any():
+        with np.errstate(all="ignore"):  # joints without a rocker
+            bars = four_bar(angle, c)
+        psi, first, second = (np.where(rocks, x, y) for x, y in zip(bars, (angle, 1.0, 0.0), strict=True))
+    travel, arm, slope = triangle(psi, a, b, c.theta0, c.shortest)
+    slope = slope * first**2 + arm * second
+    return travel, np.where(linear, arm * first, 1.0), np.where(linear, slope, 0.0)
 
 
 @compilable

@@ -1,8 +1,7 @@
 """Functions written once for numpy arrays and for the scalars of a compiled loop.
 
 A component's law is a plain Python function of floats or of arrays that broadcast (population axis
-first). Marked `compilable`, the very same function is compiled into the kernel. `select` and `power` exist
-because a compiled loop should not compute the branch that it drops.
+first). Marked `compilable`, the very same function is compiled into the kernel.
 """
 
 from collections.abc import Callable
@@ -24,12 +23,6 @@ def select(condition: Any, yes: Any, no: Any) -> Any:
     return np.where(condition, yes, no)
 
 
-def power(base: Any, exponent: Any) -> Any:
-    """Return base^exponent."""
-    return base**exponent
-
-
-@compilable
 def implicit_weight(speed: Any) -> Any:
     """Weight of the new state in a linearised step, from rate times step (dimensionless).
 
@@ -39,17 +32,17 @@ def implicit_weight(speed: Any) -> Any:
     return 1.0 - 1.0 / np.maximum(speed, 2.0)
 
 
-@overload(select)
-def _compiled_select(condition: Any, yes: Any, no: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(condition: Any, yes: Any, no: Any) -> Any:
-        return yes if condition else no
+@overload(implicit_weight)
+def _compiled_weight(speed: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(speed: Any) -> Any:
+        return 0.5 if speed <= 2.0 else 1.0 - 1.0 / speed
 
     return scalar
 
 
-@overload(power)
-def _compiled_power(base: Any, exponent: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(base: Any, exponent: Any) -> Any:
-        return base if exponent == 1.0 else base**exponent
+@overload(select)
+def _compiled_select(condition: Any, yes: Any, no: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(condition: Any, yes: Any, no: Any) -> Any:
+        return yes if condition else no
 
     return scalar

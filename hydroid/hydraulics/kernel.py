@@ -21,7 +21,7 @@ that is strong throws the arm about. After the step `close` puts the joint at q 
 e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped solution, of
 second order in the sub-step and stable for any stiffness; their change is first order in MuJoCo's step.
 
-Every candidate is computed from its own numbers in a fixed order, so neither threads nor chunks change a bit.
+Every candidate is computed from its own numbers in a fixed order, so threads change no bit.
 """
 
 import hashlib
@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
@@ -77,12 +76,10 @@ def substitute(matrix: Any, vector: Any) -> None:
 
 
 class Plugin(NamedTuple):
-    """What stays the same during a run, of n candidates' J joints."""
+    """What stays the same during a run, of one candidate's J joints; `of` takes one of n."""
 
     coefficients: Any
-    """(n, J), of COEFFICIENTS"""
-    damping: Any
-    """of the joints [N·m·s/rad], (n, J)"""
+    """(J,), of COEFFICIENTS, or (n, J)"""
     order: Any
     """the joints, those without actuator first, (J,)"""
     entries: Any
@@ -92,6 +89,15 @@ class Plugin(NamedTuple):
     period: float
     """of a step [s]"""
     substeps: int
+
+    @property
+    def past(self) -> int:
+        """Number of steps that the longest delay reaches back."""
+        return int(max(self.coefficients["a"]["late"].max(), self.coefficients["b"]["late"].max()))
+
+    def of(self, candidate: int) -> "Plugin":
+        """Return one candidate's."""
+        return self._replace(coefficients=self.coefficients[candidate])
 
 
 class Pad(NamedTuple):
@@ -114,13 +120,13 @@ def make_pad(joints: int) -> Pad:
 
 
 class Exchange(NamedTuple):
-    """What MuJoCo and the actuators of one candidate, or of n, tell each other at a step."""
+    """What MuJoCo and the actuators of one candidate tell each other at a step."""
 
     angle: Any
-    """[rad], (J,) or (n, J), as all but `mass`"""
+    """[rad], (J,), as all but `mass`"""
     velocity: Any
     mass: Any
-    """MuJoCo's `M` [kg·m²], (nC,) or (n, nC)"""
+    """MuJoCo's `M` [kg·m²], (nC,)"""
     torque: Any
     """answer: damping included [N·m]"""
     armature: Any
@@ -151,40 +157,38 @@ def release(pad: Pad, order: Any, idle: int, step: float) -> None:
 
 
 @compilable
-def look_ahead(
-    plugin: Plugin, candidate: int, state: Any, commands: Any, exchange: Exchange, pad: Pad
-) -> None:
+def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, exchange: Exchange, pad: Pad) -> None:
     """Look ahead over one step of one candidate; writes the torque and armature of its `exchange`.
 
-    `state` is its actuators', (J,) of JOINT_STATE; the newest of the commands [%], (.., J), holds now.
+    `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that at `now` holds.
     """
-    coefficients, damping, order, entries, idle, period, substeps = plugin
+    coefficients, order, entries, idle, period, substeps = plugin
     angle, velocity, mass, torque, armature = exchange
     work, lines, common, matrix, gain = pad
     line = lines[0]
     joints = state.shape[0]
     # all joints with an actuator have the same pump: read it at one of them
-    some, last = coefficients[candidate, order[joints - 1]], state[order[joints - 1]]
+    some, last = coefficients[order[joints - 1]], state[order[joints - 1]]
     shared = idle < joints and some.pump_flow < np.inf
     part = 1.0 / substeps
     step = part * period
     for a in range(joints):
         j = order[a]
-        c, z, w = coefficients[candidate, j], state[j], work[j]
+        c, z, w = coefficients[j], state[j], work[j]
         begin(c, z, w, angle[j], velocity[j])
         w.inertia = mass[entries[a, a]] - z.armature
         matrix[a, a] = w.inertia
         if a < idle:
-            coast(z, w, damping[candidate, j], step)
+            coast(c, z, w, step)
             matrix[a, a] += w.weight * step * w.drag
         else:
-            command(c, w, commands[:, j], period, substeps)
+            command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
         for b in range(a + 1, joints):
             matrix[a, b] = mass[entries[a, b]]
     if shared:
         demanded = False
         for a in range(idle, joints):
-            demanded |= commands[-1, order[a]] != 0.0
+            demanded |= commands[now, order[a]] != 0.0
         begin_line(line, some, last, demanded, step)
     # joints without actuator bring the same to all sub-steps: they are eliminated once
     eliminate(matrix, 0, idle)
@@ -194,11 +198,11 @@ def look_ahead(
     for i in range(substeps):
         for a in range(joints):
             j = order[a]
-            c, z, w = coefficients[candidate, j], state[j], work[j]
+            c, z, w = coefficients[j], state[j], work[j]
             if a >= idle:
                 supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
                 meter(c, w, move_spool(c, z, w, i, step), supply)
-                load(c, z, w, damping[candidate, j], step)
+                load(c, z, w, step)
                 if shared:
                     draw(line, c, w)
             resistance = w.weight * w.stiffness + w.drag
@@ -217,11 +221,11 @@ def look_ahead(
             close_line(line, some)
         for a in range(joints):
             j = order[a]
-            settle(coefficients[candidate, j], state[j], work[j], gain[a], step)
+            settle(coefficients[j], state[j], work[j], gain[a], step)
     for j in range(joints):
         z, w = state[j], work[j]
         z.way, z.predicted = w.way, w.speed
-        z.flow_a, z.flow_b = part * w.flow_a, part * w.flow_b
+        z.a.flow, z.b.flow = part * w.a.flow, part * w.b.flow
         kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
         z.armature = period * kappa
         z.torque = part * w.torque + kappa * (w.speed - velocity[j])
@@ -242,20 +246,5 @@ def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) 
         for b in range(order.size):
             momentum += mass[entries[a, b]] * (velocity[order[b]] - state[order[b]].velocity)
         z.external = momentum / period - z.torque
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def advance(plugin: Plugin, state: Any, commands: Any, exchange: Exchange, source: int = SOURCE) -> None:
-    """Let all candidates look ahead over one step under the last of the commands."""
-    angle, velocity, mass, torque, armature = exchange
-    pad = make_pad(state.shape[1])
-    for n in range(state.shape[0]):
-        one = Exchange(angle[n], velocity[n], mass[n], torque[n], armature[n])
-        look_ahead(plugin, n, state[n], commands, one, pad)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def close(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any, source: int = SOURCE) -> None:
-    """Let all candidates take over their true new velocities."""
-    for n in range(state.shape[0]):
-        take_over(plugin, state[n], velocity[n], mass[n], angle[n])
+    for j in range(order.size):
+        state[j].velocity = velocity[j]

@@ -71,11 +71,11 @@ def begin_line(line: Any, c: Any, z: Any, demanded: bool, step: float) -> None:
 def draw(line: Any, c: Any, w: Any) -> None:
     """Add what one actuator takes from the line in a sub-step, and how that answers to pressure and speed."""
     if line.pressure > c.supply_pressure:
-        w.give_a, w.give_b = 0.0, 0.0
-    back_a, back_b = w.filled_a * w.give_a * w.rise_a, w.filled_b * w.give_b * w.rise_b
-    line.drawn += w.pumped_a - back_a * w.inflow_a + w.pumped_b - back_b * w.inflow_b
-    line.softness += w.give_a * (1.0 - back_a) + w.give_b * (1.0 - back_b)
-    w.thrust = back_a * w.lever_a - back_b * w.lever_b
+        w.a.give, w.b.give = 0.0, 0.0
+    back_a, back_b = w.a.filled * w.a.give * w.a.rise, w.b.filled * w.b.give * w.b.rise
+    line.drawn += w.a.pumped - back_a * w.a.inflow + w.b.pumped - back_b * w.b.inflow
+    line.softness += w.a.give * (1.0 - back_a) + w.b.give * (1.0 - back_b)
+    w.thrust = back_a * w.a.lever + back_b * w.b.lever
     line.swept += w.thrust * w.speed
 
 
@@ -93,8 +93,8 @@ def open_line(line: Any, c: Any, step: float) -> None:
 @compilable
 def fill(line: Any, w: Any, step: float) -> None:
     """Give one actuator the flow and the torque of the line's change."""
-    w.inflow_a += w.give_a * line.change
-    w.inflow_b += w.give_b * line.change
+    w.a.inflow += w.a.give * line.change
+    w.b.inflow += w.b.give * line.change
     w.push += w.weight * w.thrust * line.change
     w.oil_stiffness += line.softness * w.thrust * w.thrust / step
 

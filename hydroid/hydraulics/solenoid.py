@@ -2,8 +2,8 @@
 
 The calibration of the Compact Field Point lifts the voltage over the valve's dead zone as soon as there is a
 command: A and C are the voltages at the smallest command, B and D those at full command. The article
-estimates A and C and does not print B and D. 10 V, the amplifier's full scale, is ours. It lets the spool
-open over the whole range of the command.
+estimates A and C and does not print B and D. Ours is the amplifier's full scale of 10 V for both, so that the
+spool opens over the whole range of the command.
 
 The article parametrises the solenoid's force, equation (5), by two points (x1, F1), (x2, F2) of the curve at
 rated current i0. Read as
@@ -23,18 +23,25 @@ import numpy as np
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, select
 
 FULL_SCALE = 10.0
-"""voltage from which the current is I_max [V], equation (4)"""
+"""voltage at full command, and from which the current is I_max [V], equation (4)"""
 
 
 @compilable
-def side_voltage(command: Any, onset: Any, full: Any, dead_band: Any = 0.0) -> Any:
+def side_voltage(command: Any, onset: Any, dead_band: Any = 0.0) -> Any:
     """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
 
-    For side A give (u, A, B), for side B (-u, C, D): command towards this side [%], voltage at the smallest
-    command and at 100 % [V]. It is 0 unless the command exceeds the dead band [%] of the pilot stage, ours.
+    For side A give (u, A), for side B (-u, C): command towards this side [%] and voltage at the smallest
+    command [V]. It is 0 unless the command exceeds the dead band [%] of the pilot stage, ours.
     """
     beyond = command - dead_band
-    return select(beyond > 0.0, onset + beyond * (full - onset) / (100.0 - dead_band), 0.0)
+    return select(beyond > 0.0, onset + beyond * (FULL_SCALE - onset) / (100.0 - dead_band), 0.0)
+
+
+@compilable
+def drive(command: Any, side: Any, c: Any) -> Any:
+    """Drive k i² [N·m²] of a side's coil at a command towards it [%]: equations (2) to (5)."""
+    current = coil_current(side_voltage(command, side.onset, side.dead_band), c.current_max, c.current_min)
+    return c.coil * current * current
 
 
 @compilable

@@ -22,9 +22,11 @@ the other chamber fills from the tank through an anti-cavitation check valve.
 from typing import Any
 
 import numpy as np
-from numba.extending import overload
 
-from hydroid.hydraulics.elementwise import compilable, power, select
+from hydroid.hydraulics.elementwise import compilable, select
+
+DENSITY = 860.0
+"""ρ of the oil [kg/m³]; ours"""
 
 NOTCHES = (0.04, 0.1, 0.25, 0.5)
 """parts of the full opening where the notches of a valve's curve end; ours"""
@@ -37,57 +39,47 @@ def spool(stroke_a: Any, stroke_b: Any) -> Any:
 
 
 @compilable
-def bent(share: Any, steepness: Any) -> Any:
-    """What `notched` says, with every notch computed."""
-    first, second, third, fourth = steepness
-    low, middle, high, half = NOTCHES
-    more = (first - 1.0) * np.minimum(share, low)
-    more = more + (second - 1.0) * np.minimum(np.maximum(share - low, 0.0), middle - low)
-    more = more + (third - 1.0) * np.minimum(np.maximum(share - middle, 0.0), high - middle)
-    more = more + (fourth - 1.0) * np.minimum(np.maximum(share - high, 0.0), half - high)
-    whole = (first - 1.0) * low + (second - 1.0) * (middle - low)
-    whole = whole + (third - 1.0) * (high - middle) + (fourth - 1.0) * (half - high)
-    return (share + more) / (1.0 + whole)
-
-
-def notched(share: Any, steepness: Any) -> Any:
-    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
-
-    `steepness` are the factors of the four parts below 4, 10, 25 and 50 %. Where all are 1, the result is the
-    power law's, to the bit; a compiled loop then computes no notch.
-    """
-    return bent(share, steepness)
-
-
-@overload(notched)
-def _compiled_notched(share: Any, steepness: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(share: Any, steepness: Any) -> Any:
-        return share if steepness == (1.0, 1.0, 1.0, 1.0) else bent(share, steepness)
-
-    return scalar
+def slot_share(travel: Any, side: Any) -> Any:
+    """Part of a side's slot that spool travel towards it [m] has passed, 0 to 1."""
+    return np.minimum(np.maximum(travel - side.overlap, 0.0) / side.slot_width, 1.0)
 
 
 @compilable
-def opening(spool: Any, c: Any) -> Any:
-    """Opening A(x) of the pump's edge [m²], without leakage, at x [m]; x > 0 opens P→A, x < 0 P→B."""
-    towards_a = spool > 0.0
-    beyond = np.abs(spool) - select(towards_a, c.overlap_a, c.overlap_b)
-    slot = select(towards_a, c.slot_width_a, c.slot_width_b)
-    fraction = np.minimum(np.maximum(beyond, 0.0) / slot, 1.0)
-    exponent = select(towards_a, c.opening_exponent_a, c.opening_exponent_b)
-    share = power(fraction, exponent)
-    steepness = (
-        select(towards_a, c.notch_1_a, c.notch_1_b),
-        select(towards_a, c.notch_2_a, c.notch_2_b),
-        select(towards_a, c.notch_3_a, c.notch_3_b),
-        select(towards_a, c.notch_4_a, c.notch_4_b),
+def notched(share: Any, side: Any) -> Any:
+    """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
+
+    Where all four factors are 1, the result is the power law's, to the bit.
+    """
+    low, middle, high, half = NOTCHES
+    first, second, third, fourth = (
+        side.notch_1 - 1.0,
+        side.notch_2 - 1.0,
+        side.notch_3 - 1.0,
+        side.notch_4 - 1.0,
     )
-    return select(towards_a, c.opening_a, c.opening_b) * notched(share, steepness)
+    more = first * np.minimum(share, low)
+    more = more + second * np.minimum(np.maximum(share - low, 0.0), middle - low)
+    more = more + third * np.minimum(np.maximum(share - middle, 0.0), high - middle)
+    more = more + fourth * np.minimum(np.maximum(share - high, 0.0), half - high)
+    whole = first * low + second * (middle - low) + third * (high - middle) + fourth * (half - high)
+    return (share + more) / (1.0 + whole)
 
 
-def conductance(flow_coefficient: Any, density: Any) -> Any:
+def opening(spool: Any, c: Any) -> Any:
+    """Opening A(x) of the pump's edge [m²], without leakage, at x [m]; x > 0 opens P→A, x < 0 P→B.
+
+    The compiled loop computes the same in `joint.meter`, without the terms that are off.
+    """
+    a, b = (
+        side.opening * notched(slot_share(travel, side) ** side.opening_exponent, side)
+        for side, travel in ((c.a, spool), (c.b, -spool))
+    )
+    return np.where(spool > 0.0, a, b)
+
+
+def conductance(flow_coefficient: Any) -> Any:
     """C_q √(2/ρ) [m/(s √Pa)]: flow per opening and root of the pressure drop."""
-    return flow_coefficient * np.sqrt(2.0 / density)
+    return flow_coefficient * np.sqrt(2.0 / DENSITY)
 
 
 @compilable

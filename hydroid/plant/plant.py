@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from copy import copy
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,13 +13,14 @@ from hydroid.arm.locked import lock
 from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
-from hydroid.hydraulics.actuator import ActuatorState
-from hydroid.hydraulics.records import JOINT_STATE, drawing_values, has_force_curve
+from hydroid.hydraulics.actuator import observe
+from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
-from hydroid.problem.stage import Stage
-from hydroid.simulation.hydraulic import ArmActuators
-from hydroid.simulation.rollout import HydraulicArm, SingleArm, compile_rollout
+from hydroid.problem.bindings import Bindings
+from hydroid.quantity_table import QUANTITIES
+from hydroid.simulation.chain import Chain
+from hydroid.simulation.rollout import NO_ACTUATORS, NO_JOINTS, Course, Record, SteppedArm, compile_rollout
 from hydroid.simulation.scenario import model_values
 
 Array = NDArray[np.float64]
@@ -74,14 +75,13 @@ class Plant:
         self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
-        self._candidate = Stage(settings).candidates(identified.theta[None])
+        self._candidate = Bindings(settings).candidates(identified.theta[None])
         self._locked_pose: Array | None = None
-        if self._candidate.actuators is not None:
-            if not has_force_curve(self._candidate.actuators)[0]:
-                hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
-                what = "no force-stroke curve runs through its two points"
-                raise SettingsError(what, where=identified.source, hint=hint)
-            compile_rollout()
+        if settings.stage == "hyd" and not has_force_curve(self._candidate.joints)[0]:
+            hint = "it takes F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)²"
+            what = "no force-stroke curve runs through its two points"
+            raise SettingsError(what, where=identified.source, hint=hint)
+        compile_rollout()
         self.reset()
 
     @property
@@ -112,10 +112,9 @@ class Plant:
     def pressure(self) -> Array:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
         pressure = np.full((len(self._pose), 2), np.nan)
-        if isinstance(self._arm, HydraulicArm):
-            state = ActuatorState(self._state[None], self._commands)
-            observation = self._actuator.observe(state, self.data.qpos[None])
-            pressure[self._active] = observation.pressure[0, self._active[self._columns]]
+        if self._chain is not None:
+            seen = observe(self._plugin.coefficients, self._state, self.data.qpos)
+            pressure[self._active] = seen.pressure[self._active[self._columns]]
         return pressure
 
     def reset(self, pose: str | ArrayLike | None = None) -> Array:
@@ -146,13 +145,16 @@ class Plant:
         self.model.qpos_spring[:] = start_angle
         with quiet_mujoco():
             self._balance = self._arm.start(self._values, 0, start_angle)
-            if isinstance(self._arm, HydraulicArm):
-                balance = self._balance[None]
-                self._actuator, state = self._actuators.start(self._candidate, start_angle, balance)
-                self._state, past = state.joints[0], len(state.commands) - 1
-                self._commands = np.zeros((past + self._steps, len(self._columns)))
-                self._arm.attach(self._actuator, self._state, 0)
-                self._mass = self.data.M.copy()
+            self._plugin, self._state, past = NO_ACTUATORS, np.empty(0, JOINT_STATE), 0
+            if self._chain is not None:
+                plugin, states = self._chain.start(self._candidate, start_angle, self._balance[None])
+                self._plugin, self._state = plugin.of(0), states[0]
+                past = self._plugin.past
+            joints = len(self._state)
+            self._course = Course(
+                np.zeros((past + self._steps, joints)), np.empty((self._steps, len(start_angle) - joints))
+            )
+            self._mass = self.data.M.copy()
         self._taken = 0
         return self.angle
 
@@ -206,24 +208,27 @@ class Plant:
         model.dof_damping[:], model.dof_armature[:] = self._values["dof_damping"][0], self._armature
         spec = read_mjcf(folder / "arm.xml")  # with the meshes' names there
         names = [arm.joint_names[j - 1] for j in self.joints]
-        motors, actuators = np.array([self._gain, self._balance]), None
-        if candidate.actuators is not None:
-            motors, actuators = None, drawing_values(candidate.actuators[0, self._active], names)  # pyright: ignore[reportArgumentType]
+        motors: Array | None = np.array([self._gain, self._balance])
+        actuators: dict[str, dict[str, Any]] | None = None
+        if self._chain is not None:
+            hydraulic = {name: q for name, q in QUANTITIES.items() if q.source != "fit"}
+            motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
+            for joint, values in zip(names, candidate.joints[0, self._active], strict=True):
+                actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
         text = arm_mjcf(spec, self._locked, model, motors)
         write_fitted(folder, text, self.timestep, ", ".join(names), actuators)
 
     def _advance(self, command: Array) -> None:
-        arm, steps = self._arm, self._steps
-        if isinstance(arm, HydraulicArm):
-            self._commands[:-steps] = self._commands[steps:]
-            self._commands[-steps:] = command
-            # M of the step before: refreshing positions in between must not change a bit
-            np.copyto(self.data.M, self._mass)
-            arm.roll(self._commands, self._rolled, self._unseen, self._servo)
-            np.copyto(self._mass, self.data.M)
+        commands, torque, _ = self._course
+        if self._chain is None:
+            torque[:] = self._gain * command + self._balance
         else:
-            self.data.qfrc_applied[:] = self._gain * command + self._balance
-            mujoco.mj_step(self.model, self.data, steps)
+            commands[: -self._steps] = commands[self._steps :]
+            commands[-self._steps :] = command
+        # M of the step before: refreshing positions in between must not change a bit
+        np.copyto(self.data.M, self._mass)
+        self._arm.roll(self._plugin, self._state, self._course, self._record)
+        np.copyto(self._mass, self.data.M)
 
     def _lock(self, pose: Array) -> None:
         """Build the model with the locked joints in a pose [rad], shape (J,)."""
@@ -234,16 +239,12 @@ class Plant:
         self._armature = model.dof_armature.copy()
         self._locked, self._locked_pose, self._columns = locked, pose, locked.columns
         self._values = model_values(locked, candidate)
-        self._gain = candidate.gain[0, self._columns]
-        if candidate.actuators is None:
-            self._arm = SingleArm(model)
-        else:
-            nothing = np.array([], np.intp)
-            self._actuators = ArmActuators(settings.arm, locked, self._active, settings.hydraulics, nothing)
-            self._arm = HydraulicArm(model, self._actuators.columns, nothing, self._steps)
+        self._gain = candidate.joints.gain[0, self._columns]
+        self._chain, moving = None, np.arange(len(self._columns))
+        if settings.stage == "hyd":
+            self._chain = Chain(settings.arm, locked, self._active, settings.hydraulics.substeps, NO_JOINTS)
+        columns, pushed = (NO_JOINTS, moving) if self._chain is None else (moving, NO_JOINTS)
+        self._arm = SteppedArm(model, columns, pushed, self._steps)
         self.model, self.data = self._arm.model, self._arm.data
         self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
-        # for compiled code: angles after the step; no observation, and no joint that follows a log
-        joints = len(self._columns)
-        self._rolled, self._unseen = np.empty((1, joints)), np.empty((0, joints), JOINT_STATE)
-        self._servo = np.empty((self._steps, 0))
+        self._record = Record(np.empty((1, len(moving))), np.empty((0, len(columns)), JOINT_STATE))

@@ -11,8 +11,8 @@ from hydroid.mjcf import quiet_mujoco
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.linkage import LinearActuator
-from hydroid.simulation import Candidates, HydraulicSimulation
-from hydroid.simulation.rollout import SingleArm
+from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 
 MARGIN = float(np.radians(1.0))
@@ -61,7 +61,7 @@ class Bench:
     def weigh(self, candidates: Candidates, angles: Array) -> tuple[Array, Array]:
         """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at angles, shape (n, A) each."""
         torque, inertia = np.empty((2, len(candidates), len(angles)))
-        arm, values = SingleArm(self.scenario.arm.model), self.scenario.values(candidates)
+        arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
         with quiet_mujoco():
             for row, column in np.ndindex(torque.shape):
                 arm.start(values, row, angles[[column]])
@@ -76,7 +76,7 @@ class Bench:
         """
         steps = samples * self.settings.simulation.steps_per_sample
         scenario = self.scenario.restarted(np.array([start]), np.full((steps, 1), command))
-        simulation = HydraulicSimulation(scenario, self.settings.arm, self.settings.hydraulics)
+        simulation = Simulation(scenario, self.settings.arm, self.settings.hydraulics.substeps)
         return simulation.simulate(candidates).angle[:, :, 0]
 
     @property

@@ -35,7 +35,7 @@ class Quantities:
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     """Return the quantities of every compared joint at a fit's estimate."""
-    estimate = problem.stage.candidates(uncertainty.theta[None])
+    estimate = problem.bindings.candidates(uncertainty.theta[None])
     scalars: dict[str, QuantityEstimate] = {}
     curves: dict[str, CurveEstimate] = {}
     slopes: dict[str, Array] = {}
@@ -45,7 +45,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
         columns = [column for column, _ in measure(estimate)]
 
         def values(theta: Array, measure: Measure = measure) -> Array:
-            found = measure(problem.stage.candidates(theta))
+            found = measure(problem.bindings.candidates(theta))
             return np.stack([value for _, value in found], axis=1)
 
         concerned = np.array(

@@ -68,7 +68,7 @@ class SpeedTests:
         rises = [self._steps[step].reaches(runs[step], part * speed[step]) for part in (ONSET, RISEN)]
         gain = (speed[GAIN[1]] - speed[GAIN[0]]) / (GAIN[1] - GAIN[0])
         c, arm = actuator(self._bench, candidates)
-        flow = (c.area_a if self._sign > 0 else c.area_b) * np.abs(arm) * np.radians(speed[100.0])
+        flow = (c.a if self._sign > 0 else c.b).area * np.abs(arm) * np.radians(speed[100.0])
         return [
             *curve,
             *poses,

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from hydroid.hydraulics.actuator import rod_motion
-from hydroid.hydraulics.cylinder import volume
+from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients, linkages
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench
@@ -28,7 +27,7 @@ def gravity(bench: Bench, candidates: Candidates) -> Measured:
 def gain_model(bench: Bench, candidates: Candidates) -> Measured:
     """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
     j, name = bench.joint - 1, bench.name
-    gain, damping, friction = candidates.gain[:, j], candidates.damping[:, j], candidates.friction[:, j]
+    gain, damping, friction = (candidates.joints[name][:, j] for name in ("gain", "damping", "friction"))
     inertia = bench.weigh(candidates, np.array([bench.angle]))[1][:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         torques = [np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0) for u in COMMANDS]
@@ -57,13 +56,13 @@ def oil(bench: Bench, candidates: Candidates) -> Measured:
     """
     c, arm = actuator(bench, candidates)
     if c.kind[0] == LINEAR:
-        travel = rod_motion(c, np.full(len(c), bench.angle))[0]
-        volumes = volume(travel, c.area_a, c.dead_volume), volume(c.stroke - travel, c.area_b, c.dead_volume)
+        travel = rod_motion(np.full(len(c), bench.angle), c)[0]
+        volumes = volume(travel, c.a.area, c.dead_volume), volume(c.stroke - travel, c.b.area, c.dead_volume)
     else:
         volumes = c.dead_volume, c.dead_volume
-    stiffness = arm**2 * c.bulk_modulus * (c.area_a**2 / volumes[0] + c.area_b**2 / volumes[1])
+    stiffness = arm**2 * c.bulk_modulus * (c.a.area**2 / volumes[0] + c.b.area**2 / volumes[1])
     inertia = bench.weigh(candidates, np.array([bench.angle]))[1][:, 0]
-    damping = candidates.damping[:, bench.joint - 1] / (2.0 * np.sqrt(stiffness * inertia))
+    damping = c.damping / (2.0 * np.sqrt(stiffness * inertia))
     name = bench.name
     return [
         (
@@ -71,7 +70,7 @@ def oil(bench: Bench, candidates: Candidates) -> Measured:
             np.sqrt(stiffness / inertia) / (2.0 * np.pi),
         ),
         (Column(f"{name}_damping_ratio", "damping ratio of the arm on the oil", ""), damping),
-        (Column(f"{name}_area_ratio", "ratio of areas, A/B", ""), c.area_a / c.area_b),
+        (Column(f"{name}_area_ratio", "ratio of areas, A/B", ""), c.a.area / c.b.area),
     ]
 
 
@@ -80,11 +79,7 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
 
     Of a rotary actuator, whose areas are displacements, the moment arm is 1.
     """
-    assert candidates.actuators is not None
     j = bench.joint - 1
-    parameters: Records = candidates.actuators[:, [j]].view(np.recarray)
-    table = coefficients(parameters, linkages(bench.settings.arm, [j], [j], parameters))
-    c: Records = table[:, 0].view(np.recarray)
-    if c.kind[0] == LINEAR:
-        return c, rod_motion(c, np.full(len(c), bench.angle))[1]
-    return c, np.ones(len(c))
+    joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
+    c: Records = coefficients(joints, linkages(bench.settings.arm, [j], [j], joints))[:, 0]  # pyright: ignore[reportAssignmentType]
+    return c, rod_motion(np.full(len(c), bench.angle), c)[1]

@@ -19,14 +19,17 @@ from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import Channel, make_channels
 from hydroid.problem.free_start import STEP, OpenStart, StartSlopes
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
-from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import HydraulicSimulation, MechanicalSimulation, Response
+from hydroid.simulation import Response, Simulation
 from hydroid.simulation.scenario import Scenario
+
+CHUNK = 2**23
+"""residuals that are held in memory at a time, 64 MiB"""
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,9 @@ class Problem:
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
         self.open_starts: tuple[OpenStart, ...] = ()
-        self.stage = Stage(settings)
-        self.stage.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
-        self.parameters = self.stage.parameters
+        self.bindings = Bindings(settings)
+        self.bindings.refuse_idle(np.any([log.driven for log in logs], axis=0), outputs)
+        self.parameters = self.bindings.parameters
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
@@ -112,7 +115,7 @@ class Problem:
         if not (everywhere or self.settings.free_start):
             return []
         spec = load_model(self.settings.arm)  # cannot be pickled: not kept
-        candidates, found = self.stage.candidates(theta[None]), list[StartSlopes]()
+        candidates, found = self.bindings.candidates(theta[None]), list[StartSlopes]()
         for i, log in enumerate(self.logs):
             joints = self._started(log)
             if not joints:
@@ -167,7 +170,7 @@ class Problem:
         """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""
         objective = self.settings.objective
         values = np.empty((len(theta), len(self.bounds) + 1))
-        size = min(simulation.scenario.chunk for simulation in self._simulations)
+        size = max(1, CHUNK // len(self.measured))
         for start in range(0, len(theta), size):
             rows = slice(start, start + size)
             error = self.output_errors(theta[rows])
@@ -195,7 +198,7 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        candidates = self.stage.candidates(theta)
+        candidates = self.bindings.candidates(theta)
         return [simulation.simulate(candidates) for simulation in self._simulations]
 
     def rms(self, residuals: Array) -> Array:
@@ -231,7 +234,7 @@ def make_simulation(
     outputs: list[int],
     settings: FitSettings,
     pressures: Sequence[int] = (),
-) -> MechanicalSimulation | HydraulicSimulation:
+) -> Simulation:
     """Return the simulation of one log in the settings' stage.
 
     Its response has the angles of the joints `outputs` and the chamber pressures of `pressures`, 0-based.
@@ -240,6 +243,5 @@ def make_simulation(
     if payload:
         spec = add_payload(spec, settings.arm, payload)
     scenario = Scenario(spec, settings.arm, log, outputs, settings.simulation)
-    if settings.stage == "mech":
-        return MechanicalSimulation(scenario)
-    return HydraulicSimulation(scenario, settings.arm, settings.hydraulics, pressures)
+    substeps = settings.hydraulics.substeps if settings.stage == "hyd" else None
+    return Simulation(scenario, settings.arm, substeps, pressures)

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -50,7 +51,7 @@ class JointSize:
         """Valve opening that gives the speed while the arm is lifted [mm²]; both edges lose the same."""
         left = BAR * OIL.supply_pressure * (1 - 1 / LIFT) / 2
         flow = 1e-6 * self.displacement * self.speed
-        return 1e6 * flow / (OIL.flow_coefficient * math.sqrt(2 * left / OIL.density))
+        return 1e6 * flow / (OIL.flow_coefficient * math.sqrt(2 * left / DENSITY))
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import coefficients, linkages, without_actuator
+from hydroid.hydraulics.records import Records, coefficients, linkages, without_actuator
 from hydroid.hydraulics.solenoid import coil_current, coil_force, curve_exists, resting_stroke, side_voltage
 from hydroid.hydraulics.valve import opening, port_flow, spool
 from hydroid.parameters import Array
@@ -100,9 +100,8 @@ def joint_actuator(arm: Arm, candidate: Candidates, joint: int, source: str) -> 
 
 def joint_records(arm: Arm, candidates: Candidates, joint: int) -> Any:
     """Return one joint's COEFFICIENTS, joint 1-based, of n candidates with hydraulics, shape (n,)."""
-    assert candidates.actuators is not None
-    chosen = candidates.actuators[:, [joint - 1]].view(np.recarray)
-    return coefficients(chosen, linkages(arm, [joint - 1], [joint - 1], chosen)).view(np.recarray)[:, 0]
+    joints: Records = candidates.joints[:, [joint - 1]]  # pyright: ignore[reportAssignmentType]
+    return coefficients(joints, linkages(arm, [joint - 1], [joint - 1], joints))[:, 0]
 
 
 def actuator_page(actuator: JointActuator) -> Page:
@@ -160,7 +159,7 @@ def _valve(actuator: JointActuator) -> tuple[Panel, ...]:
     """Where the spool rests, what it opens, and the flow through it."""
     p = actuator.parameters
     # a little more than from full opening to full opening [m]
-    at = np.linspace(-1.15 * (p.overlap_b + p.slot_width_b), 1.15 * (p.overlap_a + p.slot_width_a), 401)
+    at = np.linspace(-1.15 * (p.b.overlap + p.b.slot_width), 1.15 * (p.a.overlap + p.a.slot_width), 401)
     pressure = np.linspace(p.tank_pressure, p.supply_pressure, 200)
 
     def displacement(p: Any) -> Curves:
@@ -176,9 +175,9 @@ def _valve(actuator: JointActuator) -> tuple[Panel, ...]:
 
     def against(p: Any) -> Curves:
         drop = p.supply_pressure - pressure
-        return {f"{100 * share:g} % open": _pump_flow(p, drop, share * p.opening_a) for share in _OPENINGS}
+        return {f"{100 * share:g} % open": _pump_flow(p, drop, share * p.a.opening) for share in _OPENINGS}
 
-    edges = np.array([p.overlap_a, -p.overlap_b]), np.array([p.slot_width_a, -p.slot_width_b])
+    edges = np.array([p.a.overlap, -p.b.overlap]), np.array([p.a.slot_width, -p.b.slot_width])
     rules = (
         Mark("rule", y=1e3 * edges[0], color="grey", label="valve opens", width=1, look="dotted"),
         Mark("rule", y=1e3 * (edges[0] + edges[1]), color="grey", label="fully open", width=1, look="dashed"),
@@ -204,8 +203,8 @@ def _torque(actuator: JointActuator) -> Panel:
     def torques(p: Any) -> Curves:
         most, least = p.supply_pressure, p.tank_pressure
         return {
-            "A at supply": arm * (p.area_a * most - p.area_b * least),
-            "B at supply": arm * (p.area_a * least - p.area_b * most),
+            "A at supply": arm * (p.a.area * most - p.b.area * least),
+            "B at supply": arm * (p.a.area * least - p.b.area * most),
         }
 
     marks = (*actuator.curves(angle, torques), Mark("rule", y=np.zeros(1), color="grey", width=1))
@@ -216,8 +215,8 @@ def _torque(actuator: JointActuator) -> Panel:
 def _voltages(p: Any) -> Curves:
     """Voltage of both coils [V] over _COMMAND."""
     return {
-        "side A": side_voltage(_COMMAND, p.onset_a, p.full_a, p.dead_band_a),
-        "side B": side_voltage(-_COMMAND, p.onset_b, p.full_b, p.dead_band_b),
+        "side A": side_voltage(_COMMAND, p.a.onset, p.a.dead_band),
+        "side B": side_voltage(-_COMMAND, p.b.onset, p.b.dead_band),
     }
 
 

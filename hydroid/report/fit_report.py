@@ -18,7 +18,7 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.posterior import stored_posterior
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.report.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
 from hydroid.report.objectives import learning, pareto
 from hydroid.report.page import Light, Page, Plot, Section, Step, Tab, Verdict, log_names
@@ -170,19 +170,19 @@ def _actuators(record: Record) -> tuple[Section, ...]:
     settings, summary = record.settings, record.summary
     if settings.stage != "hyd":
         return ()
-    stage, arm = Stage(settings), settings.arm
+    bindings, arm = Bindings(settings), settings.arm
     theta = settings.parameter_set().vector(summary.values, record.folder)
     known = stored_posterior(IdentifiedModel(settings, theta, record.folder, summary))
     tabs: list[Tab] = []
     for joint in settings.outputs:
         try:
-            actuator = joint_actuator(arm, stage.candidates(theta[None]), joint, "the estimate")
+            actuator = joint_actuator(arm, bindings.candidates(theta[None]), joint, "the estimate")
         except SettingsError:
             continue  # no force-stroke curve runs through its two points: it diverged
         if known is not None:
 
             def records(values: Array, joint: int = joint) -> object:
-                return joint_records(arm, stage.candidates(values), joint)
+                return joint_records(arm, bindings.candidates(values), joint)
 
             actuator = replace(actuator, known=KnownActuator(known, records))
         plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}")

@@ -20,7 +20,7 @@ from hydroid.settings.fit import FitSettings
 
 DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
-FREE = ("cluster.", "simulation.threads", "simulation.chunk_mib")
+FREE = ("cluster.", "simulation.threads")
 """settings on which no result depends"""
 ELSEWHERE = frozenset({"model", "pair"})
 """of an arm's settings: where its files are, and what stands beside it"""

@@ -15,9 +15,10 @@ from pydantic import (
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Parameter, ParameterSet
+from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, ArmFile, load_arm, make_arm
 from hydroid.settings.experiment import DesignSettings
-from hydroid.settings.hydraulics import OF_THE_PIVOTS, TARGETS, HydraulicSettings
+from hydroid.settings.hydraulics import OF_THE_PIVOTS, HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, parameter, prior
@@ -104,7 +105,7 @@ class FitSettings(Settings):
         if len(set(self.outputs)) < len(self.outputs):
             raise ValueError("outputs: a joint is listed twice")
         for name, own in self.parameters.items():
-            hydraulic = own.quantity in TARGETS
+            hydraulic = own.quantity not in MECHANICAL
             if self.stage == "mech" and hydraulic:
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":

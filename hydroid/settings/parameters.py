@@ -4,13 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from annotated_types import Gt
-
 from hydroid.parameters import Parameter, Prior
+from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import OF_THE_PIVOTS, TARGETS, HydraulicSettings, actuator_values
+from hydroid.settings.hydraulics import OF_THE_PIVOTS, HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
-from hydroid.settings.problem import MECHANICAL_UNITS, ParameterSettings
+from hydroid.settings.problem import ParameterSettings
 
 QUANTILE = 1.96
 """standard deviations of a Gaussian that hold 95 % on both sides"""
@@ -18,15 +17,8 @@ BOUND_SD = 4.0
 """standard deviations of its prior that a parameter without bounds may be away"""
 SMALLEST = 0.01
 """part of the nominal value below which a quantity that must be above 0 is not searched by default"""
-MAY_BE_ZERO = {
-    name
-    for name, field in HydraulicSettings.model_fields.items()
-    if not any(isinstance(limit, Gt) for limit in field.metadata)
-}
 ROTARY_UNITS = {"mm²": "cm³/rad", "N": "N·m"}
 """of the areas and the dry friction of a rotary actuator"""
-POSITIVE = {"mass"} | {name for name, sides in TARGETS.items() if not MAY_BE_ZERO & set(sides)}
-"""quantities that must be above 0"""
 
 
 class Machine(Protocol):
@@ -71,7 +63,7 @@ def expanded(
             continue
         numbers = [joints.index(c) + 1 if not mass and c in joints else c for c in chosen]
         if len(numbers) == 1 and not mass:
-            everywhere = each is True and entry.get("quantity") in MECHANICAL_UNITS
+            everywhere = each is True and entry.get("quantity") in MECHANICAL
             result[name] = shared | ({} if everywhere else {"joints": tuple(numbers)})
             continue
         for number in numbers:
@@ -88,7 +80,7 @@ def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | Non
     arm = machine.arm
     if parameter.link is not None:
         return dict(zip(arm.link_names, arm.masses.tolist(), strict=True)).get(parameter.link)
-    if parameter.quantity not in TARGETS:
+    if parameter.quantity in MECHANICAL:
         return None
     among = arm.actuators
     if parameter.quantity in OF_THE_PIVOTS:
@@ -151,6 +143,6 @@ def _unit(arm: Arm, own: ParameterSettings) -> str:
 def _default_bounds(own: ParameterSettings, known: Prior | None) -> tuple[float, float]:
     if known is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    least = SMALLEST * known.nominal if own.quantity in POSITIVE else 0.0
+    least = SMALLEST * known.nominal if CHOICES[own.quantity].positive else 0.0
     upper = known.value(BOUND_SD)
     return max(known.value(-BOUND_SD), least), upper

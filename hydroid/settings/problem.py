@@ -6,22 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from hydroid.settings.hydraulics import OF_THE_PUMP, QUANTITIES, TARGETS
+from hydroid.quantity_table import CHOICES, MECHANICAL
 from hydroid.settings.load import JointNumber, NotNegative, Positive, Settings
-
-MECHANICAL_UNITS = {
-    "gain": "N·m/%",
-    "damping": "N·m·s/rad",
-    "stiffness": "N·m/rad",
-    "friction": "N·m",
-    "mass": "kg",
-}
-
-MECHANICAL_SPANS = {"damping": (0.0, 1e5), "stiffness": (0.0, 1e4), "friction": (0.0, 1e4)}
-"""values that real joints have, of the quantities that `hydroid suggest` asks about where not free"""
-
-UNITS = MECHANICAL_UNITS | {name: QUANTITIES[sets[0]].unit for name, sets in TARGETS.items()}
-"""Quantities that a parameter can be, with their units."""
 
 
 class ParameterSettings(Settings):
@@ -60,12 +46,12 @@ class ParameterSettings(Settings):
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
-        if self.quantity not in UNITS:
-            near = difflib.get_close_matches(self.quantity, UNITS, n=3, cutoff=0.4) or list(MECHANICAL_UNITS)
+        if self.quantity not in CHOICES:
+            near = difflib.get_close_matches(self.quantity, CHOICES, n=3, cutoff=0.4) or MECHANICAL
             raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
         if (self.quantity == "mass") != (self.link is not None):
             raise ValueError("a mass names its link, and only a mass does")
-        if self.quantity in OF_THE_PUMP and (self.joints is not None or self.each):
+        if CHOICES[self.quantity].of_the_pump and (self.joints is not None or self.each):
             raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
         if self.link is not None and (self.joints is not None or self.each):
             raise ValueError("a mass belongs to a link, not to joints")
@@ -91,7 +77,7 @@ class ParameterSettings(Settings):
     @property
     def unit(self) -> str:
         """The unit of the quantity."""
-        return UNITS[self.quantity]
+        return CHOICES[self.quantity].unit
 
     @property
     def has_prior(self) -> bool:

@@ -18,8 +18,6 @@ class SimulationSettings(Settings):
     """MuJoCo steps per sample of the log"""
     threads: Annotated[int, Field(ge=0, le=1024)] = 0
     """number of threads. 0 means one per core; with --dask it means one per worker"""
-    chunk_mib: Annotated[int, Field(ge=1, le=512)] = 128
-    """memory for the part of a population that is simulated at a time [MiB]"""
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
     """cutoff of the low-pass filter on motion that joints follow [Hz]; its second derivative becomes a
     torque"""

@@ -1,7 +1,10 @@
-"""Populations of arms in, angles out: the only package that steps MuJoCo."""
+"""Populations of arms in, angles out: the only package that steps MuJoCo.
 
-from hydroid.simulation.hydraulic import HydraulicSimulation
-from hydroid.simulation.mechanical import MechanicalSimulation
+A model of the actuators has its module: today `chain`, the whole chain from command to pressure. Another,
+simpler one would read the same quantities of the same `Candidates` and give the same `Response`.
+"""
+
 from hydroid.simulation.scenario import Candidates, Response
+from hydroid.simulation.simulation import Simulation
 
-__all__ = ["Candidates", "HydraulicSimulation", "MechanicalSimulation", "Response"]
+__all__ = ["Candidates", "Response", "Simulation"]

@@ -1,10 +1,10 @@
-"""The compiled rollout of stage 2: one candidate through its whole record, MuJoCo's steps included.
+"""The compiled rollout: one candidate through its whole record, MuJoCo's steps included.
 
 `mujoco.batch` has a rollout, but nothing can be done between its steps; and where Python does something at
 every step, threads wait for the interpreter. So the compiled loop calls `mj_step` of MuJoCo's own library
 itself, on an MjModel and MjData of the bindings, and no thread needs Python before the record's end. The bits
 are those of `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would end the process instead of
-raising; a model that gets through `SingleArm.start` has none to expect.
+raising; a model that gets through `SteppedArm.start` has none to expect.
 """
 
 import ctypes
@@ -22,14 +22,14 @@ from numba import njit, types
 from numba.core import event
 from numpy.typing import NDArray
 
-from hydroid.hydraulics.actuator import Actuator
 from hydroid.hydraulics.kernel import SOURCE, Exchange, Plugin, look_ahead, make_pad, take_over
-from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
-from hydroid.simulation.scenario import Array
+from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE, Array
 
 _log = logging.getLogger(__name__)
 
-NOTHING = np.empty(0)
+NO_JOINTS = np.empty(0, np.intp)
+NO_ACTUATORS = Plugin(np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.intp), 0, 0.0, 1)
+"""of an arm whose joints are all pushed"""
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
 _library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
@@ -52,26 +52,61 @@ class Handles(NamedTuple):
     """joints with actuators and those they couple with, (J,)"""
     own: Array
     """the arm's own armature of these [kg·m²], (J,)"""
-    follows: NDArray[np.intp]
-    """joints that follow a log, (P,)"""
+    pushed: NDArray[np.intp]
+    """the other joints, (P,)"""
 
 
-class SingleArm:
-    """One arm in MuJoCo, which candidates take in turn.
+class Course(NamedTuple):
+    """What drives an arm from step to step.
+
+    commands: held during each step [%], after those before the start, shape (past + T steps, J). torque: of
+    pushed joints [N·m], shape (T steps, P). taken: flow from the pump into pushed joints [m³/s], shape
+    (T steps,); or it is empty.
+    """
+
+    commands: Array
+    torque: Array
+    taken: Array = np.empty(0)
+
+
+class Record(NamedTuple):
+    """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of JOINT_STATE, or ()."""
+
+    angle: Array
+    states: NDArray[np.void]
+
+
+class SteppedArm:
+    """One arm in MuJoCo, which candidates take in turn and compiled code steps.
+
+    Args:
+        model: of the arm; it is copied.
+        columns: the moving joints with actuators, and those they couple with, shape (J,).
+        pushed: all others, whose torques are given, shape (P,).
+        steps: of MuJoCo in one sample.
 
     Attributes:
-        model: a copy of the arm's, with the values of the candidate that was started last.
+        model: with the values of the candidate that was started last.
         data: its state.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model, self.data = copy(model), mujoco.MjData(model)
-        self._armature = model.dof_armature.copy()
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        columns: NDArray[np.intp] = NO_JOINTS,
+        pushed: NDArray[np.intp] = NO_JOINTS,
+        steps: int = 1,
+    ) -> None:
+        self.model, self.data = m, d = copy(model), mujoco.MjData(model)
+        self._armature, self._steps = model.dof_armature.copy(), steps
+        live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
+        self._handles = Handles(*_addresses(m, d), *live, columns, model.dof_armature[columns], pushed)
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
-        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), as `ArmBatch.start` does.
+        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest.
 
-        Call it within `quiet_mujoco`.
+        `values` is what candidates change in the model, as `Scenario.values` returns it. Call it within
+        `quiet_mujoco`.
 
         Returns:
             What holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m],
@@ -80,14 +115,16 @@ class SingleArm:
         model, data = self.model, self.data
         for name, value in values.items():
             getattr(model, name)[:] = value[row]
-        model.dof_armature[:] = self._armature  # stage 2 steps with another
+        model.dof_armature[:] = self._armature  # a rollout steps with another
         mujoco.mj_setConst(model, data)
         mujoco.mj_resetData(model, data)
         data.qpos[:] = pose
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         data.warning.number[:] = 0
-        return data.qfrc_bias - data.qfrc_passive
+        balance = data.qfrc_bias - data.qfrc_passive
+        model.dof_damping[self._handles.columns] = 0.0  # the actuators integrate it
+        return balance
 
     @property
     def healthy(self) -> bool:
@@ -95,55 +132,12 @@ class SingleArm:
         finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
         return bool(finite) and not self.data.warning.number.any()
 
+    def roll(self, plugin: Plugin, state: NDArray[np.void], course: Course, record: Record) -> None:
+        """Step one candidate up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
 
-class HydraulicArm(SingleArm):
-    """An arm that is stepped with its actuators by compiled code.
-
-    Args:
-        model: of the arm; it is copied.
-        columns: the moving joints that `ArmActuators` names, shape (J,).
-        follows: those that follow a log, shape (P,).
-        steps: of MuJoCo in one sample.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, columns: NDArray[np.intp], follows: NDArray[np.intp], steps: int
-    ) -> None:
-        super().__init__(model)
-        m, d = self.model, self.data
-        live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
-        self._handles = Handles(*_addresses(m, d), *live, columns, model.dof_armature[columns], follows)
-        self._steps = steps
-
-    def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
-        """Do as `SingleArm.start`."""
-        balance = super().start(values, row, pose)
-        self.model.dof_damping[self._handles.columns] = 0.0  # the actuators integrate it
-        return balance
-
-    def attach(self, actuator: Actuator, state: NDArray[np.void], row: int) -> None:
-        """Take the actuators of one candidate of a population; steps change `state`, (J,) of JOINT_STATE."""
-        self._plugin, self._state, self._row = actuator.plugin, state, row
-
-    def roll(
-        self,
-        commands: Array,
-        angle: Array,
-        seen: NDArray[np.void],
-        servo: Array,
-        taken: Array = NOTHING,
-    ) -> None:
-        """Step the arm, up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
-
-        Args:
-            commands: held during each step [%], after those before the start, shape (past + T steps, J).
-            angle: receives the angles after each of T samples [rad], shape (T, V).
-            seen: receives the actuators after each of them, shape (T, J) of JOINT_STATE; or it is empty.
-            servo: torque of the joints that follow a log at each step [N·m], shape (T steps, P).
-            taken: flow from the pump into these joints at each step [m³/s], shape (T steps,); or it is empty.
+        `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        plugin, state = self._plugin, self._state
-        roll(self._handles, plugin, self._row, state, commands, servo, taken, self._steps, angle, seen)
+        roll(self._handles, plugin, state, course, record, self._steps)
 
 
 def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
@@ -164,38 +158,26 @@ def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll(
-    arm: Any,
-    plugin: Plugin,
-    candidate: int,
-    state: Any,
-    commands: Any,
-    servo: Any,
-    taken: Any,
-    steps: int,
-    angle: Any,
-    seen: Any,
-    source: int = SOURCE,
+    arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, steps: int, source: int = SOURCE
 ) -> None:
-    """Roll one candidate of the plugin's population out, up to the first warning of MuJoCo's.
-
-    `arm` is `Handles` at the start, `state` its actuators, shape (J,) of JOINT_STATE; the other arrays are as
-    in `HydraulicArm.roll`. `source` is the kernel's, for numba's cache.
-    """
+    """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
     columns, joints = arm.columns, arm.columns.size
+    commands, torque, taken = course
     pad, here, speed = make_pad(joints), np.empty(joints), np.empty(joints)
     exchange = Exchange(here, speed, arm.mass, np.empty(joints), np.empty(joints))
-    past = commands.shape[0] - angle.shape[0] * steps
-    for k in range(angle.shape[0] * steps):
+    past = commands.shape[0] - torque.shape[0]
+    for k in range(torque.shape[0]):
         for j in range(joints):
             here[j], speed[j] = arm.angle[columns[j]], arm.velocity[columns[j]]
         if taken.size:
             pad.line[0].taken = taken[k]
-        look_ahead(plugin, candidate, state, commands[: past + k + 1], exchange, pad)
+        if joints:
+            look_ahead(plugin, state, commands, past + k, exchange, pad)
         for j in range(joints):
             arm.applied[columns[j]] = exchange.torque[j]
             arm.armature[columns[j]] = arm.own[j] + exchange.armature[j]
-        for i in range(arm.follows.size):
-            arm.applied[arm.follows[i]] = servo[k, i]
+        for i in range(arm.pushed.size):
+            arm.applied[arm.pushed[i]] = torque[k, i]
         _mj_step(arm.model, arm.data)
         if arm.warnings.any():
             return
@@ -205,9 +187,9 @@ def roll(
         for j in range(joints):
             arm.angle[columns[j]] = here[j]
         if (k + 1) % steps == 0:
-            angle[k // steps] = arm.angle
-            if seen.size:
-                seen[k // steps] = state
+            record.angle[k // steps] = arm.angle
+            if record.states.size:
+                record.states[k // steps] = state
 
 
 class _Announcement(event.Listener):
@@ -218,7 +200,7 @@ class _Announcement(event.Listener):
 
     def on_start(self, event: Any) -> None:
         if not self._made:
-            _log.warning("compiling the actuator's kernels, once on this machine ...")
+            _log.warning("compiling the simulation, once on this machine ...")
         self._made = True
 
     def on_end(self, event: Any) -> None:
@@ -228,11 +210,10 @@ class _Announcement(event.Listener):
 @cache
 def compile_rollout() -> None:
     """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
-    one, column = np.ones(1), np.zeros(1, np.intp)
+    one = np.ones(1)
     warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-    arm = Handles(0, 0, one, one, one, one, one, warnings, column, one, column)
-    table, square = np.ones((1, 1), COEFFICIENTS), np.ones((1, 1))
-    plugin = Plugin(table, square, order=column, entries=column[None], idle=0, period=0.01, substeps=1)
-    state, nothing, none = np.zeros(1, JOINT_STATE), np.empty((0, 1)), np.empty(0)
+    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS)
+    nothing = np.empty((0, 1))
+    course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
     with event.install_listener("numba:compile", _Announcement()):
-        roll(arm, plugin, 0, state, nothing, nothing, none, 1, nothing, np.empty((0, 1), JOINT_STATE))
+        roll(arm, NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record, 1)

@@ -1,9 +1,7 @@
 """What is simulated: one log's joints, start and commands, for a population of candidates."""
 
-from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -19,26 +17,20 @@ from hydroid.simulation.prescribed import Prescribed
 
 @dataclass(frozen=True)
 class Candidates:
-    """Physical values of n candidates; J joints and L links in the arm's order.
+    """Physical values of n candidates, joints and links in the arm's order.
 
-    gain [N·m/%], damping [N·m·s/rad], stiffness [N·m/rad], friction [N·m]: shape (n, J).
-    mass [kg]: shape (n, L). actuators: in stage 2, of all J joints.
+    joints: of `hydroid.hydraulics.records.JOINT`, in SI but for the gain [N·m/%], shape (n, J). mass [kg]: of
+    the links, shape (n, L).
     """
 
-    gain: Array
-    damping: Array
-    stiffness: Array
-    friction: Array
+    joints: Records
     mass: Array
-    actuators: Records | None = None
 
     def __len__(self) -> int:
         return len(self.mass)
 
     def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Candidates":
-        values = (getattr(self, f.name) for f in fields(self))
-        chosen: list[Any] = [None if v is None else v[rows] for v in values]
-        return Candidates(*chosen)
+        return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ class Scenario:
     what the others do.
 
     Attributes:
-        settings: what the other joints do, steps, threads, memory.
+        settings: what the other joints do, steps, threads.
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
         active: shape (J,).
         outputs: columns of the outputs among the moving joints, shape (K,).
@@ -112,27 +104,11 @@ class Scenario:
             values["dof_frictionloss"][:, columns] = 0.0
         return values
 
-    @property
-    def chunk(self) -> int:
-        """Candidates simulated together: as many as the memory setting allows."""
-        candidate = 2 * 8 * self.command.size  # torque in, angle out [bytes]
-        return max(1, self.settings.chunk_mib * 2**20 // max(candidate, 1))
-
-    def in_chunks(self, simulate: Callable[[Candidates], Response], candidates: Candidates) -> Response:
-        """Simulate candidates, `chunk` at a time: memory for the steps does not grow with their number."""
-        parts = [simulate(candidates[i : i + self.chunk]) for i in range(0, len(candidates), self.chunk)]
-        pressures = [p.pressure for p in parts if p.pressure is not None]
-        return Response(
-            np.concatenate([p.angle for p in parts]),
-            np.concatenate([p.feasible for p in parts]),
-            np.concatenate(pressures) if pressures else None,
-        )
-
 
 def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, Array]:
     """Return the fields of mjModel that n candidates change, by name, shape (n, ...) each."""
     return arm.inertials(candidates.mass) | {
-        "dof_damping": candidates.damping[:, arm.columns],
-        "jnt_stiffness": candidates.stiffness[:, arm.columns],
-        "dof_frictionloss": candidates.friction[:, arm.columns],
+        "dof_damping": candidates.joints.damping[:, arm.columns],
+        "jnt_stiffness": candidates.joints.stiffness[:, arm.columns],
+        "dof_frictionloss": candidates.joints.friction[:, arm.columns],
     }

@@ -12,8 +12,8 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.validation import error_indices
 from hydroid.parameters import relative_error
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
-from hydroid.problem.stage import Stage
 from hydroid.run.folder import RunFolder
 
 SEARCHES = {name: {"search.algorithm": name} for name in ("ga", "nsga2", "cmaes")} | {
@@ -21,7 +21,7 @@ SEARCHES = {name: {"search.algorithm": name} for name in ("ga", "nsga2", "cmaes"
 }
 
 
-def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path):
+def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path, monkeypatch):
     study = Study(tmp_path)
     problem = study.problem
     truth = problem.parameters.vector(TRUTH, "truth")
@@ -31,7 +31,8 @@ def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path
     assert (evaluation.overall[1:] > 0).all()
     # p = inf: the worst segment
     np.testing.assert_allclose(evaluation.segments.max(axis=1), evaluation.overall)
-    again = Study(tmp_path, **{"simulation.chunk_mib": 1}).problem.evaluate(theta)
+    monkeypatch.setattr("hydroid.problem.problem.CHUNK", 3 * len(problem.measured))
+    again = problem.evaluate(theta)
     np.testing.assert_array_equal(again.segments, evaluation.segments)
 
 
@@ -138,7 +139,7 @@ def test_the_seed_decides_every_bit(tmp_path):
 def test_parameters_that_do_not_fit_the_arm_are_refused(change, says):
     settings = load_settings("article-mech", change)
     with pytest.raises(SettingsError, match=says):
-        Stage(settings)
+        Bindings(settings)
 
 
 def test_all_parameters_fixed_is_refused():
@@ -160,9 +161,9 @@ def test_shared_and_own_parameters_of_joints():
         "parameters.K3": {"quantity": "gain", "joints": [3], "bounds": [0.1, 1.0]},
     }
     settings = load_settings("article-mech", own)
-    stage = Stage(settings)
+    stage = Bindings(settings)
     values = stage.candidates(stage.parameters.vector(TRUTH | {"K3": 0.7}, "here")[None])
-    np.testing.assert_array_equal(values.gain[0], [0, 0.2, 0.7, 0, 0, 0, 0])
+    np.testing.assert_array_equal(values.joints.gain[0], [0, 0.2, 0.7, 0, 0, 0, 0])
     assert values.mass[0].sum() == pytest.approx(45.0)
 
 

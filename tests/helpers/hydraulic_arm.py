@@ -1,15 +1,17 @@
-"""The whole arm under the actuator plugin, for tests and benchmarks: some joints driven."""
+"""The whole arm under its actuators, in its study pose, for tests and benchmarks."""
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import Records, linkages
+from hydroid.arm.model import load_model
+from hydroid.hydraulics.actuator import Observation
+from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.hydraulics.solenoid import curve_exists
-from hydroid.mjcf import quiet_mujoco
+from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.simulation import SimulationSettings
+from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation.scenario import Scenario
 
 DAMPING, STIFFNESS, PERIOD = 231.8, 53.4, 0.01
 TEN = (
@@ -18,10 +20,17 @@ TEN = (
 )  # fmt: skip
 
 
-def scatter(nominal: Records, rng: np.random.Generator) -> Records:
+def nominal(arm: Arm, settings: HydraulicSettings, n: int = 1) -> Records:
+    """All joints of the arm with dampers and springs, once a candidate."""
+    joints = np.tile(nominal_joints(arm, settings), (n, 1)).view(np.recarray)
+    joints["damping"], joints["stiffness"] = DAMPING, STIFFNESS
+    return joints
+
+
+def scatter(joints: Records, rng: np.random.Generator) -> Records:
     """Give every actuator its own feasible set from the whole search space, 0.25 to 2.5 times nominal."""
-    scattered = nominal.copy()
-    for at in np.ndindex(nominal.shape):
+    scattered = joints.copy()
+    for at in np.ndindex(joints.shape):
         while True:
             factors = rng.uniform(0.25, 2.5, len(TEN))
             if curve_exists(8 * factors[6], 0.7 * factors[7], 0.8 * factors[8], 12 * factors[9]):
@@ -32,71 +41,29 @@ def scatter(nominal: Records, rng: np.random.Generator) -> Records:
 
 
 class DrivenArm:
-    """n candidates of the seven-joint arm in its study pose, with the actuators' plugin on some joints."""
+    """n candidates of the seven-joint arm under commands [%], (T, J), with hydraulics on every joint."""
 
     def __init__(
         self,
         arm: Arm,
-        parameters: Records,
-        driven: list[int],
+        joints: Records,
+        command: np.ndarray,
         settings: HydraulicSettings,
         steps: int = 1,
         threads: int = 1,
     ) -> None:
-        model = mujoco.MjModel.from_xml_path(str(arm.model))
-        pose = arm.pose("study")
-        model.opt.timestep = PERIOD / steps
-        model.dof_damping[:], model.jnt_stiffness[:] = 0.0, STIFFNESS
-        model.qpos_spring[:] = pose
-        n, joints = parameters.shape
-        self.batch = Batch(model, n, threads)
-        self.angle, self.velocity = self.batch.bind("qpos"), self.batch.bind("qvel")
-        self.mass, self.bias = self.batch.bind("M"), self.batch.bind("qfrc_bias")
-        self.applied, self.armature = self.batch.bind("qfrc_applied"), self.batch.expand("dof_armature")
-        entries = np.zeros((joints, joints), dtype=np.intp)
-        for i in range(joints):
-            for k in range(model.M_rowadr[i], model.M_rowadr[i] + model.M_rownnz[i]):
-                entries[i, model.M_colind[k]] = entries[model.M_colind[k], i] = k
-        moved = linkages(arm, range(joints), driven)
-        self.actuator = Actuator(parameters, moved, DAMPING, model.opt.timestep, settings, entries)
-        self.model, self.pose, self.steps = model, pose, steps
+        pose, samples = arm.pose("study"), len(command) + 1
+        held = np.concatenate([command, np.zeros((1, command.shape[1]))])
+        log = Log("commands", np.arange(samples) * PERIOD, held, np.tile(pose, (samples, 1)), PERIOD)
+        chosen = SimulationSettings(steps_per_sample=steps, threads=threads)
+        scenario = Scenario(load_model(arm), arm, log, list(range(len(pose))), chosen)
+        self._simulation = Simulation(scenario, arm, settings.substeps)
+        self._candidates = Candidates(joints, np.tile(arm.masses, (len(joints), 1)))
 
-    def run(self, command: np.ndarray) -> np.ndarray:
-        """Angles [rad], (n, T + 1, J), under commands [%], (T, J)."""
-        with quiet_mujoco():
-            self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-            self.angle[:] = self.pose
-            self.armature[:] = 0.0
-            self.batch.forward()
-            self.batch.warning[:] = 0
-            state = self.actuator.start(self.angle, self.bias)
-            out = np.empty((len(self.angle), len(command) + 1, self.angle.shape[1]))
-            out[:, 0] = self.angle
-            for t, u in enumerate(command):
-                for _ in range(self.steps):
-                    torque, armature = self.actuator.advance(state, u, self.angle, self.velocity, self.mass)
-                    self.applied[:], self.armature[:] = torque, armature
-                    self.batch.step()
-                    self.angle[:] = self.actuator.close(state, self.velocity, self.mass)
-                out[:, t + 1] = self.angle
-        self.state = state
-        return out
+    def run(self) -> np.ndarray:
+        """Angles [rad], (n, T + 1, J); NaN of a candidate that diverged."""
+        return self._simulation.simulate(self._candidates).angle
 
-    @property
-    def failed(self) -> np.ndarray:
-        """Candidates for which MuJoCo warned, (n,)."""
-        return self.batch.warning[:, :, 1].any(axis=1)
-
-
-def lone_wheel(actuator: Actuator, command: np.ndarray, inertia: float, start: float = 0.0) -> np.ndarray:
-    """Angles [rad], (T,), of an inertia [kg·m²] that nothing but one joint's actuator moves, from rest."""
-    angle, velocity = np.full((1, 1), start), np.zeros((1, 1))
-    state, mass = actuator.start(angle, np.zeros((1, 1))), np.full((1, 1), inertia)
-    out = []
-    for u in command:
-        torque, armature = actuator.advance(state, [u], angle, velocity, mass)
-        mass = inertia + armature
-        velocity = velocity + 0.01 * torque / mass
-        angle = actuator.close(state, velocity, mass)
-        out.append(angle[0, 0])
-    return np.array(out)
+    def trace(self) -> Observation:
+        """What the actuators of the only candidate did, (T + 1, J)."""
+        return self._simulation.trace(self._candidates)

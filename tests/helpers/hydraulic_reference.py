@@ -9,20 +9,23 @@ from math import cos, inf, log, radians, sin, sqrt
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 from numpy.typing import ArrayLike
 from scipy.integrate import Radau
 
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import BARS, LINEAR, LINKAGE, PARAMETERS, Records, with_values
-from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.hydraulics import actuator
+from hydroid.hydraulics.actuator import at_rest, make_plugin
+from hydroid.hydraulics.records import BARS, JOINT, JOINT_STATE, LINEAR, LINKAGE, Records
+from hydroid.mjcf import quiet_mujoco
+from hydroid.quantity_table import QUANTITIES, TARGETS
+from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
+from hydroid.simulation.rollout import Course, Record, SteppedArm
 
 INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, radians(-15.0)
 START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
 A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
 SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
 NO_BARS = (0.0,) * len(BARS)
-CYLINDER = np.array([(LINEAR, A, B, THETA0, SHORTEST, STROKE, *NO_BARS)], LINKAGE).view(np.recarray)
+CYLINDER = np.array([(LINEAR, THETA0, SHORTEST, STROKE, *NO_BARS)], LINKAGE).view(np.recarray)
 TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
 PIVOTS = {"pivot_distance_1": A, "pivot_distance_2": B, "pivot_angle": 70.0}
 TEN = {
@@ -31,15 +34,21 @@ TEN = {
 }  # fmt: skip
 
 
+def changed(joints: Records, **values: ArrayLike) -> Records:
+    """Joints, (n, V), with some quantities replaced, in drawing units; n may grow from 1."""
+    shape = np.broadcast_shapes(joints.shape, *(np.shape(v) for v in values.values()))
+    replaced = np.broadcast_to(joints, shape).copy().view(np.recarray)
+    for name, value in values.items():
+        for target in TARGETS[name]:
+            replaced[target] = np.asarray(value) * QUANTITIES[target].factor
+    return replaced
+
+
 def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
-    """One actuator a candidate; `values` in drawing units, scalars or (n,)."""
-    base = {k: inf if v is None else v for k, v in settings.model_dump().items()} | TRUTH | PIVOTS
-    one = np.zeros((1, 1), PARAMETERS).view(np.recarray)
-    return with_values(
-        one,
-        {k: np.reshape(base[k], (-1, 1)) for k in QUANTITIES}
-        | {k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()},
-    )
+    """The shoulder alone, once a candidate; `values` in drawing units, scalars or (n,)."""
+    stated = {k: inf if v is None else v for k, v in actuator_values(None, settings).items() if k != "mass"}
+    one = changed(np.zeros((1, 1), JOINT).view(np.recarray), **stated | TRUTH | PIVOTS | {"damping": DAMPING})
+    return changed(one, **{k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()})
 
 
 def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
@@ -75,48 +84,65 @@ def pendulum() -> mujoco.MjModel:
     )
 
 
+def wheel(inertia: float) -> mujoco.MjModel:
+    """An inertia [kg·m²] that nothing but its actuator moves.
+
+    It is turned, lest MuJoCo take the short cut for aligned inertias, which ignores a changed armature.
+    """
+    tensor = f"{inertia} {inertia} {inertia}"
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{PERIOD}" gravity="0 0 0"/><worldbody><body><joint/>
+        <inertial pos="0 0 0" quat="4 1 2 3" mass="1" diaginertia="{tensor}"/></body></worldbody></mujoco>"""
+    )
+
+
 def simulate(
     p: Records,
     command: np.ndarray,
     settings: HydraulicSettings,
     steps: int = 1,
     observe: list | None = None,
-    damping: float = DAMPING,
     start: float = START,
+    model: mujoco.MjModel | None = None,
+    linkage: Records = CYLINDER,
+    velocity: float = 0.0,
 ) -> np.ndarray:
-    """Angles [rad], (n, T + 1), under commands (T,), with `steps` MuJoCo steps a sample."""
-    model = pendulum()
+    """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo steps a sample.
+
+    It is the pendulum on its cylinder, or another. `observe` receives an Observation, shapes (n, 1), and the
+    velocity [rad/s], (n, 1), after each sample.
+    """
+    model, n, samples = pendulum() if model is None else model, len(p), len(command)
     model.opt.timestep = PERIOD / steps
-    n = len(p)
-    batch = Batch(model, n, 1)
-    angle, velocity = batch.bind("qpos"), batch.bind("qvel")
-    mass, bias, applied = batch.bind("M"), batch.bind("qfrc_bias"), batch.bind("qfrc_applied")
-    armature = batch.expand("dof_armature")
-    angle[:] = start
-    batch.forward()
-    actuator = Actuator(p, CYLINDER, damping, model.opt.timestep, settings)
-    spring = STIFFNESS * (start - START)
-    state = actuator.start(angle, bias + spring)
-    out = np.empty((n, len(command) + 1))
-    out[:, 0] = start
-    for t, u in enumerate(command):
-        for _ in range(steps):
-            applied[:], armature[:] = actuator.advance(state, [u], angle, velocity, mass)
-            batch.step()
-            angle[:] = actuator.close(state, velocity, mass)
-        out[:, t + 1] = angle[:, 0]
-        if observe is not None:
-            observe.append((actuator.observe(state, angle), velocity.copy()))
-    return out
+    moved = np.broadcast_to(linkage, p.shape).view(np.recarray)
+    entries = np.zeros((1, 1), np.intp)
+    plugin = make_plugin(p, moved, entries, model.opt.timestep, settings.substeps)
+    arm, pose = SteppedArm(model, np.zeros(1, np.intp), steps=steps), np.array([start])
+    angle, states = np.full((n, samples + 1, 1), start), np.zeros((n, samples, 1), JOINT_STATE)
+    with quiet_mujoco():
+        balance = np.tile(arm.start({}, 0, pose), (n, 1))
+        state = at_rest(plugin, np.full((n, 1), start), balance)
+        for i in range(n):
+            arm.start({}, 0, pose)
+            arm.data.qvel[:] = velocity
+            one = plugin.of(i)
+            held = np.concatenate([np.zeros(one.past), np.repeat(command, steps)])[:, None]
+            course = Course(held, np.empty((samples * steps, 0)))
+            arm.roll(one, state[i], course, Record(angle[i, 1:], states[i]))
+    if observe is not None:
+        for t in range(samples):
+            seen = actuator.observe(plugin.coefficients, states[:, t], angle[:, t + 1])
+            observe.append((seen, states[:, t]["velocity"]))
+    return angle[:, :, 0]
 
 
 def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.ndarray, np.ndarray]:
     """One candidate in plain equations: angles [rad], (T + 1,), and chamber pressures [Pa], (T + 1, 2)."""
-    v = {name: float(p[name][0, 0]) for name in QUANTITIES}
+    v = {name: float(p[name][0, 0]) for name in JOINT.names or ()}
     ratio = sqrt(v["force_1"] / v["force_2"])
     gap = (v["stroke_2"] - ratio * v["stroke_1"]) / (ratio - 1)
     coil = v["force_1"] * (v["stroke_1"] + gap) ** 2 / v["rated_current"] ** 2
-    beta, gain = v["bulk_modulus"], v["flow_coefficient"] * sqrt(2 / v["density"])
+    beta, gain = v["bulk_modulus"], v["flow_coefficient"] * sqrt(2 / 860)
     shortest, pump = SHORTEST, v["pump_flow"]
     backflow = -inf if pump == inf else 0.0
 
@@ -136,9 +162,7 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
 
     def pressures(z: np.ndarray, x: float) -> tuple[float, float]:
         va, vb = volumes(x)
-        return max(beta * (z[4] - log(va)), v["vapour_pressure"]), max(
-            beta * (z[5] - log(vb)), v["vapour_pressure"]
-        )
+        return max(beta * (z[4] - log(va)), 0.0), max(beta * (z[5] - log(vb)), 0.0)
 
     def slope(drive_a: float, drive_b: float):
         pt, m = v["tank_pressure"], v["plunger_mass"]
@@ -203,8 +227,8 @@ def reference(p: Records, command: np.ndarray, rtol: float = 1e-8) -> tuple[np.n
     edges = [0, *(np.flatnonzero(np.diff(command)) + 1), len(command)]
     for first, last in pairwise(edges):
         u = float(command[first])
-        ia = current(v["onset_a"] + u * (v["full_a"] - v["onset_a"]) / 100 if u > 0 else 0.0)
-        ib = current(v["onset_b"] - u * (v["full_b"] - v["onset_b"]) / 100 if u < 0 else 0.0)
+        ia = current(v["onset_a"] + u * (10.0 - v["onset_a"]) / 100 if u > 0 else 0.0)
+        ib = current(v["onset_b"] - u * (10.0 - v["onset_b"]) / 100 if u < 0 else 0.0)
         solver = Radau(
             slope(coil * ia**2, coil * ib**2),
             0.0,

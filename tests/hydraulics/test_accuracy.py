@@ -14,8 +14,7 @@ SETTINGS = HydraulicSettings()
 
 def errors(p: Records, command: np.ndarray, exact: np.ndarray, **steps: int) -> np.ndarray:
     """Error of every candidate [deg], (n, T + 1)."""
-    settings = HydraulicSettings(substeps=steps.get("substeps", SETTINGS.substeps))
-    return np.degrees(simulate(p, command, settings, steps.get("steps", 1)) - exact)
+    return np.degrees(simulate(p, command, SETTINGS, steps.get("steps", 1)) - exact)
 
 
 def test_default_settings_hold_the_bound_over_the_search_space():

@@ -14,14 +14,17 @@ from hydraulic_reference import (
     STIFFNESS,
     STROKE,
     TILT,
+    A,
+    B,
     parameters,
     pulses,
     simulate,
+    wheel,
 )
 
-from hydroid.hydraulics.actuator import Actuator, Observation
+from hydroid.hydraulics.actuator import Observation
 from hydroid.hydraulics.cylinder import triangle
-from hydroid.hydraulics.records import LINKAGE, ROTARY, has_force_curve
+from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY, has_force_curve
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -34,7 +37,7 @@ Seen = list[tuple[Observation, np.ndarray]]
 
 def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Travel and moment arm at angles of any shape."""
-    return triangle(angle, *(float(CYLINDER[name][0]) for name in ("a", "b", "theta0", "shortest")))[:2]
+    return triangle(angle, A, B, float(CYLINDER.theta0[0]), float(CYLINDER.shortest[0]))[:2]
 
 
 def weight(angle: float) -> float:
@@ -65,25 +68,20 @@ def test_a_kick_dies_out_where_it_started():
 
 
 def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
-    """Pressures come back to the last digits with the angle, and are never below vapour pressure between."""
-    p, period = parameters(TIGHT), 0.01
-    actuator = Actuator(p, CYLINDER, DAMPING, period, TIGHT)
-    angle, mass = np.full((1, 1), START), np.full((1, 1), 23.6)
-    state = actuator.start(angle, np.full((1, 1), 250.0))
-    before = actuator.observe(state, angle)
-    oil = state.joints["oil_a"].copy(), state.joints["oil_b"].copy()
-    lowest = np.inf
-    velocity = np.zeros((1, 1))
-    for k in range(200):
-        actuator.advance(state, [0.0], angle, velocity, mass)
-        velocity = np.full((1, 1), 0.5 * np.sin(2 * np.pi * (k + 1) / 200))
-        angle = actuator.close(state, velocity, mass)
-        lowest = min(lowest, actuator.observe(state, angle).pressure.min())
-    assert lowest == 0.0  # it did cavitate
-    assert state.joints["oil_a"] == oil[0]
-    assert state.joints["oil_b"] == oil[1]
-    after = actuator.observe(state, np.full((1, 1), START))
-    np.testing.assert_allclose(after.pressure, before.pressure, rtol=1e-12)
+    """A wheel far too heavy for them swings on its spring; pressures are never below vapour pressure."""
+    heavy = wheel(1e5)
+    heavy.jnt_stiffness[:], heavy.qpos_spring[:] = 1e6, START
+    seen: Seen = []
+    angle = simulate(parameters(TIGHT), np.zeros(400), TIGHT, observe=seen, model=heavy, velocity=0.5)[0]
+    pressure = np.array([o.pressure[0, 0] for o, _ in seen])
+    assert np.ptp(angle) > 0.3
+    assert pressure.min() == 0.0
+    assert pressure.max() > 100e5
+    # where it is back at an angle, so are the pressures: p + β ln V is the oil, which no motion changes
+    volume = 30e-6 + 1e-3 * cylinder(angle[1:])[0]
+    filled = pressure[:, 0] > 0
+    oil = pressure[filled, 0] + 8e8 * np.log(volume[filled])
+    np.testing.assert_allclose(oil, oil[0], rtol=1e-12)
 
 
 def test_oil_volume_is_conserved_under_flow():
@@ -139,13 +137,6 @@ def test_nothing_moves_in_the_dead_zone():
     assert abs(still - START).max() < 1e-9
     moving = simulate(p, np.full(300, 90.0), TIGHT)
     assert moving[0, -1] > START + 0.01
-
-
-def test_speed_saturates_with_the_amplifier():
-    p = parameters(SETTINGS, full_a=20.0)  # (10 V - 1.4 V) of 18.6 V is reached at 46 %
-    runs = [simulate(p, np.full(100, u), SETTINGS) for u in (40.0, 50.0, 100.0)]
-    np.testing.assert_array_equal(runs[1], runs[2])
-    assert runs[0][0, -1] < runs[1][0, -1]
 
 
 def test_a_flow_limit_caps_speed():
@@ -243,22 +234,14 @@ def test_an_infeasible_member_stands_still_and_harms_nobody():
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    linkage = np.array([(ROTARY, *[0] * (len(LINKAGE) - 1))], LINKAGE).view(np.recarray)
-    p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0)
-    actuator = Actuator(p, linkage, 5.0, 0.01, TIGHT)
-    angle, velocity, inertia = np.zeros((1, 1)), np.zeros((1, 1)), 0.05
-    state = actuator.start(angle, np.zeros((1, 1)))
-    mass = np.full((1, 1), inertia)
-    begun = actuator.observe(state, angle).pressure[0, 0, 0]
-    flowed = 0.0
-    for k in range(200):
-        torque, armature = actuator.advance(state, [60.0 if k < 100 else 0.0], angle, velocity, mass)
-        mass = inertia + armature
-        velocity = velocity + 0.01 * torque / mass  # MuJoCo's step for a lone wheel
-        angle = actuator.close(state, velocity, mass)
-        flowed += 0.01 * actuator.observe(state, angle).flow[0, 0, 0]
-    assert angle[0, 0] > 1.0
-    pressed = actuator.observe(state, angle).pressure[0, 0, 0] - begun
+    linkage = np.array([(ROTARY, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
+    p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0)
+    seen: Seen = []
+    command = np.repeat([60.0, 0.0], 100)
+    angle = simulate(p, command, TIGHT, observe=seen, start=0.0, model=wheel(0.05), linkage=linkage)[0]
+    assert angle[-1] > 1.0
+    pressed = seen[-1][0].pressure[0, 0, 0] - 50e5
+    flowed = 0.01 * sum(o.flow[0, 0, 0] for o, _ in seen)
     # swept volume plus compression of a chamber of constant volume, to the last digits
-    assert flowed == pytest.approx(10e-6 * angle[0, 0] + 50e-6 * pressed / 8e8, rel=1e-9)
-    assert abs(velocity[0, 0]) < 1e-6
+    assert flowed == pytest.approx(10e-6 * angle[-1] + 50e-6 * pressed / 8e8, rel=1e-9)
+    assert abs(seen[-1][1]).max() < 1e-6

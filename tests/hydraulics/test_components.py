@@ -8,12 +8,10 @@ import pytest
 from hydroid.hydraulics.cylinder import (
     friction_damping,
     holding_pressures,
-    oil_pressure,
     stop_damping,
     triangle,
-    volume,
 )
-from hydroid.hydraulics.records import has_force_curve, linkages, nominal_parameters, with_values
+from hydroid.hydraulics.records import has_force_curve, linkages, nominal_joints
 from hydroid.hydraulics.solenoid import (
     coil_current,
     coil_force,
@@ -26,7 +24,7 @@ from hydroid.hydraulics.solenoid import (
 )
 from hydroid.hydraulics.valve import conductance, notched, opening, port_flow, root
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import QUANTITIES, HydraulicSettings
+from hydroid.settings.hydraulics import HydraulicSettings
 
 ARTICLE = (8.0, 0.7, 0.8e-3, 12e-3, 0.9)
 
@@ -37,20 +35,20 @@ def plunger(gap: float, mass: float = 0.05) -> SimpleNamespace:
 
 def test_voltage_jumps_to_the_onset_and_reaches_full_scale():
     command = np.array([-100.0, -1e-9, 0.0, 1e-9, 50.0, 100.0])
-    np.testing.assert_allclose(side_voltage(command, 1.4, 10.0), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
-    np.testing.assert_allclose(side_voltage(-command, 1.2, 10.0), [10, 1.2, 0, 0, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(side_voltage(command, 1.4), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
+    np.testing.assert_allclose(side_voltage(-command, 1.2), [10, 1.2, 0, 0, 0, 0], atol=1e-9)
 
 
 def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
-    voltage = side_voltage(np.array([-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0]), 1.4, 10.0, 40.0)
+    voltage = side_voltage(np.array([-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0]), 1.4, 40.0)
     np.testing.assert_allclose(voltage, [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
     command = np.linspace(-100, 100, 201)
-    np.testing.assert_array_equal(side_voltage(command, 1.4, 10.0, 0.0), side_voltage(command, 1.4, 10.0))
+    np.testing.assert_array_equal(side_voltage(command, 1.4, 0.0), side_voltage(command, 1.4))
 
 
 def test_components_broadcast_over_a_population():
     onset = np.array([[1.4], [0.7]])
-    assert side_voltage(np.linspace(-100, 100, 11), onset, 10.0).shape == (2, 11)
+    assert side_voltage(np.linspace(-100, 100, 11), onset).shape == (2, 11)
 
 
 def test_current_is_a_line_between_its_limits():
@@ -118,21 +116,25 @@ def test_plunger_does_not_pass_its_seat():
 
 def test_opening_has_overlap_slope_and_ceiling_a_side():
     spool = np.array([-3e-3, -1e-3, -0.1e-3, 0.0, 0.3e-3, 1.5e-3, 3e-3])
-    valve = {"opening_a": 4e-7, "slot_width_a": 2e-3, "overlap_a": 0.5e-3, "opening_exponent_a": 1.0}
-    line = {"opening_b": 2e-7, "slot_width_b": 2e-3, "overlap_b": 0.2e-3, "opening_exponent_b": 1.0}
-    line |= {f"notch_{k}_{side}": 1.0 for k in (1, 2, 3, 4) for side in "ab"}
-    area = opening(spool, SimpleNamespace(**valve, **line))
-    np.testing.assert_allclose(area, [2e-7, 0.8e-7, 0, 0, 0, 2e-7, 4e-7], atol=1e-20)
-    curved = opening(
-        spool, SimpleNamespace(**valve | {"opening_exponent_a": 2.0}, **line | {"slot_width_b": 1e-3})
-    )
+    flat = {f"notch_{k}": 1.0 for k in (1, 2, 3, 4)} | {"opening_exponent": 1.0, "slot_width": 2e-3}
+    a = flat | {"opening": 4e-7, "overlap": 0.5e-3}
+    b = flat | {"opening": 2e-7, "overlap": 0.2e-3}
+
+    def area(a: dict[str, float], b: dict[str, float]) -> np.ndarray:
+        return opening(spool, SimpleNamespace(a=SimpleNamespace(**a), b=SimpleNamespace(**b)))
+
+    np.testing.assert_allclose(area(a, b), [2e-7, 0.8e-7, 0, 0, 0, 2e-7, 4e-7], atol=1e-20)
+    curved = area(a | {"opening_exponent": 2.0}, b | {"slot_width": 1e-3})
     np.testing.assert_allclose(curved[[1, 5]], [1.6e-7, 1e-7])
 
 
 def test_notches_bend_the_opening_between_its_ends():
+    def curve(*factors: float) -> np.ndarray:
+        return notched(share, SimpleNamespace(**{f"notch_{k}": f for k, f in enumerate(factors, start=1)}))
+
     share = np.linspace(0.0, 1.0, 1001)
-    assert np.array_equal(notched(share, (1.0, 1.0, 1.0, 1.0)), share)
-    bent = notched(share, (0.2, 3.0, 0.5, 2.0))
+    assert np.array_equal(curve(1.0, 1.0, 1.0, 1.0), share)
+    bent = curve(0.2, 3.0, 0.5, 2.0)
     assert bent[[0, -1]] == pytest.approx([0.0, 1.0])
     slope = np.diff(bent) / np.diff(share)
     assert (slope > 0).all()
@@ -154,7 +156,7 @@ def test_port_flow_against_equation_7_and_its_limit():
     c = SimpleNamespace(
         supply_pressure=150e5,
         tank_pressure=5e5,
-        conductance=conductance(0.7, 860.0),
+        conductance=conductance(0.7),
         transition_pressure=0.2e5,
         flow_limit=np.inf,
         backflow=-np.inf,
@@ -186,25 +188,15 @@ def test_triangle_is_a_derivative_chain():
 
 
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
-    moved = linkages(arm, range(7), range(7))[0]
-    for joint, c in zip(arm.joints, moved, strict=True):
+    joints = nominal_joints(arm, HydraulicSettings())[None].view(np.recarray)
+    moved = linkages(arm, range(7), range(7), joints)[0]
+    for joint, p, c in zip(arm.joints, joints[0], moved, strict=True):
         if joint.actuator.kind != "linear":
             continue
         q = np.radians(np.linspace(*joint.range, 9))
-        x, r, _ = triangle(q, c.a, c.b, c.theta0, c.shortest)
+        x, r, _ = triangle(q, p.pivot_distance_1, p.pivot_distance_2, c.theta0, c.shortest)
         np.testing.assert_allclose(x, joint.actuator.length(q) - joint.actuator.length(q[0]), atol=1e-12)
         np.testing.assert_allclose(r, joint.actuator.moment_arm(q), rtol=1e-12)
-
-
-def test_oil_gives_the_pressure_of_equation_9():
-    # shut chamber: ṗ = -β/V dV/dt; pressure from stored oil must follow
-    bulk, area, dead = 8e8, 1e-3, 30e-6
-    x = np.linspace(0.05, 0.0501, 3)
-    fill = np.log(volume(x, area, dead) / dead)
-    p = oil_pressure(50e5 + bulk * fill[1], fill, bulk, 0.0)
-    slope = (p[2] - p[0]) / (x[2] - x[0])
-    assert slope == pytest.approx(-bulk * area / volume(x[1], area, dead), rel=1e-5)
-    assert oil_pressure(0.0, 1.0, bulk, 2e3) == 2e3
 
 
 def test_stops_oppose_motion_into_them_only():
@@ -233,22 +225,12 @@ def test_holding_pressures_balance_and_stay_between_tank_and_supply_where_they_c
     assert min(pa.min(), pb.min()) > 5e5 - 1
 
 
-def test_nominal_parameters_are_the_settings_in_si(arm: Arm):
-    p = nominal_parameters(arm, HydraulicSettings(), range(7), 3)
-    assert p.area_a.shape == (3, 7)
+def test_nominal_joints_are_the_settings_in_si(arm: Arm):
+    p = nominal_joints(arm, HydraulicSettings())[None].view(np.recarray)
     np.testing.assert_allclose(p.area_a[0, 1], 1000e-6)
     np.testing.assert_allclose(p.area_b[0, 3], 10e-6)
     np.testing.assert_allclose(p.dead_volume[0, [1, 3]], [30e-6, 50e-6])
     assert np.isinf(p.flow_limit).all()
-    assert set(QUANTITIES) == set(p.dtype.names or ())
     assert has_force_curve(p).all()
-
-
-def test_replaced_values_come_in_drawing_units_and_infeasible_members_are_marked(arm: Arm):
-    p = nominal_parameters(arm, HydraulicSettings(), range(7), 2)
-    q = with_values(p, {"stroke_1": np.array([[0.8], [13.0]]), "supply_pressure": 200.0})
-    np.testing.assert_allclose(q.supply_pressure, 200e5)
-    np.testing.assert_allclose(q.stroke_1[:, 0], [0.8e-3, 13e-3])
-    assert has_force_curve(q).tolist() == [True, False]
-    np.testing.assert_allclose(p.supply_pressure, 150e5)
-    assert len(q[1:]) == 1
+    np.testing.assert_allclose(p.onset_b, 1.2)
+    assert not any(p[name].any() for name in ("gain", "damping", "stiffness", "friction"))

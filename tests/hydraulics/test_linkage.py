@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hydraulic_arm import lone_wheel
+from hydraulic_reference import changed, simulate, wheel
 from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import linkages, nominal_parameters, with_values
+from hydroid.hydraulics.records import Records, linkages, nominal_joints
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.linkage import FourBar, Triangle, four_bar
@@ -36,12 +35,15 @@ def mirrored(arm: Arm) -> Arm:
     return replace(turned, outline=replace(arm.outline, ranges=ranges))
 
 
+def shoulder(arm: Arm, **values: float) -> Records:
+    return changed(nominal_joints(arm, SETTINGS)[None, [SHOULDER]].view(np.recarray), **values)
+
+
 def motion(arm: Arm, command: np.ndarray, start: float) -> np.ndarray:
-    """Angles [rad], (T,), of the shoulder's cylinder on a lone wheel."""
-    nominal = nominal_parameters(arm, SETTINGS, [SHOULDER])
-    moved = linkages(arm, [SHOULDER], [SHOULDER])
-    actuator = Actuator(nominal, moved, 50.0, 0.01, SETTINGS)
-    return lone_wheel(actuator, command, 20.0, start)
+    """Angles [rad], (T + 1,), of the shoulder's cylinder on a lone wheel."""
+    p = shoulder(arm, damping=50.0)
+    moved = linkages(arm, [SHOULDER], [SHOULDER], p)
+    return simulate(p, command, SETTINGS, start=start, model=wheel(20.0), linkage=moved)[0]
 
 
 def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm):
@@ -54,12 +56,9 @@ def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm)
 
 
 def test_pivots_of_parameters_take_the_place_of_the_arms(arm: Arm):
-    p = nominal_parameters(arm, SETTINGS, [SHOULDER], 2)
-    own = linkages(arm, [SHOULDER], [SHOULDER])
-    moved = linkages(arm, [SHOULDER], [SHOULDER], with_values(p, {"pivot_distance_2": [[0.08], [0.1]]}))
-    assert moved[0, 0] == own[0, 0]
-    assert moved.b[1, 0] == 0.1
-    assert moved.shortest[1, 0] < own.shortest[0, 0]
+    moved = linkages(arm, [SHOULDER], [SHOULDER], shoulder(arm, pivot_distance_2=[[0.08], [0.1]]))
+    assert moved[0, 0] == linkages(arm, [SHOULDER], [SHOULDER], shoulder(arm))[0, 0]
+    assert moved.shortest[1, 0] < moved.shortest[0, 0]
 
 
 BARS = {"ground": 0.35, "rocker": 0.45, "coupler": 0.4, "child": 0.35, "phase_deg": 69.0, "side": "right"}

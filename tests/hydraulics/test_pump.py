@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from hydraulic_arm import DrivenArm
-from hydraulic_reference import parameters, pulses, reference, simulate
+from hydraulic_arm import DrivenArm, nominal
+from hydraulic_reference import changed, parameters, pulses, reference, simulate
 from recovery import assert_recovered, duties, recover, settings_of
 
-from hydroid.hydraulics.records import nominal_parameters, with_values
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import ParameterSettings
@@ -18,24 +17,10 @@ JOINTS = list(range(7))
 
 def observe(arm: Arm, command: list[float], samples: int, **pump: float) -> tuple[np.ndarray, ...]:
     """The arm, commands constant: line [bar], (T,), inflow [L/min], (T, J), chambers [bar], (T, J, 2)."""
-    driven = [j for j in JOINTS if command[j]]
-    nominal = nominal_parameters(arm, SETTINGS, JOINTS)
-    one = DrivenArm(arm, with_values(nominal, {"leakage": 0.0, **pump}), driven, SETTINGS)
-    line, flow, pressure = [], [], []
-    one.run(np.zeros((1, 7)))
-    state = one.state
-    for _ in range(samples):
-        one.applied[:], one.armature[:] = one.actuator.advance(
-            state, command, one.angle, one.velocity, one.mass
-        )
-        one.batch.step()
-        one.angle[:] = one.actuator.close(state, one.velocity, one.mass)
-        seen = one.actuator.observe(state, one.angle)
-        line.append(1e-5 * seen.line[0, driven[0]])
-        into = np.where(np.array(command) > 0, seen.flow[0, :, 0], -seen.flow[0, :, 1])
-        flow.append(LITRES * into)
-        pressure.append(1e-5 * seen.pressure[0])
-    return np.array(line), np.array(flow), np.array(pressure)
+    joints = changed(nominal(arm, SETTINGS), leakage=0.0, **pump)
+    seen = DrivenArm(arm, joints, np.tile(command, (samples, 1)), SETTINGS).trace()
+    into = np.where(np.array(command) > 0, seen.flow[1:, :, 0], -seen.flow[1:, :, 1])
+    return 1e-5 * seen.line[1:, 0], LITRES * into, 1e-5 * seen.pressure[1:]
 
 
 def test_a_pump_that_suffices_changes_nothing():
@@ -133,13 +118,12 @@ def test_random_pumps_and_valves_stay_stable(arm: Arm):
         "pump_idle": rng.uniform(0, 1, (n, 1)), "pump_rise": rng.choice([0, 0.3], (n, 1)),
         "line_volume": 10 ** rng.uniform(0.7, 3.3, (n, 1)),
     }  # fmt: skip
-    p = with_values(nominal_parameters(arm, SETTINGS, JOINTS), pump)
+    p = changed(nominal(arm, SETTINGS), **pump)
     coarse, fine = HydraulicSettings(substeps=3), HydraulicSettings(substeps=20)
     runs = []
     for settings in (coarse, fine):
-        one = DrivenArm(arm, p, JOINTS, settings, threads=1)
-        runs.append(one.run(command))
-        assert not one.failed.any()
+        runs.append(DrivenArm(arm, p, command, settings).run())
+        assert np.isfinite(runs[-1]).all()
     assert np.median(np.degrees(abs(runs[0] - runs[1])).max(axis=(1, 2))) < 0.5
 
 

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from hydraulic_arm import lone_wheel
+from hydraulic_reference import changed, simulate
+from hydraulic_reference import wheel as lone_wheel
 from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import LINKAGE, ROTARY, nominal_parameters, with_values
+from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY, nominal_joints
+from hydroid.quantity_table import QUANTITIES, ROWS, TARGETS
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import QUANTITIES, TARGETS, HydraulicSettings
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import validate
 
-SIDED = [name for name, sets in TARGETS.items() if len(sets) == 2]
 SETTINGS = HydraulicSettings()
 UNLIKE = {
     "delay_a": 0.05, "delay_b": 0.12, "plunger_damping_a": 60.0, "plunger_damping_b": 20.0,
@@ -24,10 +24,9 @@ UNLIKE = {
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
     """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
-    linkage = np.array([(ROTARY, *[0] * (len(LINKAGE) - 1))], LINKAGE).view(np.recarray)
-    nominal = nominal_parameters(arm, SETTINGS, [3])
-    actuator = Actuator(with_values(nominal, values), linkage, 5.0, 0.01, SETTINGS)
-    return lone_wheel(actuator, command, 0.05)
+    linkage = np.array([(ROTARY, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
+    p = changed(nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray), damping=5.0, **values)
+    return simulate(p, command, SETTINGS, start=0.0, model=lone_wheel(0.05), linkage=linkage)[0]
 
 
 def test_swapped_sides_mirror_the_motion(arm: Arm):
@@ -52,10 +51,10 @@ def test_a_name_without_side_sets_both(name: str):
 
 
 def test_every_side_has_its_other():
-    for name in SIDED:
-        a, b = (QUANTITIES[side] for side in TARGETS[name])
-        assert a.unit == b.unit
-    assert {q.rstrip("ab").rstrip("_") for q in QUANTITIES if q.endswith(("_a", "_b"))} == set(SIDED)
+    for row in ROWS:
+        a, b = (QUANTITIES[name] for name in TARGETS[row.name]) if row.sides else (QUANTITIES[row.name],) * 2
+        assert (a.unit, a.factor, a.span) == (b.unit, b.factor, b.span)
+        assert "{" not in a.meaning + b.meaning + a.plain
 
 
 def test_two_parameters_for_one_side_are_refused():

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hydraulic_reference import CYLINDER, START, parameters, simulate
+from hydraulic_reference import CYLINDER, START, A, B, parameters, simulate
 from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.cylinder import triangle
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
-from hydroid.problem.stage import Stage
 from hydroid.settings.hydraulics import HydraulicSettings
 
 STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
@@ -39,7 +39,7 @@ def test_the_oil_must_first_be_pressed():
     moved = int(np.argmax(angle - START > np.radians(0.1)))
     pressure = np.array([o.pressure[0, 0, 0] for o, _ in seen])[:moved]
     flow = np.array([o.flow[0, 0, 0] for o, _ in seen])[:moved]
-    ends = triangle(angle[[0, moved]], *(float(CYLINDER[k][0]) for k in ("a", "b", "theta0", "shortest")))[0]
+    ends = triangle(angle[[0, moved]], A, B, float(CYLINDER.theta0[0]), float(CYLINDER.shortest[0]))[0]
     compressed = (30e-6 + 1e-3 * ends[0]) * (pressure[-1] - 5e5) / 8e8
     swept = 1e-3 * (ends[1] - ends[0])
     assert 0.01 * flow.sum() == pytest.approx(compressed + swept, rel=0.05)
@@ -77,10 +77,10 @@ def test_a_log_says_in_which_pressures_it_rested():
     log = duties(STOPPED, {2: [0, 50]})
     pressure = np.full((len(log.time), 7, 2), np.nan)
     pressure[:, 1] = 12e5, 3e5
-    spec, stage = load_model(settings.arm), Stage(settings)
+    spec, bindings = load_model(settings.arm), Bindings(settings)
     for measured, wanted in ((None, (40e5, 50e5)), (pressure, (12e5, 3e5))):
         simulation = make_simulation(spec, replace(log, pressure=measured), [1], settings, [1])
-        response = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, 40.0]])))
+        response = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, 40.0]])))
         assert response.pressure is not None
         np.testing.assert_allclose(response.pressure[0, 0, 0], wanted)
 
@@ -89,9 +89,9 @@ def test_a_joint_away_from_its_stops_is_held_by_its_oil():
     settings = settings_of(
         {"trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 150.0]}}
     )
-    log, stage = duties(settings.arm.pose("study"), {2: [50, -50]}), Stage(settings)
+    log, bindings = duties(settings.arm.pose("study"), {2: [50, -50]}), Bindings(settings)
     simulation = make_simulation(load_model(settings.arm), log, [1], settings)
-    angle = simulation.simulate(stage.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
+    angle = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
     np.testing.assert_array_equal(angle[0], angle[1])
 
 

@@ -13,8 +13,8 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.plant import Plant, load_plant
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
-from hydroid.problem.stage import Stage
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.linkage import LinearActuator
 
@@ -59,7 +59,7 @@ def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray
     settings = fitted.settings
     spec = load_model(settings.arm)
     simulation = make_simulation(spec, log, [j - 1 for j in joints], settings)
-    return simulation.simulate(Stage(settings).candidates(fitted.theta[None])).angle[0]
+    return simulation.simulate(Bindings(settings).candidates(fitted.theta[None])).angle[0]
 
 
 @pytest.mark.parametrize("joints", [[2], [2, 3, 5], [1, 2, 3, 4, 5, 6, 7]])
@@ -164,7 +164,7 @@ def test_pressures_are_those_of_the_simulation():
     settings = fitted.settings
     spec = load_model(settings.arm)
     simulation = make_simulation(spec, log, [1], settings, [1])
-    expected = simulation.simulate(Stage(settings).candidates(fitted.theta[None])).pressure
+    expected = simulation.simulate(Bindings(settings).candidates(fitted.theta[None])).pressure
     assert expected is not None
     plant = Plant(fitted)
     pressure = [plant.pressure]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import replaced, step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
@@ -14,7 +14,7 @@ from hydroid.plant import Plant
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.posterior.statics import actuator
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.simulation import Candidates
 
 TRUE = {"A_A": 1000, "A_B": 750, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2, "F2": 0.7, "x2": 12}
@@ -31,7 +31,7 @@ def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:
 def shoulder_bench(one: IdentifiedModel, joint: int = 2) -> tuple[Bench, Candidates]:
     log = step_log(one.settings.arm.pose("study"), [50.0], joint=joint)
     log.angle[-1, joint - 1] += 0.6  # the travel
-    return make_bench(one.settings, [log], joint), Stage(one.settings).candidates(one.theta[None])
+    return make_bench(one.settings, [log], joint), Bindings(one.settings).candidates(one.theta[None])
 
 
 def measured(bench: Bench, estimate: Candidates) -> dict[str, list[float]]:
@@ -102,8 +102,8 @@ def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
     bench, estimate = shoulder_bench(model(**changes))
     found, (c, _) = measured(bench, estimate), actuator(bench, estimate)
 
-    def spool(command: float, onset: float, full: float) -> float:
-        current = coil_current(side_voltage(command, onset, full), c.current_max[0], c.current_min[0])
+    def spool(command: float, onset: float) -> float:
+        current = coil_current(side_voltage(command, onset), c.current_max[0], c.current_min[0])
         rest = (
             resting_stroke(c.coil[0] * i**2, c.gap[0], c.plunger_stiffness[0])
             for i in (current, c.current_min[0])
@@ -112,11 +112,11 @@ def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
         return float(moved - resting)
 
     commands = np.linspace(1, 60, 1000)
-    for name, onset, full, overlap in (
-        ("positive", c.onset_a[0], c.full_a[0], c.overlap_a[0]),
-        ("negative", c.onset_b[0], c.full_b[0], c.overlap_b[0]),
+    for name, onset, overlap in (
+        ("positive", c.a.onset[0], c.a.overlap[0]),
+        ("negative", c.b.onset[0], c.b.overlap[0]),
     ):
-        opens = np.interp(overlap, [spool(u, onset, full) for u in commands], commands)
+        opens = np.interp(overlap, [spool(u, onset) for u in commands], commands)
         (band,) = found[f"joint2_dead_band_{name}"]
         assert opens < band < opens + 5.0  # 2 % of full speed needs a little more
 
@@ -145,7 +145,7 @@ def test_stage_1s_quantities_are_its_ratios():
     np.testing.assert_allclose(
         found["joint2_speed"], gain * np.array([-100, -75, -50, -25, -10, 10, 25, 50, 75, 100])
     )
-    scaled = replace(estimate, gain=3 * estimate.gain, damping=3 * estimate.damping)
+    scaled = replaced(estimate, gain=3 * estimate.joints.gain, damping=3 * estimate.joints.damping)
     assert measured(bench, scaled)["joint2_gain"] == [pytest.approx(gain)]
 
 
@@ -155,7 +155,7 @@ def test_quantities_are_smooth_in_the_parameters(shoulder):
     step = np.zeros_like(one.theta)
     step[one.settings.parameter_set().names.index("A_A")] = 1e-3
     rows = one.theta * (1 + np.outer([-10, -1, 0, 1, 10], step))
-    for column, value in measure(Stage(one.settings).candidates(rows)):
+    for column, value in measure(Bindings(one.settings).candidates(rows)):
         near, far = (value[3] - value[1]) / 2, (value[4] - value[0]) / 20
         assert near == pytest.approx(far, rel=0.2, abs=2e-5 * (abs(value[2]) + 1)), column.label
 

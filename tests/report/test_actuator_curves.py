@@ -7,7 +7,7 @@ import pytest
 
 from hydroid.errors import SettingsError
 from hydroid.identified_model import load_identified
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.report.actuator_report import (
     JointActuator,
     actuator_page,
@@ -27,7 +27,7 @@ def candidate() -> Candidates:
 
 def nominal(settings: dict[str, float]) -> Candidates:
     found = load_identified(None, "fit-hyd", settings, nominal=True)
-    return Stage(found.settings).candidates(found.theta[None])
+    return Bindings(found.settings).candidates(found.theta[None])
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 import hydroid
 from hydroid.assets import assets, find_config
 from hydroid.errors import SettingsError
-from hydroid.problem.stage import Stage
+from hydroid.problem.bindings import Bindings
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
@@ -192,7 +192,7 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, mes
     path = tmp_path / "fit.yaml"
     path.write_text(NAMED.replace(old, new))
     with pytest.raises(SettingsError, match=message):
-        Stage(hydroid.load_settings(path))
+        Bindings(hydroid.load_settings(path))
 
 
 def test_a_column_is_named_once(tmp_path: Path):

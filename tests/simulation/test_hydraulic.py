@@ -3,41 +3,35 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from conftest import candidates as arms
-from conftest import step_log
+from conftest import replaced, step_log
 
-from hydroid.hydraulics.actuator import Actuator
-from hydroid.hydraulics.records import linkages, nominal_parameters
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation import Candidates, HydraulicSimulation
-from hydroid.simulation.hydraulic import mass_entries
-from hydroid.simulation.rollout import SingleArm, compile_rollout
+from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation.rollout import compile_rollout
 from hydroid.simulation.scenario import Scenario
 
-JOINTS = range(7)
 SHOULDER = [1]
 
 
-def simulation(spec, arm, log, outputs=SHOULDER, hydraulics=None, **settings) -> HydraulicSimulation:
+def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
     chosen = SimulationSettings(**settings)
     scenario = Scenario(spec, arm, log, list(outputs), chosen)
-    return HydraulicSimulation(scenario, arm, hydraulics or HydraulicSettings())
+    return Simulation(scenario, arm, HydraulicSettings().substeps)
 
 
 def candidates(arm, n: int, seed: int = 0, **hydraulics) -> Candidates:
     """Random arms with actuators whose areas, currents and calibration differ too."""
     rng = np.random.default_rng(seed)
-    actuators = nominal_parameters(arm, HydraulicSettings(**hydraulics), JOINTS, n)
+    everyone = arms(arm, n, seed, HydraulicSettings(**hydraulics))
     for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
-        actuators[name] *= rng.uniform(0.7, 1.4, (n, 1))
-    return replace(arms(arm, n, seed), actuators=actuators)
+        everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
+    return everyone
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +40,11 @@ def steps(arm):
 
 
 @pytest.mark.parametrize("other", ["locked", "passive", "measured"])
-def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, steps, other):
+def test_threads_and_neighbours_change_no_bit(spec, arm, steps, other):
     everyone = candidates(arm, 7)
     together = simulation(spec, arm, steps, other_joints=other, threads=1).simulate(everyone).angle
     assert np.ptp(together, axis=1).min() > np.deg2rad(1)
-    for settings in ({"threads": 2}, {"threads": 3, "chunk_mib": 1}):
+    for settings in ({"threads": 2}, {"threads": 3}):
         again = simulation(spec, arm, steps, other_joints=other, **settings).simulate(everyone).angle
         np.testing.assert_array_equal(again, together)
     alone = simulation(spec, arm, steps, other_joints=other).simulate(everyone[slice(3, 4)]).angle
@@ -75,28 +69,30 @@ def test_the_answer_converges_with_mujocos_step(spec, arm, steps):
 
 def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, steps):
     everyone = candidates(arm, 2)
-    stiff = replace(everyone, stiffness=np.where(np.arange(7) == 1, everyone.stiffness, 1e5))
-    stiff = replace(stiff, damping=np.where(np.arange(7) == 1, everyone.damping, 1e4))
+    held = {"stiffness": 1e5, "damping": 1e4}
+    stiff = {k: np.where(np.arange(7) == 1, everyone.joints[k], value) for k, value in held.items()}
     locked = simulation(spec, arm, steps).simulate(everyone).angle
-    passive = simulation(spec, arm, steps, other_joints="passive").simulate(stiff)
+    passive = simulation(spec, arm, steps, other_joints="passive").simulate(replaced(everyone, **stiff))
     np.testing.assert_allclose(passive.angle, locked, atol=np.deg2rad(0.1))
 
 
 def test_only_products_that_the_chain_knows_matter(spec, arm, steps):
     """F1, F2, x1, x2 act through two numbers, and the currents' scale trades with them: null directions."""
     one = candidates(arm, 2)
-    assert one.actuators is not None
-    a = one.actuators
+    a = one.joints
     ratio = np.sqrt(a.force_1 / a.force_2)
     gap = (a.stroke_2 - ratio * a.stroke_1) / (ratio - 1)
     coil = a.force_1 * (a.stroke_1 + gap) ** 2
     x1, x2 = a.stroke_1 * 1.5, a.stroke_2 * 0.6
-    along = a.copy()
-    along.stroke_1, along.stroke_2 = x1, x2
-    along.force_1, along.force_2 = 4 * coil / (x1 + gap) ** 2, 4 * coil / (x2 + gap) ** 2
-    along.current_max, along.current_min = a.current_max / 2, a.current_min / 2
+    along = {
+        "stroke_1": x1,
+        "stroke_2": x2,
+        "current_max": a.current_max / 2,
+        "current_min": a.current_min / 2,
+    }
+    along |= {"force_1": 4 * coil / (x1 + gap) ** 2, "force_2": 4 * coil / (x2 + gap) ** 2}
     run = simulation(spec, arm, steps).simulate
-    np.testing.assert_allclose(run(replace(one, actuators=along)).angle, run(one).angle, atol=1e-9)
+    np.testing.assert_allclose(run(replaced(one, **along)).angle, run(one).angle, atol=1e-9)
 
 
 def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
@@ -106,19 +102,16 @@ def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
     everyone = candidates(arm, 3)
     run = simulation(spec, arm, steps).simulate
     healthy = run(everyone).angle
-    assert everyone.actuators is not None
     capfd.readouterr()
-    broken = everyone.actuators.copy()
-    force = broken.force_2
+    force = everyone.joints.force_2.copy()
     force[1] = 100.0  # the force would grow with the stroke
-    response = run(replace(everyone, actuators=broken))
+    response = run(replaced(everyone, force_2=force))
     np.testing.assert_array_equal(response.feasible, [True, False, True])
     np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
     assert np.isnan(response.angle[1]).all()
     assert capfd.readouterr() == ("", "")
     assert not Path("MUJOCO_LOG.TXT").exists()
-    broken.force_2 = 100.0
-    nobody = run(replace(everyone, actuators=broken))
+    nobody = run(replaced(everyone, force_2=100.0))
     assert not nobody.feasible.any()
 
 
@@ -128,46 +121,14 @@ def test_the_trace_explains_the_motion(spec, arm, steps):
     run = simulation(spec, arm, steps)
     angle = run.simulate(one).angle[0, :, 0]
     trace = run.trace(one)
-    assert list(trace.joints) == [2]
+    assert list(run.joints) == [1]
     assert trace.pressure.shape == (len(steps.time), 1, 2)
     assert trace.pressure.min() >= 0
     cylinder = arm.joints[1].actuator
     way = cylinder.length(angle) - cylinder.length(angle[:1])
-    assert one.actuators is not None
-    oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.actuators.area_a[0, 1]
+    oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.joints.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
-
-
-def test_the_compiled_rollout_is_the_plugin_stepped_beside_mujoco(spec, arm, steps):
-    """Step by step in Python, with delayed commands."""
-    one = candidates(arm, 1, delay=0.033)
-    run = simulation(spec, arm, steps, [1, 3], HydraulicSettings(delay=0.033), other_joints="passive")
-    together = run.simulate(one).angle[0]
-    locked = run.scenario.arm
-    stepped = SingleArm(locked.model)
-    balance = stepped.start(run.scenario.values(one), 0, locked.pose)[None]
-    model, data = stepped.model, stepped.data
-    model.dof_damping[:] = 0.0
-    assert one.actuators is not None
-    actuator = Actuator(
-        one.actuators,
-        linkages(arm, JOINTS, [1, 3]),
-        one.damping,
-        0.01,
-        HydraulicSettings(delay=0.033),
-        mass_entries(model),
-    )
-    state = actuator.start(data.qpos[None], balance)
-    angle = [data.qpos.copy()]
-    for command in steps.command[:-1]:
-        torque, armature = actuator.advance(state, command, data.qpos[None], data.qvel[None], data.M[None])
-        data.qfrc_applied[:], model.dof_armature[:] = torque[0], locked.model.dof_armature + armature[0]
-        mujoco.mj_step(model, data)
-        data.qpos[:] = actuator.close(state, data.qvel[None], data.M[None])[0]
-        angle.append(data.qpos.copy())
-    assert np.ptp(together[:, 0]) > np.deg2rad(1)
-    np.testing.assert_array_equal(together, np.array(angle)[:, [1, 3]])
 
 
 def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, tmp_path, monkeypatch):
@@ -175,10 +136,10 @@ def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, 
     everyone = candidates(arm, 3)
     run = simulation(spec, arm, steps, other_joints="passive", threads=1)
     healthy = run.simulate(everyone).angle
-    stiffness = everyone.stiffness.copy()
+    stiffness = everyone.joints.stiffness.copy()
     stiffness[1, 4] = 1e9  # MuJoCo's spring is explicit in the angle: at 0.01 s it blows up
     capfd.readouterr()
-    response = run.simulate(replace(everyone, stiffness=stiffness))
+    response = run.simulate(replaced(everyone, stiffness=stiffness))
     np.testing.assert_array_equal(response.feasible, [True, False, True])
     assert np.isnan(response.angle[1]).all()
     np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
@@ -204,5 +165,5 @@ def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
         ).stderr
         for _ in range(2)
     ]
-    assert said[0].count("compiling the actuator's kernels") == 1
+    assert said[0].count("compiling the simulation") == 1
     assert said[1] == ""

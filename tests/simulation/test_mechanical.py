@@ -4,19 +4,19 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from conftest import candidates, step_log
+from conftest import candidates, replaced, step_log
 from scipy.integrate import solve_ivp
 
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation import Candidates, MechanicalSimulation
+from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER = [1]
 
 
-def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> MechanicalSimulation:
+def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
     chosen = SimulationSettings(**settings)
-    return MechanicalSimulation(Scenario(spec, arm, log, list(outputs), chosen))
+    return Simulation(Scenario(spec, arm, log, list(outputs), chosen), arm, None)
 
 
 @pytest.mark.parametrize("other", ["locked", "passive"])
@@ -38,7 +38,10 @@ def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
         body.mass = mass
     own.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT.value
     model = own.compile()
-    model.dof_damping[:], model.jnt_stiffness[:] = parameters.damping[0], parameters.stiffness[0]
+    model.dof_damping[:], model.jnt_stiffness[:] = (
+        parameters.joints.damping[0],
+        parameters.joints.stiffness[0],
+    )
     pose = study_log.angle[0]
     model.qpos_spring[:] = pose
     data = mujoco.MjData(model)
@@ -47,7 +50,7 @@ def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
     balance = data.qfrc_bias.copy()
     angle = [pose]
     for command in study_log.command[:-1]:
-        data.qfrc_applied[:] = balance + parameters.gain[0] * command
+        data.qfrc_applied[:] = balance + parameters.joints.gain[0] * command
         mujoco.mj_step(model, data)
         angle.append(data.qpos.copy())
     assert np.ptp(np.array(angle)[:, 1]) > np.deg2rad(2)  # it moves
@@ -75,7 +78,7 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
         return data.qfrc_bias[1], mass_matrix[1, 1]
 
     balance, _ = gravity_and_inertia(pose[1])
-    gain, damping, stiffness = (x[0, 1] for x in (parameters.gain, parameters.damping, parameters.stiffness))
+    gain, damping, stiffness = (parameters.joints[name][0, 1] for name in ("gain", "damping", "stiffness"))
 
     def motion(t, y, u):
         bias, inertia = gravity_and_inertia(y[0])
@@ -101,17 +104,17 @@ def test_locked_arm_converges_to_the_equation_of_motion(spec, arm, study_log):
 @pytest.mark.parametrize("other", ["locked", "passive"])
 def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, study_log, other):
     one = candidates(arm, 3)
-    forces = [1.7 * x for x in (one.gain, one.damping, one.stiffness, one.friction, one.mass)]
-    scaled = Candidates(*forces[:4], mass=forces[4])
+    forces = {name: 1.7 * one.joints[name] for name in ("gain", "damping", "stiffness", "friction")}
+    scaled = Candidates(replaced(one, **forces).joints, 1.7 * one.mass)
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
 
 
 @pytest.mark.parametrize("other", ["locked", "passive", "measured"])
-def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other):
+def test_threads_and_neighbours_change_no_bit(spec, arm, study_log, other):
     parameters = candidates(arm, 11)
     together = simulation(spec, arm, study_log, other_joints=other, threads=1).simulate(parameters).angle
-    for settings in ({"threads": 2}, {"threads": 5, "chunk_mib": 1}):
+    for settings in ({"threads": 2}, {"threads": 5}):
         other_run = simulation(spec, arm, study_log, other_joints=other, **settings)
         np.testing.assert_array_equal(other_run.simulate(parameters).angle, together)
     alone = simulation(spec, arm, study_log, other_joints=other)
@@ -120,20 +123,14 @@ def test_threads_chunks_and_neighbours_change_no_bit(spec, arm, study_log, other
         np.testing.assert_array_equal(alone.simulate(parameters[rows]).angle, together[rows])
 
 
-def test_memory_for_a_chunk_is_bounded(spec, arm, study_log):
-    small = simulation(spec, arm, study_log, other_joints="passive", chunk_mib=1)
-    assert small.scenario.chunk * 2 * 8 * 7 * (len(study_log.time) - 1) <= 2**20
-    assert simulation(spec, arm, study_log, other_joints="passive").scenario.chunk > small.scenario.chunk
-
-
 def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, study_log, capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     parameters = candidates(arm, 4)
-    damping, stiffness = parameters.damping.copy(), parameters.stiffness.copy()
+    damping, stiffness = parameters.joints.damping.copy(), parameters.joints.stiffness.copy()
     damping[2], stiffness[2] = 0.0, 1e9  # explicit at 0.01 s: blows up
     run = simulation(spec, arm, study_log, other_joints="passive").simulate
     healthy = run(parameters)
-    response = run(replace(parameters, damping=damping, stiffness=stiffness))
+    response = run(replaced(parameters, damping=damping, stiffness=stiffness))
     np.testing.assert_array_equal(response.feasible, [True, True, False, True])
     assert np.isnan(response.angle[2]).all()
     np.testing.assert_array_equal(response.angle[[0, 1, 3]], healthy.angle[[0, 1, 3]])
@@ -166,8 +163,8 @@ def test_prescribed_joints_give_the_shoulder_the_motion_they_had(spec, arm):
 def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
     log = step_log(arm.pose("study"), [20.0, 20.0, 20.0])
     parameters = candidates(arm, 1)
-    torque = 20.0 * parameters.gain[0, 1]
-    holding = replace(parameters, friction=np.full_like(parameters.friction, 3 * torque))
+    torque = 20.0 * parameters.joints.gain[0, 1]
+    holding = replaced(parameters, friction=3 * torque)
     run = simulation(spec, arm, log).simulate
     moved = np.ptp(run(parameters).angle)
     assert np.ptp(run(holding).angle) < 0.05 * moved

@@ -1,0 +1,106 @@
+"""Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.errors import SettingsError
+from hydroid.hydraulics.records import Records, nominal_joints, without_actuator
+from hydroid.parameters import Array
+from hydroid.quantity_table import QUANTITIES, TARGETS
+from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.problem import ParameterSettings
+from hydroid.simulation import Candidates
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based, in SI."""
+
+    column: int
+    quantity: str
+    places: list[int]
+    factor: float
+
+
+class Bindings:
+    """Spreads a parameter vector over joints and links.
+
+    What the settings do not name has its nominal value: 0 for gains, dampers, springs and dry friction, else
+    what `hydraulics` and the arm's file say.
+
+    Raises:
+        SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
+    """
+
+    def __init__(self, settings: FitSettings) -> None:
+        self._arm, self._stage = settings.arm, settings.stage
+        self._nominal = nominal_joints(settings.arm, settings.hydraulics)
+        self._rows = [
+            Binding(column, quantity, _places(settings.arm, name, p), QUANTITIES[quantity].factor)
+            for column, (name, p) in enumerate(settings.parameters.items())
+            for quantity in TARGETS[p.quantity]
+        ]
+        self._refuse_overlap(list(settings.parameters))
+        self.parameters = settings.parameter_set()
+
+    def candidates(self, theta: Array) -> Candidates:
+        """Spread theta, shape (n, P), over joints and links."""
+        joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
+        mass = np.tile(self._arm.masses, (len(theta), 1))
+        for row in self._rows:
+            target = mass if row.quantity == "mass" else joints[row.quantity]
+            target[:, row.places] = theta[:, row.column, None] * row.factor
+        return Candidates(joints, mass)
+
+    def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
+        """Refuse driven, (J,), or compared joints, 0-based, that the model cannot move.
+
+        Those are joints for which stage 1 has no gain or no damping, or stage 2 no actuator.
+        """
+        moved = sorted({*np.flatnonzero(driven).tolist(), *outputs})
+        if self._stage == "hyd":
+            for joint in moved:
+                if joint < len(self._arm.joints) and self._arm.joints[joint].actuator is None:
+                    raise without_actuator(self._arm, joint)
+            return
+        for quantity in ("gain", "damping"):
+            served = {place for row in self._rows if row.quantity == quantity for place in row.places}
+            for joint in moved:
+                if joint not in served:
+                    raise SettingsError(
+                        f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
+                        where="parameters",
+                        hint="add one, or leave the joint's command out with log.joints",
+                    )
+
+    def _refuse_overlap(self, names: list[str]) -> None:
+        taken: dict[tuple[str, int], str] = {}
+        for row in self._rows:
+            name = names[row.column]
+            for place in row.places:
+                if other := taken.get((row.quantity, place)):
+                    raise SettingsError(
+                        f"{other} and {name} both set the {row.quantity} of the same joint or link",
+                        where=f"parameters.{name}",
+                        hint="give each its own joints, or remove one",
+                    )
+                taken[row.quantity, place] = name
+
+
+def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:
+    """0-based joints or links that the parameter acts on."""
+    where = f"parameters.{name}"
+    if settings.link is not None:
+        if settings.link not in arm.link_names:
+            known = ", ".join(arm.link_names)
+            raise SettingsError(f"no link {settings.link!r}", where=where, hint=f"links: {known}")
+        return [arm.link_names.index(settings.link)]
+    count = len(arm.joint_names)
+    joints = range(1, count + 1) if settings.joints is None else settings.joints
+    if any(joint > count for joint in joints):
+        raise SettingsError(f"the arm has joints 1 to {count}", where=f"{where}.joints")
+    return [joint - 1 for joint in joints]

@@ -455,5 +455,5 @@ TARGETS = {row.name: tuple(quantity.name for quantity in row.each()) for row in 
 }
 """the quantities that a name sets: itself, or both sides"""
 
-MECHANICAL = tuple(row.name for row in ROWS if row.source == "fit")
+MECHANICAL: tuple[str, ...] = tuple(row.name for row in ROWS if row.source == "fit")
 """the quantities that both stages have"""

@@ -17,7 +17,7 @@ from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
 from hydroid.posterior.posterior import WEAK_PRIOR
 from hydroid.problem.problem import Problem
-from hydroid.settings.problem import MECHANICAL_UNITS
+from hydroid.quantity_table import MECHANICAL
 
 MIN_COMPONENT = 0.1
 """components below this part of the largest are left out of a direction's parameters"""
@@ -109,7 +109,7 @@ def _common_scale(
     """
     idle, named = flags
     quantities = [problem.settings.parameters[name].quantity for name in names]
-    linear = np.array([q in MECHANICAL_UNITS for q in quantities]) & ~idle
+    linear = np.array([q in MECHANICAL for q in quantities]) & ~idle
     mass = np.array([q == "mass" for q in quantities]) & linear
     if linear.sum() < 2:
         return None

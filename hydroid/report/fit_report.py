@@ -222,11 +222,10 @@ def _front(record: Record) -> Section:
 def _facts(record: Record) -> tuple[tuple[str, str], ...]:
     settings, run = record.settings, record.folder
     config, again = shlex.quote(f"{run}/config.yaml"), shlex.quote(f"{run}-again")
+    hashes = record.identity["logs"]
     logs = [
-        (name, f"{number(len(p.log.time) * p.log.period)} s, SHA-256 {digest[:12]}…")
-        for p, name, digest in zip(
-            record.result.fitted, _names(record), record.identity["logs"].values(), strict=True
-        )
+        (name, f"{number(len(p.log.time) * p.log.period)} s, SHA-256 {hashes[p.log.source][:12]}…")
+        for p, name in zip(record.result.fitted, _names(record), strict=True)
     ]
     search, segments = settings.search, record.result.front[1].shape[1] - 1
     return (

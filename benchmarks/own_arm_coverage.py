@@ -57,7 +57,7 @@ def main() -> None:
     fits = parser.parse_args().fits
     with tempfile.TemporaryDirectory() as place:
         truth = machine(Path(place) / "machine")
-        logs = [EXAMPLE / f"log_{number}.csv" for number in (1, 2, 3)]
+        logs: list[str | Path] = [EXAMPLE / f"log_{number}.csv" for number in (1, 2, 3)]
         hydroid.init(Path(place) / "mine", arm=EXAMPLE / "robot.urdf", log=logs)
         study(truth, hydroid.load_settings(Path(place) / "mine" / "fit.yaml"), fits)
 

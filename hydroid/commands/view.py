@@ -196,14 +196,14 @@ def _collisions(
 def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Files:
     require_hydraulics(model)
     from hydroid.posterior.posterior import stored_posterior
-    from hydroid.problem.stage import Stage
+    from hydroid.problem.bindings import Bindings
     from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
     from hydroid.report.page_file import write_figures, write_page
 
-    stage, arm = Stage(model.settings), model.settings.arm
-    actuator = joint_actuator(arm, stage.candidates(model.theta[None]), joint, model.source)
+    bindings, arm = Bindings(model.settings), model.settings.arm
+    actuator = joint_actuator(arm, bindings.candidates(model.theta[None]), joint, model.source)
     if (posterior := stored_posterior(model)) is not None:
-        known = KnownActuator(posterior, lambda theta: joint_records(arm, stage.candidates(theta), joint))
+        known = KnownActuator(posterior, lambda theta: joint_records(arm, bindings.candidates(theta), joint))
         actuator = replace(actuator, known=known)
     page = actuator_page(actuator)
     files = [str(file) for file in (*write_figures(page, out / "figures"), *write_page(page, out))]

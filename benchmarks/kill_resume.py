@@ -30,7 +30,7 @@ import numpy as np
 
 from hydroid.commands.app import main as hydroid
 from hydroid.fitting import checkpoints
-from hydroid.report import page_file
+from hydroid.reporting import page_file
 
 LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
 SAMPLES = 600

@@ -15,7 +15,7 @@ from scipy.stats import rankdata, wilcoxon
 from studies import Claim
 
 from hydroid.parameters import Array
-from hydroid.study.study import Row
+from hydroid.studies.study import Row
 
 SIGNIFICANT = 0.05
 

@@ -15,7 +15,7 @@ from hydroid.arm.model import load_model
 from hydroid.parameters import Array
 from hydroid.posterior.sweep import surface
 from hydroid.problem.problem import Problem
-from hydroid.study.runs import Result
+from hydroid.studies.runs import Result
 
 COLORS = [f"C{i}" for i in range(10)]
 DATA: dict[str, Any] = {"color": "black", "linestyle": "--", "lw": 1.8, "label": "data"}

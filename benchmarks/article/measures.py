@@ -15,8 +15,8 @@ from hydroid.parameters import Array, relative_error
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.jacobian import jacobian
 from hydroid.problem.problem import Problem
-from hydroid.study.runs import Result, Task
-from hydroid.study.study import Row
+from hydroid.studies.runs import Result, Task
+from hydroid.studies.study import Row
 
 CONVERGED = 0.05
 """part of the objective's whole descent that is left when a search counts as converged"""

@@ -20,7 +20,7 @@ from measures import UNITS
 from studies import FOLDER, ArticleStudy, Table, load_studies, order
 
 from hydroid.settings.study import cell_settings
-from hydroid.study.study import Row
+from hydroid.studies.study import Row
 
 DOCS = FOLDER.parents[1] / "docs"
 QUICK = "The short form: few seeds, short data, few generations. It shows that the studies run, nothing else."

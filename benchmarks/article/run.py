@@ -26,8 +26,8 @@ from studies import DETERMINED_AT_DEG, Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.progress import no_progress
-from hydroid.report.study_report import runs_csv
-from hydroid.study.execution import processes
+from hydroid.reporting.study_report import runs_csv
+from hydroid.studies.execution import processes
 
 ROOT = Path(__file__).parents[2]
 

@@ -23,9 +23,9 @@ from hydroid.progress import Progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 from hydroid.settings.study import Changes, StudySettings, cell_settings
-from hydroid.study.execution import run_all
-from hydroid.study.runs import Result, Task
-from hydroid.study.study import Row, make_tasks, measured, read_checks
+from hydroid.studies.execution import run_all
+from hydroid.studies.runs import Result, Task
+from hydroid.studies.study import Row, make_tasks, measured, read_checks
 
 FOLDER = Path(__file__).parent
 DETERMINED_AT_DEG = 0.1

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from hydroid.parameters import Array
     from hydroid.posterior.sweep import Surface, Sweep
     from hydroid.problem.problem import Problem
-    from hydroid.report.table import Table
-    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.reporting.table import Table
+    from hydroid.reporting.uncertainty_report import UncertaintyStudy
 
 SENSITIVITY = ("log", "output", "parameter", "rms_per_percent")
 """keys of the table of sensitivities"""
@@ -144,8 +144,8 @@ def analyse(
         model = open_model(fit, config, set)
     problem = problem_of(model, logs or run_logs(model), repair=repair)
     from hydroid.posterior import sweep as sweeps
-    from hydroid.report.analysis_report import analysis_page
-    from hydroid.report.uncertainty_report import uncertainty_page
+    from hydroid.reporting.analysis_report import analysis_page
+    from hydroid.reporting.uncertainty_report import uncertainty_page
 
     grid = points, None if around is None else around / 100
     with Progress() as progress:
@@ -164,7 +164,7 @@ def _uncertainty(
     from hydroid.fitting.refinement import refine
     from hydroid.posterior import covariance, directions
     from hydroid.posterior import profile as profiling
-    from hydroid.report.uncertainty_report import UncertaintyStudy
+    from hydroid.reporting.uncertainty_report import UncertaintyStudy
     from hydroid.settings.search import RefinementSettings
 
     def at(theta: "Array", source: str) -> UncertaintyStudy:

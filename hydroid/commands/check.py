@@ -13,7 +13,7 @@ from hydroid.commands.result import Printed
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from hydroid.settings.log import LogSettings
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ConfigSource, Source
     from hydroid.log import ColumnGuess, Log, LogFinding, Table
-    from hydroid.report.table import Table as ShownTable
+    from hydroid.reporting.table import Table as ShownTable
 
 MOST_JOINTS = 12
 """of a log whose columns are guessed"""

@@ -12,7 +12,7 @@ from hydroid.commands.result import Result, as_path, rows
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
 """keys of the table of predicted relative standard deviations"""
@@ -85,7 +85,7 @@ def design(
     model = open_model(fit, config, setting_changes(set, **options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
-    from hydroid.report.design_report import design_page
+    from hydroid.reporting.design_report import design_page
 
     settings, folder = model.settings, as_path(out)
     with Progress() as progress:

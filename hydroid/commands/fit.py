@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Problem, Spread
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
     from hydroid.run.folder import RunFolder
 
 _log = logging.getLogger(__name__)
@@ -57,8 +57,8 @@ class FitResult(Printed):
 
     def lines(self) -> "list[Table | str]":
         """Return the table of the estimate, and what must be read before any use."""
-        from hydroid.report.fit_report import fit_lines
-        from hydroid.report.parameters_report import parameter_table
+        from hydroid.reporting.fit_report import fit_lines
+        from hydroid.reporting.parameters_report import parameter_table
 
         table = parameter_table(self.model.settings, self.summary)
         return [table, *fit_lines(self.summary), *([str(self.folder / "report.html")] if self.folder else [])]
@@ -133,7 +133,7 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.report.drawing import draw
+    from hydroid.reporting.drawing import draw
     from hydroid.run.record import fit_result, save_result
 
     checkpoints = folder.begin_or_continue(problem.settings, problem.logs)

@@ -15,7 +15,7 @@ from hydroid.files import is_file
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
     from hydroid.project import Project
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)

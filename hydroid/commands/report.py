@@ -13,7 +13,7 @@ from hydroid.commands.result import Files, Printed, Result, rows
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
     from hydroid.run.collection import Collection
 
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
@@ -28,7 +28,7 @@ class MergedRuns(Result):
 
     def lines(self) -> "list[Table | str]":
         """Return median and spread of the estimates, and the best run."""
-        from hydroid.report.spread import final_spread
+        from hydroid.reporting.spread import final_spread
 
         best = self.result.best
         line = f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
@@ -36,7 +36,7 @@ class MergedRuns(Result):
 
     def plain(self) -> dict[str, Any]:
         """Return the runs, and the spread of each parameter."""
-        from hydroid.report.spread import final_spread
+        from hydroid.reporting.spread import final_spread
 
         return {
             "out": self.out and str(self.out),
@@ -89,12 +89,12 @@ def report(
             seeds, or the page cannot be written.
     """
     if merge:
-        from hydroid.report.spread import spread_page
+        from hydroid.reporting.spread import spread_page
         from hydroid.run.collection import read_runs
 
         collected = read_runs([str(run) for run in as_list(runs)], Path(out))
         return MergedRuns(collected, spread_page(collected), Path(out)).write()
-    from hydroid.report.drawing import draw
+    from hydroid.reporting.drawing import draw
 
     page = str(draw(as_list(runs), out, without or (), figures=figures))
     return Files({"out": page}, (page,))

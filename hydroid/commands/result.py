@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
-    from hydroid.report.page import Page
-    from hydroid.report.table import Table
+    from hydroid.reporting.page import Page
+    from hydroid.reporting.table import Table
 
 
 class Printed(ABC):
@@ -70,7 +70,7 @@ class Result(Printed):
             RunError: the folder cannot be written.
         """
         if self.out is not None:
-            from hydroid.report.page_file import write_page
+            from hydroid.reporting.page_file import write_page
 
             write_page(self.page, self.out)
         return self
@@ -108,7 +108,7 @@ def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:
 
 
 def _html(table: "Table") -> str:
-    from hydroid.report.table import shown
+    from hydroid.reporting.table import shown
 
     cells = "".join(f"<th>{escape(name)}</th>" for name in table.header)
     body = "".join(

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from hydroid.commands.inputs import LogSources, SettingChanges
     from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Spread
-    from hydroid.report.page import Page
-    from hydroid.report.table import Table
+    from hydroid.reporting.page import Page
+    from hydroid.reporting.table import Table
 
 NAMED = "runs/LOG-STAGE-ALGORITHM"
 """run folder named after its log, stage and algorithm"""
@@ -100,7 +100,7 @@ class FitRuns(Printed):
         """Return the lines of the one run, or the table of several."""
         if self.spread is None:
             return self.best.lines()
-        from hydroid.report.spread import final_spread
+        from hydroid.reporting.spread import final_spread
 
         return [
             final_spread(self.spread),
@@ -236,8 +236,8 @@ def _spread(out: Path | None, results: list[FitResult]) -> "Page | None":
     """Write and return the page of several runs, which are read back from their folders."""
     if out is None:
         return None
-    from hydroid.report.page_file import write_page
-    from hydroid.report.spread import spread_page
+    from hydroid.reporting.page_file import write_page
+    from hydroid.reporting.spread import spread_page
     from hydroid.run.collection import read_runs
 
     page = spread_page(read_runs([str(result.folder) for result in results], out))

@@ -17,7 +17,7 @@ from hydroid.files import write_atomic
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
     from hydroid.log import Log
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)

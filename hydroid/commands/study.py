@@ -18,8 +18,8 @@ from hydroid.settings.study import load_study
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
-    from hydroid.report.table import Table
-    from hydroid.study.study import StudyRuns
+    from hydroid.reporting.table import Table
+    from hydroid.studies.study import StudyRuns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,9 +75,9 @@ def study(
     """
     path, folder = Path(file), Path(out or "runs/study")
     load_study(path)  # a wrong file is refused before anything heavy is imported
-    from hydroid.report.study_report import study_page
+    from hydroid.reporting.study_report import study_page
     from hydroid.run.lock import locked
-    from hydroid.study.study import run_study
+    from hydroid.studies.study import run_study
 
     with stoppable(folder), locked(folder), executor(processes, dask, dask_insecure) as workers:
         with Progress() as progress:
@@ -90,7 +90,7 @@ def executor(processes: int, dask: str | None = None, dask_insecure: bool = Fals
     """Open what performs runs: processes of this machine (0: one per core), or Dask workers."""
     from hydroid.parallel.cluster import open_workers
     from hydroid.settings.simulation import ClusterSettings
-    from hydroid.study.execution import processes as open_processes
+    from hydroid.studies.execution import processes as open_processes
 
     with open_workers(dask, ClusterSettings(), insecure=dask_insecure) as workers:
         if workers is None:

@@ -13,7 +13,7 @@ from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
     from hydroid.advice.proposals import Advice
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,8 +68,8 @@ def suggest(
     from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
     from hydroid.posterior.covariance import uncertainty
-    from hydroid.report.page import log_names
-    from hydroid.report.suggestion_report import suggestion_page
+    from hydroid.reporting.page import log_names
+    from hydroid.reporting.suggestion_report import suggestion_page
 
     problem = problem_of(model, given, repair=repair)
     with Progress() as progress:

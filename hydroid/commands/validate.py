@@ -15,7 +15,7 @@ from hydroid.errors import SettingsError
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ModelSource
     from hydroid.fitting.validation import Prediction
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,8 +71,8 @@ def validate(
         raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.validation import predicted, without_one
-    from hydroid.report.comparison import validation_page
-    from hydroid.report.drawing import draw
+    from hydroid.reporting.comparison import validation_page
+    from hydroid.reporting.drawing import draw
     from hydroid.run.identity import was_fitted
     from hydroid.run.record import keep_validation
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hydroid.arm.collision import Clearance
     from hydroid.commands.inputs import ConfigSource, ModelSource, Source
     from hydroid.log import Log
-    from hydroid.report.table import Table
+    from hydroid.reporting.table import Table
     from hydroid.settings.fit import FitSettings
 
 
@@ -184,7 +184,7 @@ def _collisions(
 ) -> Collisions:
     logs = read_trajectories(log, settings, arm, repair=repair)
     from hydroid.arm.machine import load_machine
-    from hydroid.report.collision_report import collision_page
+    from hydroid.reporting.collision_report import collision_page
 
     machine = load_machine(settings.arm, pair=arm is not None)
     rest = settings.arm.pose(settings.start_pose)
@@ -197,8 +197,8 @@ def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Files:
     require_hydraulics(model)
     from hydroid.posterior.posterior import stored_posterior
     from hydroid.problem.bindings import Bindings
-    from hydroid.report.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
-    from hydroid.report.page_file import write_figures, write_page
+    from hydroid.reporting.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
+    from hydroid.reporting.page_file import write_figures, write_page
 
     bindings, arm = Bindings(model.settings), model.settings.arm
     actuator = joint_actuator(arm, bindings.candidates(model.theta[None]), joint, model.source)

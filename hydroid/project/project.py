@@ -18,8 +18,8 @@ from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
 from hydroid.project.steps import next_steps, steps_page
-from hydroid.report.arm_chart import arm_chart
-from hydroid.report.figure import rendered
+from hydroid.reporting.arm_chart import arm_chart
+from hydroid.reporting.figure import rendered
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings

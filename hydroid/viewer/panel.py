@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hydroid.parameters import Array
-from hydroid.report.chart import Chart, Mark, Panel
-from hydroid.report.figure import figure, style
+from hydroid.reporting.chart import Chart, Mark, Panel
+from hydroid.reporting.figure import figure, style
 from hydroid.viewer.motion import JointSignals, Motion
 
 MOST_JOINTS = 7

@@ -12,7 +12,7 @@ from hydroid.errors import SettingsError
 from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.design_report import design_table
+from hydroid.reporting.design_report import design_table
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings

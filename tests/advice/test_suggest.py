@@ -24,8 +24,8 @@ from hydroid.posterior.posterior import regular
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import QUANTITIES, ROWS, TARGETS
-from hydroid.report.page_file import write_page
-from hydroid.report.suggestion_report import suggestion_page
+from hydroid.reporting.page_file import write_page
+from hydroid.reporting.suggestion_report import suggestion_page
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 

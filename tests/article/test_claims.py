@@ -7,7 +7,7 @@ from measures import generations_to_converge
 from scipy.stats import wilcoxon
 from studies import Claim
 
-from hydroid.study.study import Row
+from hydroid.studies.study import Row
 
 RNG = np.random.default_rng(1)
 CLAIM = Claim(says="A beats B", item="table 1", column="error", lower="A", than="B")

@@ -17,8 +17,8 @@ from hydroid.commands.app import app
 from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.report import drawing
-from hydroid.report.spread import final_spread
+from hydroid.reporting import drawing
+from hydroid.reporting.spread import final_spread
 
 SMALL = {
     "search.algorithm": "ga",

@@ -9,7 +9,7 @@ import pytest
 
 import hydroid
 from hydroid.commands import runs
-from hydroid.report import drawing, page_file
+from hydroid.reporting import drawing, page_file
 
 ROOT = Path(__file__).parents[2]
 NAMES = [

@@ -54,7 +54,10 @@ def test_help_lists_every_command_in_its_group():
 
 
 def test_every_public_name_exists_and_an_unknown_one_does_not():
-    for package in ("hydroid.report.page", "hydroid.study.study"):  # packages of the same name as a command
+    for package in (
+        "hydroid.reporting.page",
+        "hydroid.studies.study",
+    ):  # packages of the same name as a command
         import_module(package)
 
     for name in hydroid.__all__:

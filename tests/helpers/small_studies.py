@@ -8,7 +8,7 @@ import yaml
 
 from hydroid import read_logs
 from hydroid.progress import no_progress
-from hydroid.study.study import StudyRuns, run_study
+from hydroid.studies.study import StudyRuns, run_study
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 

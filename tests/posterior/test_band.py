@@ -11,7 +11,7 @@ from hydroid.log import Log
 from hydroid.posterior.band import Band, prediction_bands, start_effects
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.comparison import validation_page
+from hydroid.reporting.comparison import validation_page
 
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 CHANGES = {

@@ -14,7 +14,7 @@ from hydroid.errors import RunError
 from hydroid.estimate import read_estimate
 from hydroid.posterior.posterior import stored_posterior
 from hydroid.prediction import simulate_log
-from hydroid.report.quantities_report import curves_csv, quantity_table
+from hydroid.reporting.quantities_report import curves_csv, quantity_table
 
 TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
 FIXED = {"I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}

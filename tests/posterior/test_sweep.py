@@ -12,8 +12,8 @@ from hydroid.log import Log
 from hydroid.posterior.sweep import SWEEP_POINTS, Sweep, surface, sweep
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report.analysis_report import analysis_page, landscape
-from hydroid.report.page_file import write_page
+from hydroid.reporting.analysis_report import analysis_page, landscape
+from hydroid.reporting.page_file import write_page
 
 TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 THETA = np.array(list(TRUTH.values()))

@@ -21,7 +21,7 @@ from hydroid.files import write_atomic
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.report import page_file
+from hydroid.reporting import page_file
 from hydroid.run import lock
 from hydroid.run.folder import RunFolder
 from hydroid.run.lock import locked

@@ -1,0 +1,81 @@
+"""The report of a trajectory: which bodies meet, and how near they come over time."""
+
+from functools import partial
+from itertools import groupby
+
+import numpy as np
+
+from hydroid.arm.collision import Clearance
+from hydroid.reporting.chart import SERIES, Chart, Mark, Panel
+from hydroid.reporting.page import Page, Plot, Section
+from hydroid.reporting.table import Cell, Table
+
+SHAPES = (
+    "Bodies are as large as the shapes that collide in the MJCF; a mesh counts as its convex hull, hoses and "
+    "cylinders are not checked. A body is not held against the one that it hangs on."
+)
+
+
+def collision_page(clearance: Clearance, name: str) -> Page:
+    """Return the page of a trajectory of an arm; its tables are `nearest` and `collisions`."""
+    plot = Plot("clearance", "Smallest distance between bodies.", partial(clearance_chart, clearance), True)
+    tables = {"collisions": collision_table(clearance)} if clearance.meetings else {}
+    tables |= {"nearest": nearest_table(clearance)}
+    sections = Section("Clearance", text=SHAPES, plots=(plot,)), Section("Bodies", tables=tables)
+    return Page("collisions", f"Collisions of {name}", verdict(clearance), sections)
+
+
+def verdict(clearance: Clearance) -> str:
+    """Return the answer in a sentence."""
+    k = clearance.smallest
+    pair, at = " and ".join(clearance.nearest[k]), f"at {clearance.time[k]:.2f} s"
+    size = f"{1e3 * abs(clearance.distance[k]):.1f} mm"
+    if not clearance.meetings:
+        return f"No bodies meet. The nearest are {pair}: {size} {at}."
+    first, times = clearance.meetings[0], sum(met for met, _ in groupby(clearance.distance < 0))
+    return (
+        f"Bodies meet {'once' if times == 1 else f'{times} times'}, first {first.first} and {first.second} "
+        f"at {first.begins:.2f} s. The deepest inside each other are {pair}: {size} {at}."
+    )
+
+
+def collision_table(clearance: Clearance) -> Table:
+    """Return the pairs of bodies that met."""
+    rows: list[tuple[Cell, ...]] = []
+    for pair in dict.fromkeys((meeting.first, meeting.second) for meeting in clearance.meetings):
+        times = [meeting for meeting in clearance.meetings if (meeting.first, meeting.second) == pair]
+        worst = max(times, key=lambda meeting: meeting.depth)
+        rows.append((*pair, len(times), times[0].begins, times[0].ends, 1e3 * worst.depth, worst.deepest))
+    header = ("first", "second", "times", "first from [s]", "to [s]", "depth [mm]", "at [s]")
+    note = "depth: the largest of all times. --json lists every time."
+    return Table("Bodies that meet", header, tuple(rows), note)
+
+
+def nearest_table(clearance: Clearance) -> Table:
+    """Return the pairs of bodies that were the nearest at any time, the nearest of all first."""
+    rows: list[tuple[Cell, ...]] = []
+    for k in np.argsort(clearance.distance, kind="stable").tolist():
+        pair = clearance.nearest[k]
+        if pair not in [row[:2] for row in rows]:
+            share = 100 * clearance.nearest.count(pair) / len(clearance.time)
+            rows.append((*pair, 1e3 * float(clearance.distance[k]), float(clearance.time[k]), share))
+    excluded = ", ".join("–".join(pair) for pair in clearance.excluded)
+    note = f"{clearance.checked} pairs of bodies were checked. The model excludes: {excluded or 'none'}."
+    header = ("first", "second", "smallest distance [mm]", "at [s]", "share of the time [%]")
+    return Table("Nearest bodies", header, tuple(rows), note)
+
+
+def clearance_chart(clearance: Clearance) -> Chart:
+    """Draw the smallest distance over time, coloured by the bodies that it lies between."""
+    distance, marks = 1e3 * clearance.distance, [Mark("rule", y=np.zeros(1), color="ink", width=1)]
+    pairs = [(str(row[0]), str(row[1])) for row in nearest_table(clearance).rows]
+    for i, pair in enumerate(pairs):
+        named = i < len(SERIES)
+        own = np.array([other == pair for other in clearance.nearest])
+        own[:-1] |= own[1:]  # up to where the next pair begins
+        label, color = (" – ".join(pair), SERIES[i]) if named else ("others", "grey")
+        marks.append(
+            Mark("line", clearance.time, np.where(own, distance, np.nan), color=color, label=label, width=2)
+        )
+    title = "Distance of the nearest bodies; below 0 they are inside each other"
+    return Chart((Panel("time [s]", "smallest distance [mm]", tuple(marks), title, 280),))

@@ -1,0 +1,184 @@
+"""A report as data: sections of text, tables, bars and charts; `page_file` writes it."""
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any, Protocol
+
+from hydroid.log import Log
+from hydroid.reporting.table import Table
+
+_LONGEST_NAME = 40
+
+
+class Drawing(Protocol):
+    """A `Chart` or a `MovingArm`."""
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure: the name of its files, what it shows in words, and the function that draws it.
+
+    The page draws it, a chart with buttons to zoom it if `zoom`; `write_figures` makes files of charts.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[], Drawing]
+    zoom: bool = False
+
+
+@dataclass(frozen=True)
+class Tab:
+    """One of several groups of figures of which a reader sees one at a time."""
+
+    name: str
+    plots: tuple[Plot, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One quantity on a bar from its lower to its upper bound; positions are parts of the bar, 0 to 1.
+
+    Attributes:
+        symbol, name: short, and in plain words.
+        value, interval: in words, with the unit.
+        ends: the bounds in words; empty where there are none.
+        note: what is to be known about it.
+        state: `known`, `weak`, `unknown` or `fixed`.
+        at: position of the value.
+        band: ends of its 95 % interval.
+        prior: ends of the interval that its prior gives.
+        dots: positions of other estimates.
+    """
+
+    symbol: str
+    name: str
+    value: str
+    interval: str = ""
+    ends: tuple[str, str] = ("", "")
+    note: str = ""
+    state: str = "known"
+    at: float | None = None
+    band: tuple[float, float] | None = None
+    prior: tuple[float, float] | None = None
+    dots: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Step:
+    """Something to do next, what it is predicted to bring, and the command that does it."""
+
+    what: str
+    gain: str
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with text, points to note, facts, tables by file name, bars and figures.
+
+    `more` are tables that are shown on demand. All of a `folded` section is. `link` is a page that has more,
+    relative to this one.
+    """
+
+    title: str
+    text: str = ""
+    points: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    tables: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    plots: tuple[Plot, ...] = ()
+    tabs: tuple[Tab, ...] = ()
+    bars: tuple[Bar, ...] = ()
+    steps: tuple[Step, ...] = ()
+    more: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    folded: bool = False
+    link: str = ""
+
+    @property
+    def all_plots(self) -> Iterator[Plot]:
+        """Its figures, and those of its tabs."""
+        yield from self.plots
+        for tab in self.tabs:
+            yield from tab.plots
+
+
+@dataclass(frozen=True)
+class Light:
+    """One question with its answer: `good`, `fair`, `bad`, or `open` where nobody has looked."""
+
+    question: str
+    state: str
+    answer: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer in a sentence on the prediction and one on the parameters, and lights."""
+
+    prediction: str
+    parameters: str = ""
+    lights: tuple[Light, ...] = ()
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report.
+
+    Attributes:
+        name: of the page's file, without ending.
+        title: of the page.
+        lead: the answer in a sentence.
+        sections: in order.
+        warnings: what a reader must know before using the answer; stands at the top.
+        versions: of the software, printed at the foot.
+        data: further files by name, such as CSV for scripts.
+        verdict: stands above all sections.
+    """
+
+    name: str
+    title: str
+    lead: str
+    sections: tuple[Section, ...]
+    warnings: tuple[str, ...] = ()
+    versions: Mapping[str, str] = field(default_factory=dict[str, str])
+    data: Mapping[str, str] = field(default_factory=dict[str, str])
+    verdict: Verdict | None = None
+
+    @property
+    def plots(self) -> Iterator[Plot]:
+        """All figures."""
+        for section in self.sections:
+            yield from section.all_plots
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """All tables by file name."""
+        return {n: table for s in self.sections for n, table in {**s.tables, **s.more}.items()}
+
+
+def log_names(logs: Sequence[Log]) -> list[str]:
+    """Return short names of logs, all different."""
+    names: list[str] = []
+    for log in logs:
+        names.append(unique(short_name(Path(log.source).name or log.source), names))
+    return names
+
+
+def unique(name: str, taken: Collection[str]) -> str:
+    """Return the name, numbered where it is taken."""
+    candidates = (f"{name} ({n})" if n > 1 else name for n in count(1))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def short_name(name: str) -> str:
+    """Return a name with unprintable characters replaced and the middle of a long one left out."""
+    text = "".join(c if c.isprintable() else "?" for c in name)
+    half = _LONGEST_NAME // 2
+    return text if len(text) <= _LONGEST_NAME else f"{text[: half - 1]}…{text[-half:]}"

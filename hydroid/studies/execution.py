@@ -1,0 +1,135 @@
+"""Performing the runs of a study: what is there is read, the rest goes to processes or to Dask.
+
+Only the process that was started writes. The fits run in processes of their own, one thread each.
+"""
+
+import json
+import logging
+import multiprocessing
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Generator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+from hydroid.assets import assets
+from hydroid.errors import HydroidError, RunError
+from hydroid.files import write_atomic
+from hydroid.progress import NOTE, Progress
+from hydroid.studies.runs import Result, Task, perform
+
+RUNS = "runs"
+"""folder of the runs' files, which several studies may share"""
+
+_log = logging.getLogger(__name__)
+
+
+def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
+    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
+
+    A run that fails is a result too: {"failed": why}.
+
+    Raises:
+        RunError: a file cannot be written or is damaged, or a process of the executor died.
+    """
+    files = [folder / RUNS / f"{task.key()}.json" for task in tasks]
+    missing = {file: task for file, task in zip(files, tasks, strict=True) if not file.is_file()}
+    results = {file: read_result(file) for file in files if file not in missing}
+    failed: dict[Path, Result] = {}
+    known, code = len(results), code_version()
+    if known and missing:
+        _log.log(NOTE, "%d of %d runs found, goes on", known, known + len(missing))
+    progress("runs", known, known + len(missing))
+    futures: dict[Future[Result], Path] = {
+        executor.submit(perform, task): file for file, task in missing.items()
+    }
+    try:
+        for done, future in enumerate(as_completed(futures), 1):
+            file = futures.pop(future)
+            results[file] = _outcome(future, missing[file], failed, file) | {"code": code}
+            if file not in failed:
+                write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
+            progress("runs", known + done, known + len(missing))
+    finally:
+        for future in futures:
+            future.cancel()
+    return [results[file] for file in files]
+
+
+def _outcome(future: Future[Result], task: Task, failed: dict[Path, Result], file: Path) -> Result:
+    """Return what a run came to. An error that is no fault of the input may pass: it is not kept."""
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        hint = "the same command goes on from here; with less memory, use fewer processes"
+        raise RunError("a process of the study was killed", hint=hint) from None
+    except HydroidError as error:
+        words = str(error)
+    except Exception as error:
+        words = f"{type(error).__name__}: {error}"
+        failed[file] = {}
+    _log.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
+    return {"failed": words}
+
+
+def read_result(file: Path) -> Result:
+    """Read a run's file.
+
+    Raises:
+        RunError: it cannot be read, or is damaged.
+    """
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunError(
+            f"cannot be read ({error})", where=str(file), hint="remove it: the run is repeated"
+        ) from None
+    if not isinstance(content, dict) or not {"theta", "failed"} & set(content):
+        raise RunError("is no result of a run", where=str(file), hint="remove it: the run is repeated")
+    return content
+
+
+@contextmanager
+def processes(count: int = 0) -> Generator[Executor]:
+    """Open that many processes, one per core for 0; they end with this one, however it ends."""
+    context = multiprocessing.get_context("spawn")  # threads of the simulation do not survive a fork
+    pool = ProcessPoolExecutor(count or os.cpu_count() or 1, context, initializer=_end_with_parent)
+    try:
+        yield pool
+    except BaseException:
+        for process in list((getattr(pool, "_processes", None) or {}).values()):
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Ignore what the terminal sends to all, and leave when the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def code_version() -> str:
+    """Return hydroid's version, with the commit where it runs from a checkout that has one."""
+    own, folder = version("hydroid"), assets()
+    if not (folder / ".git").exists():
+        return own
+    try:
+        command = ["git", "-C", str(folder), "describe", "--always", "--dirty=, changed"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return own
+    return f"{own} ({done.stdout.strip()})"

@@ -1,0 +1,100 @@
+"""An actuator's curves: what is drawn obeys the laws that it draws."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hydroid.errors import SettingsError
+from hydroid.identified_model import load_identified
+from hydroid.problem.bindings import Bindings
+from hydroid.reporting.actuator_report import (
+    JointActuator,
+    actuator_page,
+    draw,
+    joint_actuator,
+)
+from hydroid.reporting.chart import Panel
+from hydroid.reporting.page_file import write_page
+from hydroid.settings.arm import Arm
+from hydroid.simulation import Candidates
+
+
+@pytest.fixture(scope="module")
+def candidate() -> Candidates:
+    return nominal({"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "parameters.I_max.fixed": 1.2})
+
+
+def nominal(settings: dict[str, float]) -> Candidates:
+    found = load_identified(None, "fit-hyd", settings, nominal=True)
+    return Bindings(found.settings).candidates(found.theta[None])
+
+
+@pytest.fixture(scope="module")
+def actuator(arm: Arm, candidate: Candidates) -> JointActuator:
+    return joint_actuator(arm, candidate, 2, "test")
+
+
+PANELS = ("calibration", "current", "force", "spool", "opening", "flow", "pressure_flow", "torque")
+
+
+def panel(actuator: JointActuator, name: str) -> Panel:
+    return draw(actuator).panels[PANELS.index(name)]
+
+
+def curve(actuator: JointActuator, name: str, label: str) -> tuple[np.ndarray, np.ndarray]:
+    (mark,) = [mark for mark in panel(actuator, name).marks if mark.label == label]
+    return mark.x, mark.y
+
+
+def test_the_force_curve_at_rated_current_runs_through_its_points(actuator: JointActuator):
+    stroke, force = curve(actuator, "force", "0.9 A")
+    for at, expected in zip(*curve(actuator, "force", "F1, F2 (rated)"), strict=True):
+        assert np.interp(at, stroke, force) == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_plunger_rests_where_the_spring_meets_the_coil(actuator: JointActuator):
+    rests = [m for m in panel(actuator, "force").marks if m.kind == "points" and not m.label]
+    assert len(rests) == 4  # I_min, between, rated, I_max
+    for rest, current in zip(rests, ("0.3 A", "0.75 A", "0.9 A", "1.2 A"), strict=True):
+        at, force = float(rest.x[0]), float(rest.y[0])
+        assert np.interp(at, *curve(actuator, "force", current)) == pytest.approx(force, rel=2e-3)
+        assert np.interp(at, *curve(actuator, "force", "spring")) == pytest.approx(force, rel=1e-9)
+
+
+def test_the_valve_stays_shut_within_its_overlap(actuator: JointActuator):
+    at, area = curve(actuator, "opening", "side A")
+    assert np.nanmax(area[at < 0.4]) == 0.0
+    assert np.nanmax(area) == pytest.approx(0.40)
+    assert np.interp(1.4, at, area) == pytest.approx(0.20, rel=1e-3)  # half of the slot beyond the overlap
+
+
+def test_flow_grows_with_the_root_of_the_drop_up_to_the_pumps_limit(actuator: JointActuator):
+    at, ten = curve(actuator, "flow", "10 bar")
+    _, fifty = curve(actuator, "flow", "50 bar")
+    _, hundred = curve(actuator, "flow", "100 bar")
+    partly = (at > 0.6) & (at < 1.4)
+    assert fifty[partly] == pytest.approx(np.sqrt(5) * ten[partly], rel=1e-3)
+    assert hundred.max() == pytest.approx(2.0)
+    _, against = curve(actuator, "pressure_flow", "100 % open")
+    assert against.max() == pytest.approx(2.0)
+    assert abs(against[-1]) < 1e-9  # nothing flows into a chamber at supply pressure
+
+
+def test_the_torque_is_largest_where_the_moment_arm_is(actuator: JointActuator):
+    angle, torque = curve(actuator, "torque", "A at supply")
+    arm = actuator.linkage.moment_arm(np.radians(angle))
+    assert torque == pytest.approx(arm * (1000e-6 * 150e5 - 750e-6 * 5e5))
+
+
+def test_a_rotary_joint_is_drawn_too(arm: Arm, candidate: Candidates, tmp_path: Path):
+    page = actuator_page(joint_actuator(arm, candidate, 4, "test"))
+    written = write_page(page, tmp_path)
+    assert {path.name for path in written} == {"actuator.html"}
+
+
+def test_a_set_without_a_force_stroke_curve_is_refused_in_words(arm: Arm):
+    infeasible = nominal({"parameters.F1.fixed": 500})
+    with pytest.raises(SettingsError, match=r"joint 2: no .* curve runs through 500 N at 0\.8 mm"):
+        joint_actuator(arm, infeasible, 2, "test")
+    joint_actuator(arm, infeasible, 1, "test")  # the others have one

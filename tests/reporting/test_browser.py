@@ -1,0 +1,113 @@
+"""Pages in a real browser: no error, no request, nothing cut off, at the width of a phone and of a screen."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_fits import make_fit, make_prediction, make_problem, make_record
+
+from hydroid.reporting.comparison import validation_page
+from hydroid.reporting.fit_report import fit_page
+from hydroid.reporting.page_file import write_page
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
+
+PROBE = """<script>
+const problems = [];
+addEventListener("error", (e) => problems.push(`error: ${e.message}`));
+addEventListener("unhandledrejection", (e) => problems.push(`rejected: ${e.reason}`));
+addEventListener("securitypolicyviolation", (e) => problems.push(`refused: ${e.blockedURI}`));
+console.error = (...words) => problems.push(`console: ${words.join(" ")}`);
+const outlines = (end) => {
+  const slider = document.querySelector(".moving input");
+  if (!slider) return [];
+  slider.value = slider[end];
+  slider.oninput();
+  return [...document.querySelectorAll(".moving polygon")].map((one) => one.getAttribute("points"));
+};
+const waiting = setInterval(() => {
+  if (document.documentElement.dataset.ready !== "yes") return;
+  clearInterval(waiting);
+  document.querySelectorAll("details").forEach((one) => { one.open = true; });
+  setTimeout(() => {
+    const loaded = performance.getEntriesByType("resource").map((e) => e.name);
+    const charts = [...document.querySelectorAll(".chart")].filter((e) => e.offsetParent !== null);
+    const found = {
+      problems, width: innerWidth, content: document.documentElement.scrollWidth,
+      requests: loaded.filter((name) => !name.startsWith("data:")),
+      empty: charts.filter((e) => !e.querySelector(".panel > div > *")).length, charts: charts.length,
+      moved: outlines("min").filter((points, i) => points !== outlines("max")[i]).length,
+      headings: [...document.querySelectorAll("h1, h2, h3")].map((e) => +e.tagName[1]),
+      unnamed: [...document.querySelectorAll("button, img, [role=group]")]
+        .filter((e) => !(e.textContent.trim() || e.alt || e.ariaLabel)).length,
+    };
+    document.head.replaceChildren();
+    document.body.textContent = `FOUND${JSON.stringify(found)}END`;
+  }, 2000);
+}, 100);
+</script>"""
+
+
+def seen(page: Path, width: int, *options: str) -> dict:
+    """What a browser finds in a page of a width [px] with all its folded parts open."""
+    probed = page.with_name("probed.html")
+    source = page.read_text(encoding="utf-8")
+    probed.write_text(source.replace("<head>", f"<head>{PROBE}", 1), encoding="utf-8")
+    assert BROWSER is not None
+    how = ["--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},900", "--dump-dom"]
+    how += ["--virtual-time-budget=60000", f"--user-data-dir={page.parent / 'profile'}", *options]
+    done = subprocess.run([BROWSER, *how, probed.as_uri()], capture_output=True, text=True, timeout=240)
+    found = re.search(r"FOUND(.*)END", done.stdout)
+    assert found, done.stdout[-2000:]
+    return json.loads(found[1].replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    problem = make_problem(("<a>&b.csv", "other.csv"), outputs=(2, 3))
+    fit = make_fit(problem, effects=(1e-3, 1e-3, 0.0, 1e-3))
+    folder = tmp_path_factory.mktemp("pages")
+    log = replace(problem.logs[0], source="unseen.csv")
+    results = [make_prediction(log, fit=name) for name in ("a", "b")]
+    arm = problem.settings.arm
+    for page in (fit_page(make_record(problem, fit)), validation_page(results, arm)):
+        write_page(page, folder)
+    return {name: folder / f"{name}.html" for name in ("report", "validation")}
+
+
+@pytest.mark.parametrize("name", ["report", "validation"])
+@pytest.mark.parametrize("width", [400, 1400])
+def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, width: int):
+    found = seen(pages[name], width)
+    assert found["problems"] == []
+    assert found["requests"] == []
+    assert found["content"] <= found["width"] + 1
+    assert found["charts"] > 0
+    assert found["empty"] == 0
+    assert found["unnamed"] == 0
+    assert found["moved"] > 0
+    levels = found["headings"]
+    assert levels[0] == 1
+    assert np.max(np.diff(levels)) <= 1
+
+
+def test_a_page_is_whole_in_the_dark(pages: dict[str, Path]):
+    found = seen(pages["report"], 1400, "--force-dark-mode", "--blink-settings=preferredColorScheme=0")
+    assert (found["problems"], found["empty"]) == ([], 0)
+
+
+def test_a_page_is_printed_on_paper(pages: dict[str, Path], tmp_path: Path):
+    assert BROWSER is not None
+    paper = tmp_path / "page.pdf"
+    how = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=30000"]
+    how += [f"--print-to-pdf={paper}", f"--user-data-dir={tmp_path / 'profile'}"]
+    subprocess.run([BROWSER, *how, pages["report"].as_uri()], capture_output=True, timeout=240, check=True)
+    content = paper.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(content) > 30_000  # with its charts

@@ -1,0 +1,108 @@
+"""The numbers and words of a fit's tables are the fit's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from report_fits import MODEL, make_fit, make_problem, make_uncertainty
+
+from hydroid.findings import Finding
+from hydroid.fitting.summary import summarise
+from hydroid.fitting.validation import error_indices, fitted, pooled_indices
+from hydroid.reporting.page import log_names
+from hydroid.reporting.parameters_report import parameter_table
+from hydroid.reporting.predictions import error_table
+from hydroid.reporting.spread import spread_table
+from hydroid.reporting.table import Table
+from hydroid.run.collection import RunEstimate
+
+
+def column(table: Table, name: str) -> list:
+    return [row[table.header.index(name)] for row in table.rows]
+
+
+def with_theta(fit, problem, effects=None, **values: float):
+    theta = fit.best.theta.copy()
+    for name, value in values.items():
+        theta[problem.parameters.names.index(name)] = value
+    estimates = fit.estimates | {fit.final: replace(fit.best, theta=theta)}
+    return replace(fit, estimates=estimates, uncertainty=make_uncertainty(problem, theta, effects))
+
+
+def test_every_estimate_of_every_parameter_is_in_the_table():
+    problem = make_problem()
+    fit = make_fit(problem)
+    table = parameter_table(problem.settings, summarise(problem, fit))
+    assert column(table, "name") == list(MODEL)
+    for name, estimate in fit.estimates.items():
+        assert column(table, name) == list(estimate.theta)
+    assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.effects))
+    assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
+    assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
+    assert set(table.optional) < set(table.header)
+
+
+def test_flags_and_findings_name_what_the_data_cannot_tell():
+    problem = make_problem(fixed={"D": 100.0})
+    effects = (1e-3, 0.0, 0.0, 1e-3)
+    fit = make_fit(problem, effects=effects)
+    low, high = MODEL["K"]
+    summary = summarise(problem, fit)
+    assert column(parameter_table(problem.settings, summary), "flag") == ["", "fixed", "no effect", ""]
+    assert Finding("no effect", "note", ("M1",)) in summary.findings
+    at = with_theta(fit, problem, effects, K=low + 1e-4 * (high - low), M2=MODEL["M2"][1])
+    expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
+    assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
+    assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
+    off = with_theta(fit, problem, effects, K=low + 2e-3 * (high - low))
+    off = replace(off, estimates={"refined": off.best})
+    assert not [f for f in summarise(problem, off).findings if f.level != "note"]
+
+
+def test_errors_are_those_of_the_responses():
+    problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
+    fit = make_fit(problem)
+    table = error_table(fitted(problem, fit), problem.settings.arm)
+    assert column(table, "joint")[:4] == ["shoulder", "elbow", "shoulder", "elbow"]
+    everything = [row for row in table.rows if row[1] == "all fitted"]
+    assert [row[0] for row in everything] == [fit.final, *(n for n in fit.estimates if n != fit.final)]
+    for row in everything:
+        assert row[5] == pytest.approx(np.degrees(fit.estimates[row[0]].rms))
+
+
+def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
+    problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
+    pairs = [p.pair(joint) for p in fitted(problem, make_fit(problem)) for joint in p.joints]
+    error = sum(np.sum((measured - simulated) ** 2) for measured, simulated in pairs)
+    spread = sum(np.sum((measured - np.mean(measured)) ** 2) for measured, _ in pairs)
+    assert pooled_indices(pairs).fit == pytest.approx(100 * (1 - np.sqrt(error / spread)))
+
+
+def test_a_joint_that_moves_by_rounding_has_no_fit():
+    rest = 0.3 + 1e-16 * np.arange(50)
+    assert np.isnan(error_indices(rest, rest + 0.1).fit)
+
+
+@pytest.mark.parametrize(
+    "sources",
+    [["x/a.csv", "y/a.csv", "a.csv"], ["a.csv (2)", "b/a.csv", "a.csv"], ["n\n\x01.csv"], ["W" * 300]],
+)
+def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
+    log = make_problem().logs[0]
+    names = log_names([replace(log, source=source) for source in sources])
+    assert len(set(names)) == len(sources)
+    assert all(name.isprintable() and len(name) <= 50 for name in names)
+
+
+def test_the_spread_over_runs_is_median_quartiles_and_flags_whatever_the_order():
+    problem = make_problem(fixed={"D": 80.0})
+    unit = np.array([[1.0, 0.3, 0.0], [1.0, 0.3, 0.4], [1.0, 0.5, 0.4]])
+    theta = problem.parameters.from_unit(unit)
+    runs = [RunEstimate(seed, t, 0.01 * seed) for seed, t in enumerate(theta)]
+    table = spread_table(problem.parameters, runs, ["M1"], "refined")
+    assert column(table, "median")[:4] == pytest.approx(np.median(theta, axis=0))
+    assert column(table, "lowest")[:4] == list(theta.min(axis=0))
+    assert column(table, "highest")[-1] == pytest.approx(np.degrees(0.02))
+    bounds = ["at upper bound in 3 of 3 runs", "fixed", "no effect", "at lower bound in 1 of 3 runs", ""]
+    assert column(table, "flag") == bounds
+    assert spread_table(problem.parameters, runs[::-1], ["M1"], "refined").rows == table.rows

@@ -1,0 +1,98 @@
+"""The arm in motion: its parts lie in the picture where MuJoCo puts its links."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from report_fits import make_problem
+
+from hydroid.arm.model import load_model
+from hydroid.reporting.moving_arm import MOST, Movement, MovingArm, motion_section, moving_arm, side_view
+from hydroid.reporting.outlines import shapes
+
+PROBLEM = make_problem(outputs=(2, 3), samples=400)
+ARM = PROBLEM.settings.arm
+LOG = replace(PROBLEM.logs[0], angle=PROBLEM.logs[0].angle * [0, 1, 1, 0, 0, 0, 0])
+ERROR = 0.05 * np.sin(3 * LOG.time)[:, None] * [1, 0]
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return load_model(ARM).compile()
+
+
+def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:
+    movement = Movement.of("a.csv", LOG, (2, 3), LOG.angle[:, [1, 2]] - error)
+    return moving_arm(model, ARM.joint_names, movement, most)
+
+
+def test_a_part_for_each_joint_that_moves_and_one_that_stands(model):
+    arm = moved(model)
+    assert len(arm.poses["measured"]) == 3
+    assert [len(part) for part in arm.poses["measured"]] == [1, len(arm.time), len(arm.time)]
+    assert {part for part, _ in arm.shapes} == {0, 1, 2}
+
+
+def test_the_same_angles_are_the_same_picture(model):
+    arm = moved(model, error=0 * ERROR)
+    for measured, simulated in zip(*arm.poses.values(), strict=True):
+        assert np.array_equal(measured, simulated)
+    assert not np.any(list(arm.errors.values()))
+
+
+def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
+    arm, data = moved(model), mujoco.MjData(model)
+    address = [int(model.joint(name).qposadr[0]) for name in ARM.joint_names]
+    root, tip = int(model.joint(ARM.joint_names[2]).bodyid[0]), model.body(ARM.link_names[-1]).id
+    poses, moments = arm.poses["measured"][2].reshape(-1, 2, 4), (0, len(arm.time) - 1)
+    world, drawn = [], []
+    for moment in moments:
+        data.qpos[address] = LOG.angle[np.searchsorted(LOG.time, arm.time[moment])]
+        mujoco.mj_kinematics(model, data)
+        world.append(data.xpos[tip].copy())
+        own = (data.xpos[tip] - data.xpos[root]) @ data.xmat[root].reshape(3, 3)
+        drawn.append(poses[moment, :, :3] @ own + poses[moment, :, 3])
+    scale = np.linalg.norm(poses[0, 0, :3])
+    right, up, _ = scale * side_view() @ (world[1] - world[0])
+    assert drawn[1] - drawn[0] == pytest.approx([right, -up], abs=1e-6 * scale)
+    assert np.linalg.norm(drawn[1] - drawn[0]) > 10
+
+
+def test_the_arm_stays_in_its_picture(model):
+    arm = moved(model)
+    for name, poses in arm.poses.items():
+        for part, corners in arm.shapes:
+            turned = poses[part].reshape(-1, 2, 4)
+            at = turned[..., :3] @ corners.T + turned[..., 3:]
+            assert at.min() >= 0, name
+            assert at[:, 0].max() <= arm.size[0]
+            assert at[:, 1].max() <= arm.size[1]
+
+
+def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
+    arm = moved(model, most=20)
+    assert len(arm.time) == 20
+    assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
+    worst = arm.plain()["start"]
+    assert abs(arm.errors["shoulder"][worst]) == np.abs(arm.errors["shoulder"]).max()
+
+
+def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
+    inertial = '<inertial pos="0.5 0 0" mass="1" diaginertia="1 1 1"/>'
+    stick = f'<body pos="2 0 0">{inertial}<joint name="stick" axis="0 -1 0"/></body>'
+    boom = f'<body>{inertial}<joint name="boom" axis="0 -1 0"/>{stick}</body>'
+    bare = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boom}</worldbody></mujoco>")
+    lengths = [np.linalg.norm(np.diff(line, axis=0)) for line in [shape.corners for shape in shapes(bare)]]
+    assert lengths == pytest.approx([2.0, 0.5])
+    movement = Movement.of("a.csv", LOG, (1, 2), LOG.angle[:, :2])
+    two = replace(movement, measured=LOG.angle[:, 1:3], simulated=LOG.angle[:, 1:3])
+    assert [len(points) for _, points in moving_arm(bare, ["boom", "stick"], two).shapes] == [2, 2]
+
+
+def test_a_log_that_diverged_is_not_shown():
+    good = Movement.of("a.csv", LOG, (2, 3), LOG.angle[:, [1, 2]])
+    lost = replace(good, log="b.csv", simulated=good.simulated * np.nan)
+    (section,) = motion_section(ARM, [good, lost])
+    assert [tab.name for tab in section.tabs] == ["a.csv"]
+    assert motion_section(ARM, [lost]) == ()

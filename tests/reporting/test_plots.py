@@ -1,0 +1,294 @@
+"""Figures: they hold what they claim, and stand whatever a fit looks like."""
+
+import json
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from report_fits import make_fit, make_problem, make_uncertainty
+
+from hydroid.fitting.validation import fitted
+from hydroid.posterior.directions import identifiability
+from hydroid.posterior.profile import THRESHOLD, Profile
+from hydroid.posterior.sweep import Surface
+from hydroid.problem.problem import Evaluation
+from hydroid.reporting.analysis_report import landscape
+from hydroid.reporting.chart import Chart, Mark, Panel
+from hydroid.reporting.figure import figure, rendered, style
+from hydroid.reporting.objectives import learning, pareto
+from hydroid.reporting.predictions import JointResponse, draw, joint_responses
+from hydroid.reporting.uncertainty_report import UncertaintyStudy, draw_profiles
+from hydroid.settings.problem import ObjectiveSettings
+
+pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
+
+
+@pytest.fixture(autouse=True)
+def _styled():
+    with style():
+        yield
+
+
+def responses(problem, fit) -> list[JointResponse]:
+    return joint_responses(fitted(problem, fit), problem.settings.arm)
+
+
+def drawn_front(problem, fit) -> Chart:
+    evaluation = fit.front[1]
+    objectives = np.column_stack([evaluation.segments, evaluation.overall])
+    segments = {name: fit.estimates[name].segments for name in (fit.final, *fit.estimates)}
+    return pareto(objectives, segments, problem.settings.objective)
+
+
+def draw_all(problem, fit) -> list[Chart]:
+    objective = problem.settings.objective
+    return [
+        *(draw(response) for response in responses(problem, fit)),
+        learning(fit.history, objective),
+        drawn_front(problem, fit),
+    ]
+
+
+def check(chart: Chart) -> None:
+    json.dumps(chart.plain(), allow_nan=False)
+    drawn = figure(chart)
+    drawn.draw_without_rendering()
+    for axes in drawn.axes:
+        assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
+
+
+def labelled(panel: Panel, start: str = "") -> dict[str, Mark]:
+    return {mark.label: mark for mark in panel.marks if mark.label.startswith(start)}
+
+
+TWO = {"K": (0.05, 0.5), "D": (80.0, 80.0)}
+SHAPES = {
+    "one segment, one parameter, simple GA": (
+        {"segments": 1, "parameters": {"K": (0.05, 0.5)}},
+        {"names": ("best", "refined")},
+    ),
+    "several logs and outputs": ({"sources": ("a.csv", "b.csv"), "outputs": (1, 2)}, {"names": ("best",)}),
+    "no refinement, one estimate diverged": (
+        {},
+        {"names": ("average", "utopia", "best"), "diverged": ("average",)},
+    ),
+    "nothing but diverged": (
+        {},
+        {
+            "names": ("best", "refined"),
+            "diverged": ("best", "refined"),
+            "front": 0,
+            "effects": (np.nan,) * 4,
+        },
+    ),
+    "fixed without bounds, relative": ({"parameters": TWO, "fixed": {"D": 80.0}, "relative": True}, {}),
+    "names that are markup": ({"sources": ("<b>&_%$a$.csv",)}, {}),
+    "names without glyphs": ({"sources": ("日志🦾.csv",)}, {}),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_any_fit_can_be_drawn(shape: str):
+    of_problem, of_fit = SHAPES[shape]
+    problem = make_problem(**of_problem)
+    fit = make_fit(problem, **of_fit)
+    for drawn in draw_all(problem, fit):
+        if shape == "names without glyphs":
+            rendered(drawn)  # with boxes, without a warning
+        else:
+            check(drawn)
+
+
+def test_what_is_not_finite_is_left_out():
+    problem = make_problem()
+    fit = make_fit(problem)
+    history = fit.history.copy()
+    history[:3, 4:] = np.inf
+    segments = fit.front[1].segments.copy()
+    segments[0] = np.inf
+    broken = replace(fit, history=history, front=(fit.front[0], Evaluation(segments, fit.front[1].overall)))
+    for drawn in draw_all(problem, broken):
+        check(drawn)
+    check(learning(np.full((2, 6), np.inf), problem.settings.objective))
+    check(learning(np.empty((0, 6)), problem.settings.objective))
+
+
+def test_the_response_shows_measured_angle_every_estimate_residual_and_command():
+    problem = make_problem()
+    fit = make_fit(problem)
+    (record,) = responses(problem, fit)
+    upper, middle, lower = draw(record).panels
+    measured = np.degrees(record.measured)
+    assert labelled(upper)["measured"].y == pytest.approx(measured)
+    for name, estimate in fit.estimates.items():
+        simulated = np.degrees(estimate.responses[0][:, 0])
+        ((label, mark),) = labelled(upper, f"{name} (").items()
+        assert mark.y == pytest.approx(simulated)
+        assert f"{np.degrees(estimate.rms):.3g}"[:3] in label
+        assert labelled(middle)[label].y == pytest.approx(measured - simulated)
+        assert mark.off == (name != fit.final)  # the others are shown when a reader asks for them
+    band = labelled(middle)["95 % band of refined"]
+    assert np.all(band.end > 0)
+    assert np.array_equal(band.y, -band.end)
+    assert np.array_equal(lower.marks[0].y, record.of.log.command[:, 1])
+
+
+def test_pressures_are_drawn_where_they_are_logged():
+    problem = make_problem()
+    (record,) = responses(problem, make_fit(problem))
+    pressure = np.tile([5e6, 2e6], (*record.of.log.angle.shape, 1))
+    pressed = replace(record, of=replace(record.of, log=replace(record.of.log, pressure=pressure)))
+    panels = draw(pressed).panels
+    assert [panel.y for panel in panels] == ["angle [deg]", "residual [deg]", "pressure [bar]", "command [%]"]
+    assert labelled(panels[2])["chamber A"].y == pytest.approx(np.full(len(record.measured), 50.0))
+
+
+def test_a_response_that_runs_away_does_not_flatten_the_others():
+    problem = make_problem()
+    fit = make_fit(problem)
+    away = replace(fit.estimates["utopia"], responses=(np.linspace(0, 1e6, 120)[:, None],))
+    fit = replace(fit, estimates=fit.estimates | {"utopia": away})
+    record = responses(problem, fit)[0]
+    reach = 4 * max(np.degrees(np.ptp(record.measured)), 1.0)
+    for panel, middle in zip(draw(record).panels, (np.degrees(record.measured.mean()), 0.0), strict=False):
+        (runaway,) = labelled(panel, "utopia").values()
+        assert np.isnan(runaway.y).any()
+        assert np.nanmax(np.abs(runaway.y - middle), initial=0.0) < reach
+
+
+def test_the_front_is_one_line_with_gaps_and_estimates_on_top():
+    problem = make_problem()
+    fit = make_fit(problem, front=9)
+    (panel,) = drawn_front(problem, fit).panels
+    front, *others = panel.marks
+    order = np.argsort(fit.front[1].overall, kind="stable")
+    drawn = np.append(front.y, np.nan).reshape(9, -1)
+    assert drawn[:, :-1] == pytest.approx(np.degrees(fit.front[1].segments)[order])
+    assert np.isnan(drawn[:, -1]).all()
+    assert len({mark.label for mark in others if mark.label}) == len(fit.estimates)
+
+
+def test_the_learning_curve_shows_best_and_median_in_deg():
+    problem = make_problem()
+    fit = make_fit(problem)
+    values = labelled(learning(fit.history, problem.settings.objective).panels[0])
+    assert values["best so far"].y == pytest.approx(np.degrees(fit.history[:, 4]))
+    assert values["median of the population"].y == pytest.approx(np.degrees(fit.history[:, 5]))
+
+
+@pytest.mark.parametrize(("ratio", "log"), [(5.0, False), (20.0, True), (1e6, True)])
+def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bool):
+    problem = make_problem()
+    fit = make_fit(problem)
+    history = fit.history.copy()
+    history[:, 4] = history[:, 5] = np.geomspace(0.1 * ratio, 0.1, 7)
+    chart = learning(history, problem.settings.objective)
+    assert chart.panels[0].log_y == log
+    drawn = figure(chart)
+    drawn.draw_without_rendering()
+    assert drawn.axes[0].get_yscale() == ("log" if log else "linear")
+    labels = [label.get_text() for label in drawn.axes[0].get_yticklabels()]
+    assert sum(bool(label) for label in labels) >= 2
+
+
+def test_a_file_leaves_out_what_is_off_and_has_every_label_once():
+    x = np.arange(3.0)
+    shown, off = Mark("line", x, x, label="a"), Mark("line", x, 9 * x, label="b", off=True)
+    chart = Chart((Panel("x", "y", (shown, off)), Panel("x", "y", (shown,))), linked=True)
+    drawn = figure(chart, "A title")
+    assert [len(axes.lines) for axes in drawn.axes] == [1, 1]
+    apart = Chart((Panel("x", "y", (shown,)), Panel("x", "y", (replace(shown, label="c"),))))
+    assert apart.apart
+    assert not chart.apart
+
+
+def test_every_kind_of_mark_can_be_drawn():
+    x = np.arange(1.0, 4.0)
+    marks = (
+        Mark("step", x, x),
+        Mark("points", x, x, look="diamond", label="p"),
+        Mark("band", x, x, x + 1, alpha=0.3),
+        Mark("bars", x, x, x + 1, label="b"),
+        Mark("spans", x[:1], end=x[1:2]),
+        Mark("rule", y=x[:1], look="dashed"),
+        Mark("rule", x[:1], look="dotted"),
+        Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
+        Mark("text", x, x, texts=("a", "b", "c")),
+    )
+    check(
+        Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4], names=("a", "b"))), columns=2)
+    )
+
+
+def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
+    fit = make_fit(make_problem())
+
+    def drawn() -> tuple[bytes, bytes]:
+        return rendered(drawn_front(make_problem(), fit))
+
+    plain = drawn()
+    with mpl.rc_context({"font.size": 30.0, "svg.fonttype": "none", "axes.grid": False}):
+        before = dict(mpl.rcParams)
+        assert drawn() == plain
+        assert dict(mpl.rcParams) == before
+
+
+def test_a_dollar_in_a_name_is_a_dollar():
+    problem = make_problem(("a$x^2$.csv",))
+    drawn = figure(draw(responses(problem, make_fit(problem))[0]))
+    named = [text for text in drawn.findobj(Text) if "$" in text.get_text()]
+    assert named
+    assert not any(text.get_parse_math() for text in named)
+
+
+@pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])
+def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
+    rng = np.random.default_rng(0)
+    time, curve = np.arange(samples) * 0.01, rng.normal(size=samples).cumsum()
+    thin = Mark("line", time, curve).thinned(1000)
+    kept = thin.y
+    assert len(kept) <= 2002
+    assert np.array_equal(curve[np.searchsorted(time, thin.x)], kept)
+    assert (kept[0], kept[-1], kept.min(), kept.max()) == (curve[0], curve[-1], curve.min(), curve.max())
+    band = Mark("band", time, -np.abs(curve), np.abs(curve)).thinned(1000)
+    assert (band.y.min(), band.end.min()) == (-np.abs(curve).max(), np.abs(curve).min())
+    gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
+    if samples > 1:
+        assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
+
+
+def make_surface(estimate: tuple[float, float]) -> Surface:
+    parameters = make_problem().parameters.parameters[:2]
+    values = np.union1d(np.linspace(0.05, 0.5, 9), estimate[0]), np.linspace(50.0, 500.0, 7)
+    error = np.abs(values[0][:, None] - estimate[0]) + np.abs(values[1] - 200.0) / 1e3
+    return Surface(parameters, values, error, estimate, abs(estimate[1] - 200.0) / 1e3)
+
+
+def test_a_surface_marks_the_estimate_and_the_lowest_point_where_they_are():
+    for estimate in ((0.2, 200.0), (0.21, 260.0)):
+        surface = make_surface(estimate)
+        chart = landscape(surface, ObjectiveSettings())
+        check(chart)
+        marks = {mark.label.split(" (")[0]: mark for mark in chart.panels[0].marks}
+        for label, (x, y, *_) in (("estimate", estimate), ("lowest point drawn", surface.lowest)):
+            assert (marks[label].x[0], marks[label].y[0]) == pytest.approx((x, y))
+        assert surface.lowest[2] <= surface.estimate_error
+
+
+def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_ends():
+    uncertainty = make_uncertainty(problem := make_problem(), make_fit(problem).best.theta)
+    centre, deviation = uncertainty.theta[0], uncertainty.standard_deviation[0]
+    values = centre + deviation * np.linspace(-40, 40, 13)
+    deviance = ((values - centre) / deviation) ** 2
+    half = deviation * np.sqrt(THRESHOLD)
+    profile = Profile("K", values, deviance, (centre - half, centre + half), uncertainty.theta)
+    shown = identifiability(problem, uncertainty)
+    chart = draw_profiles(UncertaintyStudy(problem, "test", uncertainty, shown, (profile,)))
+    check(chart)
+    (panel,) = chart.panels
+    assert panel.x_limits is not None
+    assert np.ptp(panel.x_limits) < 4 * half
+    curve = labelled(panel)["profile"]
+    assert np.interp(centre + half, curve.x, curve.y) == pytest.approx(THRESHOLD, rel=0.02)

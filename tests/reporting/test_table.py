@@ -1,0 +1,131 @@
+"""Tables: exact for scripts, safe and short for readers."""
+
+import csv
+import io
+import math
+import re
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from hydroid.reporting.table import Given, Table
+from hydroid.words import number, plain
+
+HOSTILE = r"<b>&_%$#{}~^|\*`[x](http://e.org).csv"
+TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc",)), max_size=30)
+
+
+def table(*cells: str | float | None) -> Table:
+    return Table("title", tuple(f"c{i}" for i in range(len(cells))), (cells,))
+
+
+@given(st.lists(st.one_of(st.floats(), TEXT), min_size=2, max_size=5))
+def test_csv_gives_back_every_bit_and_letter(values: list[float | str]):
+    (_, row) = csv.reader(io.StringIO(table(*values).csv()))
+    for text, value in zip(row, values, strict=True):
+        if isinstance(value, str):
+            assert text == value
+        else:
+            assert float(text) == value or (math.isnan(value) and math.isnan(float(text)))
+
+
+def test_bounds_keep_their_bits_in_csv_and_their_digits_elsewhere():
+    bounds = table(Given(0.1 + 0.2), Given(57.95))
+    assert bounds.csv().splitlines()[1] == f"{0.1 + 0.2!r},57.95"
+    assert "| 0.3 | 57.95 |" in bounds.markdown()
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_shown_number_is_right_to_four_digits(value: float):
+    assert abs(Decimal(number(value)) - Decimal(value)) <= abs(Decimal(value)) * Decimal("5.01e-4")
+
+
+@given(st.floats(1e-4, 9e6))
+def test_ordinary_numbers_have_four_digits_and_no_exponent(value: float):
+    for text in (number(value), number(-value).removeprefix("-")):
+        assert "e" not in text
+        digits = text.replace(".", "").lstrip("0")
+        assert len(digits) == 4 or (value >= 1e4 and digits[4:].strip("0") == "")
+
+
+@pytest.mark.parametrize(
+    ("write", "value", "text"),
+    [
+        *((number, 0.0, "0"), (number, 0.2, "0.2000"), (number, 9.9999, "10.00"), (number, 12345.6, "12350")),
+        *((number, math.inf, "–"), (plain, 0.05, "0.05"), (plain, 2e6, "2000000"), (plain, math.nan, "–")),
+    ],
+)
+def test_numbers_as_read(write, value: float, text: str):
+    assert write(value) == text
+
+
+@pytest.mark.parametrize("name", [HOSTILE, r"\|", "**bold**", "<script>", "`x`", "[x][y]", "_a_ ~~b~~"])
+def test_markdown_shows_a_hostile_name_as_it_is(name: str):
+    source = Table(name, ("h",), ((name,),), name).markdown()
+    tokens = MarkdownIt("gfm-like", {"linkify": False}).parse(source)
+    title, header, cell, note = [token for token in tokens if token.type == "inline"]
+    for token in (title, cell, note):
+        kinds = {child.type for child in token.children or []}
+        assert kinds <= {"text", "text_special", "strong_open", "strong_close"}
+        assert "".join(child.content for child in token.children or []) == name
+    assert header.content == "h"
+
+
+def test_latex_leaves_no_special_letter_bare():
+    source = Table(HOSTILE, (HOSTILE,), ((HOSTILE,), ("[2ex]",), ("*",)), HOSTILE).latex()
+    # what stays after all legal commands are taken out
+    rest = re.sub(r"\\text(backslash|asciitilde|asciicircum|less|greater|bar)\{\}", "", source)
+    rest = re.sub(r"\\[&%$#_{}]", "", rest)
+    assert not set("%$#_~^<>|") & set(rest)
+    assert rest.count("{") == rest.count("}")
+    assert "\n{[}2ex] \\\\" in source  # else a length for the line break before it
+
+
+def test_every_format_has_every_cell():
+    several = Table("t", ("name", "value", "c"), (("K", 1.5, "x"), ("D", None, None), ("S", math.nan, "")))
+    assert several.numeric == (False, True, False)
+    assert several.markdown().count("\n|") == 5
+    assert several.latex().count(r" \\") == 4
+    assert [row["value"] for row in several.records()] == [1.5, None, None]  # JSON has no NaN
+
+
+def test_without_a_terminal_no_line_is_cut(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    words = tuple(f"[deg] word{i}" * 3 for i in range(12))
+    Table("wide", words, (words,)).show()
+    shown = capsys.readouterr().out
+    assert all(word in shown for word in words)
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 200])
+def test_a_table_fits_the_terminal_and_names_the_columns_left_out(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("COLUMNS", str(width))
+    names = tuple(f"value {i}" for i in range(14))
+    values = tuple(0.001234 * 1.7**i for i in range(14))
+    header = ("name", *names, "flag")
+    words = "not identifiable, at upper bound"
+    Table("t", header, (("K", *values, words),), "note", names[3:]).show()
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= width
+    assert all(word in shown for word in words.split())
+    left_out = shown.split("Left out for width: ")[1] if "Left out" in shown else ""
+    for name, value in zip(names, values, strict=True):
+        assert (number(value) in shown) != (name in " ".join(left_out.split()).rstrip(".").split(", "))
+    assert ("Left out" in shown) == (width < 150)
+
+
+def test_numbers_without_optional_columns_are_whole_in_any_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("COLUMNS", "40")
+    values = tuple(0.001234 * 1.7**i for i in range(14))
+    Table("narrow", tuple(f"value {i}" for i in range(14)), (values,)).show()
+    shown = capsys.readouterr().out
+    assert all(number(value) in shown for value in values)

@@ -1,0 +1,135 @@
+"""The study's mechanism: each run is one file, what is there is not repeated, what failed is shown."""
+
+import json
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+from small_studies import content, run, written
+
+from hydroid import read_logs
+from hydroid.errors import HydroidError, RunError
+from hydroid.reporting.study_report import study_page
+from hydroid.settings.study import cell_settings, load_study
+from hydroid.studies import execution
+from hydroid.studies.study import make_tasks
+
+
+def stored(folder: Path) -> dict[str, dict[str, Any]]:
+    """Results by file, without the time that they took."""
+    found = {file.name: json.loads(file.read_text()) for file in sorted((folder / "runs").glob("*.json"))}
+    for result in found.values():
+        result.pop("seconds", None)
+    return found
+
+
+def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, monkeypatch, caplog):
+    caplog.set_level("INFO", "hydroid")
+    file = written(tmp_path)
+    first, before = run(file, tmp_path), stored(tmp_path)
+    assert len(first.rows) == len(before) == 4
+    assert all(result["code"].startswith(version("hydroid")) for result in before.values())
+    assert "found" not in caplog.text
+    next((tmp_path / "runs").glob("*.json")).unlink()
+    performed: list[tuple[str, int]] = []
+    perform = execution.perform
+
+    def counted(task):
+        performed.append((task.cell, task.seed))
+        return perform(task)
+
+    monkeypatch.setattr(execution, "perform", counted)
+    again = run(file, tmp_path)
+    assert len(performed) == 1
+    assert "3 of 4 runs found, goes on" in caplog.text
+    assert stored(tmp_path) == before
+    both = zip(first.rows, again.rows, strict=True)
+    assert all(a.values[n] == b.values[n] for a, b in both for n in a.values if n != "seconds")
+    # another study shares the runs that both have; the unused search's settings decide nothing
+    other = {"alone": {"one": {"objective.norm": "inf", "search.nsga2.population": 10}}}
+    run(written(tmp_path, axes=other), tmp_path)
+    assert set(stored(tmp_path)) == set(before)
+    run(written(tmp_path, seeds=3), tmp_path)  # more seeds add runs
+    assert len(stored(tmp_path)) == 6
+
+
+def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
+    """A checkout that is moved keeps its runs: paths decide nothing."""
+    file = written(tmp_path)
+    cells = cell_settings(load_study(file), file)
+    (task, *_) = make_tasks(cells, [1], read_logs([tmp_path / "short.csv"], cells["mean"]), {})
+    arm = task.settings.arm
+    moved = replace(arm, file=arm.file.model_copy(update={"pair": tmp_path / "other.xml"}))
+    other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
+    assert other.key() == task.key()
+
+
+def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypatch):
+    perform = execution.perform
+
+    def failing(task):
+        if (task.cell, task.seed) == ("mean", 2):
+            raise RunError("every candidate diverged")
+        if (task.cell, task.seed) == ("mean", 1):
+            raise MemoryError("for now")
+        return perform(task)
+
+    monkeypatch.setattr(execution, "perform", failing)
+    page = study_page("small", run(written(tmp_path), tmp_path))
+    assert list(page.tables["failed"].rows) == [
+        ("mean", 1, "MemoryError: for now"),
+        ("mean", 2, "every candidate diverged"),
+    ]
+    assert "2 of 4 runs failed" in " ".join(page.warnings)
+    assert [row[:2] for row in page.tables["cells"].rows] == [("largest", 2), ("mean", 0)]
+    assert len(stored(tmp_path)) == 3  # what may pass is tried again
+    monkeypatch.setattr(execution, "perform", perform)
+    assert [row.failed for row in run(written(tmp_path), tmp_path).rows].count("") == 3
+
+
+def test_errors_agree_with_each_other_and_a_check_is_the_fitted_log_s_own_error(tmp_path: Path):
+    found = run(written(tmp_path, checks={"again": {"log": "short.csv"}}, seeds=1), tmp_path)
+    for row in found.rows:
+        assert row.values["mean absolute error"] <= row.values["rms error"] <= row.values["largest error"]
+        assert row.values["check again"] == pytest.approx(row.values["mean absolute error"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml, line \d+: .*objective.nrm.*'norm'"),
+        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be at least 2"),
+        ({"axes": {"objective.norm": []}}, r"axes give 0 cells"),
+        ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
+        ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),
+        ({"logs": []}, r"names no log"),
+        ({"logs": ["gone.csv"]}, r"gone.csv"),
+        ({"checks": {"other": {"log": "gone.csv"}}}, r"gone.csv"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, change: dict[str, Any], message: str):
+    with pytest.raises(HydroidError, match=message) as error:
+        run(written(tmp_path, **change), tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"other": 1}'])
+def test_a_damaged_result_is_refused_in_one_line(tmp_path: Path, text: str):
+    file = written(tmp_path, axes={"objective.norm": ["inf"]}, seeds=1)
+    run(file, tmp_path)
+    (result,) = (tmp_path / "runs").glob("*.json")
+    result.write_text(text)
+    with pytest.raises(RunError, match="remove it"):
+        run(file, tmp_path)
+
+
+def test_axes_multiply_and_lists_name_their_cells(tmp_path: Path):
+    axes = {"search.ga.crossover_rate": [0.4, 0.8], "norm": content()["axes"]["norm"]}
+    file = written(tmp_path, axes=axes)
+    cells = cell_settings(load_study(file), file)
+    assert list(cells) == [
+        f"search.ga.crossover_rate {r}, {n}" for r in (0.4, 0.8) for n in ("largest", "mean")
+    ]
+    assert [s.search.ga.crossover_rate for s in cells.values()] == [0.4, 0.4, 0.8, 0.8]

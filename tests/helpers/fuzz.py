@@ -231,7 +231,7 @@ def simulate(room: Path, data: bytes) -> Sequence[str]:
     return (
         "simulate",
         str(room / "log.csv"),
-        "--params",
+        "--fit",
         str(given),
         "--out",
         str(room / "out.csv"),

@@ -214,6 +214,7 @@ def _with_varied(
     prior = white_posterior(box, derivatives.prior_slopes[varied]).deviations
     shares = np.ones(len(theta))
     shares[varied] = np.clip(1 - (relative[varied] / prior) ** 2, 0.0, 1.0)
+    shares[derivatives.without_effect] = 0.0  # not the rounding of their factorisation
     limited = np.zeros(len(theta), dtype=bool)
     limited[varied] = prior < LIMITED * WEAK_PRIOR
     unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~limited

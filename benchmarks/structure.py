@@ -113,7 +113,7 @@ def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
 
 COUNT_SETTINGS = """
 from pydantic import BaseModel
-from hydroid.settings.arm import Arm
+from hydroid.settings import arm
 from hydroid.settings.fit import FitSettings
 
 def models(annotation):
@@ -122,7 +122,7 @@ def models(annotation):
     for part in getattr(annotation, "__args__", ()):
         yield from models(part)
 
-seen, waiting = set(), [FitSettings, Arm]
+seen, waiting = set(), [FitSettings, getattr(arm, "ArmFile", None) or arm.Arm]
 while waiting:
     model = waiting.pop()
     if model not in seen:

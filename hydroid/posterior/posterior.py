@@ -107,8 +107,10 @@ class Posterior:
         """Return what is known of some of the parameters, shape (P,), whatever the others are."""
         varied = self.box.varied & chosen
         inside = chosen[self.box.varied]
-        root = np.asarray(np.linalg.cholesky(np.linalg.inv(self.covariance[np.ix_(inside, inside)])).T, float)
-        return Posterior(replace(self.box, varied=varied), root, self.quantile)
+        # with the others first, the last block of the triangle is the root of what is left (Schur complement)
+        triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
+        others = int(np.sum(~inside))
+        return Posterior(replace(self.box, varied=varied), triangle[others:, others:], self.quantile)
 
     def propagate(
         self,

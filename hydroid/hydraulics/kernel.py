@@ -17,9 +17,10 @@ solved for v at once, κ is added to MuJoCo's inertia:
     M (v − v₀)/h = τ* − κ (v − v*) + …   is   (M + h κ) (v − v₀)/h = τ* + κ (v* − v₀) + …
 
 As a damping it would be the same but for stops and contacts: their solver ignores implicit damping, and where
-that is strong throws the arm about. After the step `close` puts the joint at q + way + h (v − v*)/2 and takes
-e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped solution, of
-second order in the sub-step and stable for any stiffness; their change is first order in MuJoCo's step.
+that is strong throws the arm about. After the step `take_over` puts the joint at q + way + h (v − v*)/2 and
+takes e from what really happened. Where M and e do not change within a step, this *is* the sub-stepped
+solution, of second order in the sub-step and stable for any stiffness; their change is first order in
+MuJoCo's step.
 
 Every candidate is computed from its own numbers in a fixed order, so threads change no bit.
 """
@@ -93,7 +94,7 @@ class Plugin(NamedTuple):
     @property
     def past(self) -> int:
         """Number of steps that the longest delay reaches back."""
-        return int(max(self.coefficients["a"]["late"].max(), self.coefficients["b"]["late"].max()))
+        return int(max(self.coefficients[side]["late"].max(initial=0) for side in "ab"))
 
     def of(self, candidate: int) -> "Plugin":
         """Return one candidate's."""
@@ -102,7 +103,7 @@ class Plugin(NamedTuple):
 
 class Pad(NamedTuple):
     """Scratch space of one look-ahead: (J,) of SCRATCH, (1,) of LINE; what the matrices of all sub-steps
-    share, (J, J)."""
+    share, and one of them, (J, J); the right side, then the gain in velocity, (J,)."""
 
     joints: Any
     line: Any
@@ -117,20 +118,6 @@ def make_pad(joints: int) -> Pad:
     square = (joints, joints)
     work, line = np.zeros(joints, SCRATCH), np.zeros(1, LINE)
     return Pad(work, line, np.empty(square), np.empty(square), np.empty(joints))
-
-
-class Exchange(NamedTuple):
-    """What MuJoCo and the actuators of one candidate tell each other at a step."""
-
-    angle: Any
-    """[rad], (J,), as all but `mass`"""
-    velocity: Any
-    mass: Any
-    """MuJoCo's `M` [kg·m²], (nC,)"""
-    torque: Any
-    """answer: damping included [N·m]"""
-    armature: Any
-    """answer: [kg·m²]"""
 
 
 @compilable
@@ -157,13 +144,14 @@ def release(pad: Pad, order: Any, idle: int, step: float) -> None:
 
 
 @compilable
-def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, exchange: Exchange, pad: Pad) -> None:
-    """Look ahead over one step of one candidate; writes the torque and armature of its `exchange`.
+def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, arm: Any, pad: Pad) -> None:
+    """Look ahead over one step of one candidate; writes torques and armatures of its `arm` in MuJoCo.
 
-    `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that at `now` holds.
+    `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that at `now` holds. The
+    joints are the `columns` of the arm's angle, velocity, applied torque and armature, and `own` is their
+    armature without oil.
     """
     coefficients, order, entries, idle, period, substeps = plugin
-    angle, velocity, mass, torque, armature = exchange
     work, lines, common, matrix, gain = pad
     line = lines[0]
     joints = state.shape[0]
@@ -175,8 +163,8 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, exchange: Ex
     for a in range(joints):
         j = order[a]
         c, z, w = coefficients[j], state[j], work[j]
-        begin(c, z, w, angle[j], velocity[j])
-        w.inertia = mass[entries[a, a]] - z.armature
+        begin(c, z, w, arm.angle[arm.columns[j]], arm.velocity[arm.columns[j]])
+        w.inertia = arm.mass[entries[a, a]] - z.armature
         matrix[a, a] = w.inertia
         if a < idle:
             coast(c, z, w, step)
@@ -184,7 +172,7 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, exchange: Ex
         else:
             command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
         for b in range(a + 1, joints):
-            matrix[a, b] = mass[entries[a, b]]
+            matrix[a, b] = arm.mass[entries[a, b]]
     if shared:
         demanded = False
         for a in range(idle, joints):
@@ -228,23 +216,24 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, exchange: Ex
         z.a.flow, z.b.flow = part * w.a.flow, part * w.b.flow
         kappa = part * (RAMP_TORQUE * period * w.oil_stiffness + RAMP_WAY * w.resistance)
         z.armature = period * kappa
-        z.torque = part * w.torque + kappa * (w.speed - velocity[j])
-        torque[j], armature[j] = z.torque, z.armature
+        z.torque = part * w.torque + kappa * (w.speed - z.velocity)
+        arm.applied[arm.columns[j]], arm.armature[arm.columns[j]] = z.torque, arm.own[j] + z.armature
         if shared:
             z.line, z.share, z.demand = line.pressure, line.share, line.demand
 
 
 @compilable
-def take_over(plugin: Plugin, state: Any, velocity: Any, mass: Any, angle: Any) -> None:
-    """Take over one candidate's true new velocity [rad/s]; writes the new angle [rad] to `angle`."""
+def take_over(plugin: Plugin, state: Any, arm: Any) -> None:
+    """Take over one candidate's true new velocities from MuJoCo, and give it the new angles."""
     order, entries, period = plugin.order, plugin.entries, plugin.period
     for a in range(order.size):
-        z = state[order[a]]
-        angle[order[a]] = z.angle + z.way + RAMP_WAY * period * (velocity[order[a]] - z.predicted)
+        z, place = state[order[a]], arm.columns[order[a]]
+        arm.angle[place] = z.angle + z.way + RAMP_WAY * period * (arm.velocity[place] - z.predicted)
         # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M contains h κ
         momentum = 0.0
         for b in range(order.size):
-            momentum += mass[entries[a, b]] * (velocity[order[b]] - state[order[b]].velocity)
+            change = arm.velocity[arm.columns[order[b]]] - state[order[b]].velocity
+            momentum += arm.mass[entries[a, b]] * change
         z.external = momentum / period - z.torque
     for j in range(order.size):
-        state[j].velocity = velocity[j]
+        state[j].velocity = arm.velocity[arm.columns[j]]

@@ -140,7 +140,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> NDArray[np.void]:
     return np.array(rows, JOINT)
 
 
-def has_force_curve(joints: Records) -> NDArray[np.bool_]:
+def has_force_curve(joints: Any) -> NDArray[np.bool_]:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
     return np.asarray(exists.all(axis=1), dtype=bool)

@@ -20,7 +20,7 @@ from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import QUANTITIES
 from hydroid.simulation.chain import Chain
-from hydroid.simulation.rollout import NO_ACTUATORS, NO_JOINTS, Course, Record, SteppedArm, compile_rollout
+from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout
 from hydroid.simulation.scenario import model_values
 
 Array = NDArray[np.float64]
@@ -111,10 +111,10 @@ class Plant:
     @property
     def pressure(self) -> Array:
         """Pressures of chambers A and B [Pa], shape (J, 2); NaN where a joint has no hydraulics."""
-        pressure = np.full((len(self._pose), 2), np.nan)
-        if self._chain is not None:
-            seen = observe(self._plugin.coefficients, self._state, self.data.qpos)
-            pressure[self._active] = seen.pressure[self._active[self._columns]]
+        pressure, chain = np.full((len(self._pose), 2), np.nan), self._chain
+        seen = observe(self._plugin.coefficients, self._state, self.data.qpos[chain.columns])
+        pressure[chain.joints] = seen.pressure
+        pressure[~self._active] = np.nan
         return pressure
 
     def reset(self, pose: str | ArrayLike | None = None) -> Array:
@@ -145,15 +145,10 @@ class Plant:
         self.model.qpos_spring[:] = start_angle
         with quiet_mujoco():
             self._balance = self._arm.start(self._values, 0, start_angle)
-            self._plugin, self._state, past = NO_ACTUATORS, np.empty(0, JOINT_STATE), 0
-            if self._chain is not None:
-                plugin, states = self._chain.start(self._candidate, start_angle, self._balance[None])
-                self._plugin, self._state = plugin.of(0), states[0]
-                past = self._plugin.past
-            joints = len(self._state)
-            self._course = Course(
-                np.zeros((past + self._steps, joints)), np.empty((self._steps, len(start_angle) - joints))
-            )
+            plugin, states = self._chain.start(self._candidate, start_angle, self._balance[None])
+            self._plugin, self._state = plugin.of(0), states[0]
+            commands = np.zeros((self._plugin.past + self._steps, len(self._state)))
+            self._course = Course(commands, np.empty((self._steps, len(self._chain.pushed))))
             self._mass = self.data.M.copy()
         self._taken = 0
         return self.angle
@@ -210,7 +205,7 @@ class Plant:
         names = [arm.joint_names[j - 1] for j in self.joints]
         motors: Array | None = np.array([self._gain, self._balance])
         actuators: dict[str, dict[str, Any]] | None = None
-        if self._chain is not None:
+        if self._chain.joints.size:
             hydraulic = {name: q for name, q in QUANTITIES.items() if q.source != "fit"}
             motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
             for joint, values in zip(names, candidate.joints[0, self._active], strict=True):
@@ -220,11 +215,9 @@ class Plant:
 
     def _advance(self, command: Array) -> None:
         commands, torque, _ = self._course
-        if self._chain is None:
-            torque[:] = self._gain * command + self._balance
-        else:
-            commands[: -self._steps] = commands[self._steps :]
-            commands[-self._steps :] = command
+        torque[:] = (self._gain * command + self._balance)[self._chain.pushed]
+        commands[: -self._steps] = commands[self._steps :]
+        commands[-self._steps :] = command[self._chain.columns]
         # M of the step before: refreshing positions in between must not change a bit
         np.copyto(self.data.M, self._mass)
         self._arm.roll(self._plugin, self._state, self._course, self._record)
@@ -240,11 +233,10 @@ class Plant:
         self._locked, self._locked_pose, self._columns = locked, pose, locked.columns
         self._values = model_values(locked, candidate)
         self._gain = candidate.joints.gain[0, self._columns]
-        self._chain, moving = None, np.arange(len(self._columns))
-        if settings.stage == "hyd":
-            self._chain = Chain(settings.arm, locked, self._active, settings.hydraulics.substeps, NO_JOINTS)
-        columns, pushed = (NO_JOINTS, moving) if self._chain is None else (moving, NO_JOINTS)
-        self._arm = SteppedArm(model, columns, pushed, self._steps)
+        moving = np.arange(len(self._columns))
+        pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.hydraulics.substeps
+        self._chain = chain = Chain(settings.arm, locked, self._active, substeps, pushed)
+        self._arm = SteppedArm(model, chain.columns, pushed, self._steps)
         self.model, self.data = self._arm.model, self._arm.data
         self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
-        self._record = Record(np.empty((1, len(moving))), np.empty((0, len(columns)), JOINT_STATE))
+        self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))

@@ -23,18 +23,19 @@ class Chain:
         locked: the arm that is stepped.
         active: which of the arm's joints have hydraulics, shape (J,).
         substeps: of valves and oil in one MuJoCo step.
-        pushed: columns of the moving joints that follow a log, which have a servo instead.
+        pushed: columns of the moving joints whose torques are given instead: in stage 1 all.
 
     Attributes:
         columns: all other moving joints, with and without actuator: they couple through their inertia.
         joints: the same among the arm's joints, 0-based.
+        pushed: as given.
     """
 
     def __init__(
         self, arm: Arm, locked: LockedArm, active: NDArray[np.bool_], substeps: int, pushed: NDArray[np.intp]
     ) -> None:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
-        self.joints = locked.columns[self.columns]
+        self.joints, self.pushed = locked.columns[self.columns], pushed
         self._pushed = locked.columns[pushed].tolist()
         self._arm, self._driven = arm, self.joints[active[self.joints]].tolist()
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
@@ -65,12 +66,12 @@ class Chain:
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
     def taken(self, candidates: Candidates, angle: Array, velocity: Array) -> Array:
-        """What P joints that follow a log take from the pump [m³/s], shape (n, steps); (n, 0) without a pump.
+        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0) if there are none.
 
         Angle [rad] and velocity [rad/s] of their motion have the shape (steps, P).
         """
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
-        if np.isinf(joints.pump_flow).all():
+        if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
         driven = [j for j in self._pushed if self._arm.joints[j].actuator is not None]
         c = coefficients(joints, linkages(self._arm, self._pushed, driven, joints))

@@ -57,7 +57,9 @@ class Prescribed:
         step = log.period / settings.steps_per_sample
         motion = smooth(log.angle[:, joints], settings.measured_cutoff_hz * log.period)
         samples = np.arange((len(motion) - 1) * settings.steps_per_sample + 1) * step
-        fine = np.stack([np.interp(samples, log.time, angle) for angle in motion.T], axis=1)
+        fine = np.empty((len(samples), len(joints)))
+        for k, angle in enumerate(motion.T):
+            fine[:, k] = np.interp(samples, log.time, angle)
         velocity = np.diff(fine, axis=0, prepend=fine[:1]) / step
         acceleration = np.diff(velocity, axis=0) / step
         self.angle: Array = fine[:-1]
@@ -70,7 +72,7 @@ class Prescribed:
 
 def smooth(angle: Array, cutoff: float) -> Array:
     """Low-pass angles, shape (T, K), without phase shift; `cutoff` is in cycles per sample."""
-    if cutoff >= 0.5 or len(angle) < 16:
+    if cutoff >= 0.5 or len(angle) < 16 or not angle.size:
         return angle
     sections = butter(2, 2 * cutoff, output="sos")
     return np.asarray(sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100)))

@@ -9,7 +9,6 @@ raising; a model that gets through `SteppedArm.start` has none to expect.
 
 import ctypes
 import logging
-import threading
 from copy import copy
 from functools import cache
 from pathlib import Path
@@ -22,7 +21,7 @@ from numba import njit, types
 from numba.core import event
 from numpy.typing import NDArray
 
-from hydroid.hydraulics.kernel import SOURCE, Exchange, Plugin, look_ahead, make_pad, take_over
+from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE, Array
 
 _log = logging.getLogger(__name__)
@@ -54,6 +53,8 @@ class Handles(NamedTuple):
     """the arm's own armature of these [kg·m²], (J,)"""
     pushed: NDArray[np.intp]
     """the other joints, (P,)"""
+    steps: int
+    """in one sample"""
 
 
 class Course(NamedTuple):
@@ -98,9 +99,9 @@ class SteppedArm:
         steps: int = 1,
     ) -> None:
         self.model, self.data = m, d = copy(model), mujoco.MjData(model)
-        self._armature, self._steps = model.dof_armature.copy(), steps
+        self._armature = own = model.dof_armature.copy()
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
-        self._handles = Handles(*_addresses(m, d), *live, columns, model.dof_armature[columns], pushed)
+        self._handles = Handles(m._address, d._address, *live, columns, own[columns], pushed, steps)
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
         """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest.
@@ -137,59 +138,29 @@ class SteppedArm:
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        roll(self._handles, plugin, state, course, record, self._steps)
-
-
-def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
-    """Where MuJoCo keeps a model and its data: it tells every physics callback."""
-    addresses: dict[int, tuple[int, int]] = {}
-
-    @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-    def passive(m: int, d: int) -> None:
-        addresses[threading.get_ident()] = (m, d)  # other threads may be stepping
-
-    mujoco.set_mjcb_passive(passive)
-    try:
-        mujoco.mj_forward(model, data)
-    finally:
-        mujoco.set_mjcb_passive(None)
-    return addresses[threading.get_ident()]
+        roll(self._handles, plugin, state, course, record)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def roll(
-    arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, steps: int, source: int = SOURCE
-) -> None:
+def roll(arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
-    columns, joints = arm.columns, arm.columns.size
     commands, torque, taken = course
-    pad, here, speed = make_pad(joints), np.empty(joints), np.empty(joints)
-    exchange = Exchange(here, speed, arm.mass, np.empty(joints), np.empty(joints))
-    past = commands.shape[0] - torque.shape[0]
+    pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
     for k in range(torque.shape[0]):
-        for j in range(joints):
-            here[j], speed[j] = arm.angle[columns[j]], arm.velocity[columns[j]]
         if taken.size:
             pad.line[0].taken = taken[k]
-        if joints:
-            look_ahead(plugin, state, commands, past + k, exchange, pad)
-        for j in range(joints):
-            arm.applied[columns[j]] = exchange.torque[j]
-            arm.armature[columns[j]] = arm.own[j] + exchange.armature[j]
+        if state.size:
+            look_ahead(plugin, state, commands, past + k, arm, pad)
         for i in range(arm.pushed.size):
             arm.applied[arm.pushed[i]] = torque[k, i]
         _mj_step(arm.model, arm.data)
         if arm.warnings.any():
             return
-        for j in range(joints):
-            speed[j] = arm.velocity[columns[j]]
-        take_over(plugin, state, speed, arm.mass, here)
-        for j in range(joints):
-            arm.angle[columns[j]] = here[j]
-        if (k + 1) % steps == 0:
-            record.angle[k // steps] = arm.angle
+        take_over(plugin, state, arm)
+        if (k + 1) % arm.steps == 0:
+            record.angle[k // arm.steps] = arm.angle
             if record.states.size:
-                record.states[k // steps] = state
+                record.states[k // arm.steps] = state
 
 
 class _Announcement(event.Listener):
@@ -212,8 +183,8 @@ def compile_rollout() -> None:
     """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
     one = np.ones(1)
     warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS)
+    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1)
     nothing = np.empty((0, 1))
     course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
     with event.install_listener("numba:compile", _Announcement()):
-        roll(arm, NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record, 1)
+        roll(arm, NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)

@@ -58,7 +58,8 @@ class Scenario:
         active: shape (J,).
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
-        prescribed: the joints that follow the log, if any.
+        period: between samples [s].
+        prescribed: the joints that follow the log.
         pressure: in which the moving joints' chambers rest at the start [Pa], shape (V, 2), NaN where the log
             has none.
     """
@@ -77,11 +78,10 @@ class Scenario:
         self.command = np.repeat(log.command[:-1, moving], settings.steps_per_sample, axis=0)
         start = log.start_pressure
         self.pressure = np.full((len(self.arm.columns), 2), np.nan) if start is None else start[moving]
-        self.prescribed = None
-        if settings.other_joints == "measured" and not self.active.all():
-            follows = np.flatnonzero(~self.active)
-            columns = np.searchsorted(self.arm.columns, follows)
-            self.prescribed = Prescribed(self.arm.model, log, follows, columns, settings)
+        self.period = log.period
+        follows = np.flatnonzero(~self.active & (settings.other_joints == "measured"))
+        columns = np.searchsorted(self.arm.columns, follows)
+        self.prescribed = Prescribed(self.arm.model, log, follows, columns, settings)
 
     def restarted(self, start: Array, command: Array) -> "Scenario":
         """Return the same moving joints from another pose [rad], shape (V,), under other commands.
@@ -89,19 +89,16 @@ class Scenario:
         `command` is held during each step [%], shape (steps, V). No joint may follow the log. Springs are
         slack where they were.
         """
-        assert self.prescribed is None
         other = copy(self)
         other.arm, other.command = replace(self.arm, pose=start), command
         return other
 
     def values(self, candidates: Candidates) -> dict[str, Array]:
         """Return what candidates change in the model, the prescribed joints' servo included."""
-        values = model_values(self.arm, candidates)
-        if self.prescribed is not None:
-            columns = self.prescribed.columns
-            values["dof_damping"][:, columns] = self.prescribed.damping
-            values["jnt_stiffness"][:, columns] = self.prescribed.stiffness
-            values["dof_frictionloss"][:, columns] = 0.0
+        values, columns = model_values(self.arm, candidates), self.prescribed.columns
+        values["dof_damping"][:, columns] = self.prescribed.damping
+        values["jnt_stiffness"][:, columns] = self.prescribed.stiffness
+        values["dof_frictionloss"][:, columns] = 0.0
         return values
 
 

@@ -9,33 +9,23 @@ many at a time as there are threads; candidates are independent, and no number o
 
 import os
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.hydraulics.actuator import Observation, observe
-from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, Array, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 from hydroid.simulation.chain import Chain
-from hydroid.simulation.rollout import NO_ACTUATORS, NO_JOINTS, Course, Record, SteppedArm, compile_rollout
+from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout
 from hydroid.simulation.scenario import Candidates, Response, Scenario
 from hydroid.simulation.sensor import reading
 
-
-@dataclass(frozen=True)
-class _Start:
-    """Candidates at the start of a log: what they change in the model, and their actuators, if any."""
-
-    candidates: Candidates
-    values: dict[str, Array]
-    plugin: Plugin
-    state: NDArray[np.void]
-    taken: Array
+Follow = Callable[[SteppedArm, int], tuple[Array, Observation | None]]
+"""simulates one of n candidates: angles of the moving joints [rad], (1 + T, V), and what its actuators do"""
 
 
 class Simulation:
@@ -55,21 +45,11 @@ class Simulation:
         self, scenario: Scenario, arm: Arm, substeps: int | None, pressures: Sequence[int] = ()
     ) -> None:
         compile_rollout()
-        self.scenario, self._steps = scenario, scenario.settings.steps_per_sample
-        self._threads = scenario.settings.threads or os.cpu_count() or 1
-        moving, prescribed = np.arange(len(scenario.arm.columns)), scenario.prescribed
-        follows = NO_JOINTS if prescribed is None else prescribed.columns
-        self._chain = (
-            None if substeps is None else Chain(arm, scenario.arm, scenario.active, substeps, follows)
-        )
-        self._pushed = moving if self._chain is None else follows
-        self._columns = np.setdiff1d(moving, self._pushed)
-        self.joints = scenario.arm.columns[self._columns]
+        self.scenario = scenario
+        pushed = scenario.prescribed.columns if substeps else np.arange(len(scenario.arm.columns))
+        self._chain = Chain(arm, scenario.arm, scenario.active, substeps or 1, pushed)
+        self.joints = self._chain.joints
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
-        self._command = np.ascontiguousarray(scenario.command[:, self._columns])
-        self._servo = np.empty((len(self._command), 0))
-        if prescribed is not None:
-            self._servo = np.ascontiguousarray(prescribed.torque)
 
     def simulate(self, candidates: Candidates) -> Response:
         """Simulate n candidates, whatever n is.
@@ -78,31 +58,30 @@ class Simulation:
             What the outputs' sensors read, and the pressures asked for, at the log's samples; the first is
             the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
-        scenario, n = self.scenario, len(candidates)
-        samples = 1 + len(scenario.command) // self._steps
+        scenario, n, wanted = self.scenario, len(candidates), self._pressures
+        samples = 1 + len(scenario.command) // scenario.settings.steps_per_sample
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
-        pressure = np.full((n, samples, len(self._pressures), 2), np.nan) if self._pressures.size else None
-        exists = np.ones(n, bool) if self._chain is None else has_force_curve(candidates.joints)
+        pressure = np.full((n, samples, len(wanted), 2), np.nan) if wanted.size else None
+        exists = has_force_curve(candidates.joints[:, self.joints])
         rows = np.flatnonzero(exists)
-        threads = min(self._threads, rows.size)
+        threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
             return Response(angle, exists, pressure)
         sensors = candidates.joints[:, scenario.arm.columns[scenario.outputs]]
-        period = self._steps * scenario.arm.model.opt.timestep
 
         def simulate(place: int) -> None:
             arm, row = free.pop(), rows[place]
-            followed, states = self._follow(arm, start, place, observed=pressure is not None)
+            followed, actuators = follow(arm, place)
             if arm.healthy:
                 seen = followed[:, scenario.outputs]
-                angle[row] = seen if self._chain is None else reading(seen, sensors[row], period)
-                if pressure is not None:
-                    pressure[row] = self._observe(start, place, followed, states).pressure[:, self._pressures]
+                angle[row] = reading(seen, sensors[row], scenario.period) if self.joints.size else seen
+                if pressure is not None and actuators is not None:
+                    pressure[row] = actuators.pressure[:, wanted]
             free.append(arm)
 
         with quiet_mujoco(), ThreadPoolExecutor(threads) as pool:
             free = deque(self._stepped() for _ in range(threads))
-            start = self._start(candidates[rows], free[0])
+            follow = self._follower(candidates[rows], free[0], observed=pressure is not None)
             deque(pool.map(simulate, range(rows.size)), maxlen=0)
         feasible: NDArray[np.bool_] = np.all(np.isfinite(angle), axis=(1, 2))
         return Response(angle, feasible, pressure)
@@ -111,52 +90,41 @@ class Simulation:
         """Simulate one candidate; return what its actuators did, at T samples, shape (T, J) or (T, J, 2)."""
         arm = self._stepped()
         with quiet_mujoco():
-            start = self._start(candidates, arm)
-            followed, states = self._follow(arm, start, 0, observed=True)
-        return self._observe(start, 0, followed, states)
+            observation = self._follower(candidates, arm, observed=True)(arm, 0)[1]
+        assert observation is not None
+        return observation
 
     def _stepped(self) -> SteppedArm:
-        return SteppedArm(self.scenario.arm.model, self._columns, self._pushed, self._steps)
+        scenario, chain = self.scenario, self._chain
+        steps = scenario.settings.steps_per_sample
+        return SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps)
 
-    def _start(self, candidates: Candidates, arm: SteppedArm) -> _Start:
-        """Balance all candidates, one after another, on one arm."""
-        scenario, n = self.scenario, len(candidates)
-        values, pose, prescribed = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
-        if self._chain is None:
-            return _Start(candidates, values, NO_ACTUATORS, np.empty((n, 0), JOINT_STATE), np.empty((n, 0)))
-        balance = np.array([arm.start(values, row, pose) for row in range(n)]).reshape(n, len(pose))
-        plugin, state = self._chain.start(candidates, pose, balance, scenario.pressure)
-        taken = np.empty((n, 0))
-        if prescribed is not None:
-            taken = self._chain.taken(candidates, prescribed.angle, prescribed.velocity)
-        return _Start(candidates, values, plugin, state, taken)
+    def _follower(self, candidates: Candidates, arm: SteppedArm, *, observed: bool) -> Follow:
+        """Return what simulates each of n candidates, and observes its actuators, under the log's commands.
 
-    def _follow(
-        self, arm: SteppedArm, start: _Start, row: int, *, observed: bool
-    ) -> tuple[Array, NDArray[np.void]]:
-        """Simulate one candidate under the log's commands.
-
-        Returns:
-            At the start and after each sample: angles of the moving joints [rad], shape (1 + T, V), and where
-            they are `observed` states of the actuators, shape (1 + T, J).
+        All are balanced here, one after another, on one arm.
         """
-        scenario, state = self.scenario, start.state[row]
-        pose, samples = scenario.arm.pose, len(scenario.command) // self._steps
-        balance = arm.start(start.values, row, pose)
-        if self._chain is None:
-            torque = start.candidates.joints.gain[row, scenario.arm.columns] * scenario.command + balance
-            if scenario.prescribed is not None:
-                torque[:, scenario.prescribed.columns] = self._servo
-            plugin, commands = NO_ACTUATORS, self._command
-        else:
-            plugin, torque = start.plugin.of(row), self._servo
-            commands = np.concatenate([np.zeros((plugin.past, len(state))), self._command])
-        angle = np.full((1 + samples, len(pose)), np.nan)
-        states = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
-        angle[0], states[0] = pose, state
-        course = Course(commands, torque, start.taken[row])
-        arm.roll(plugin, state, course, Record(angle[1:], states[1:]))
-        return angle, states
+        scenario, chain, n = self.scenario, self._chain, len(candidates)
+        values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
+        samples = len(scenario.command) // scenario.settings.steps_per_sample
+        balance = np.array([arm.start(values, row, pose) for row in range(n)])
+        plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
+        taken = chain.taken(candidates, servo.angle, servo.velocity)
+        gain = candidates.joints.gain[:, scenario.arm.columns[chain.pushed]]
+        served = np.searchsorted(chain.pushed, servo.columns)
 
-    def _observe(self, start: _Start, row: int, angle: Array, states: NDArray[np.void]) -> Observation:
-        return observe(start.plugin.coefficients[row], states, angle[:, self._columns])
+        def follow(arm: SteppedArm, row: int) -> tuple[Array, Observation | None]:
+            arm.start(values, row, pose)
+            torque = gain[row] * scenario.command[:, chain.pushed] + balance[row, chain.pushed]
+            if served.size:
+                torque[:, served] = servo.torque
+            one, state = plugin.of(row), states[row]
+            before = np.zeros((one.past, len(state)))
+            commands = np.concatenate([before, scenario.command[:, chain.columns]])
+            angle = np.full((1 + samples, len(pose)), np.nan)
+            record = np.zeros((1 + samples if observed else 1, len(state)), JOINT_STATE)
+            angle[0], record[0] = pose, state
+            arm.roll(one, state, Course(commands, torque, taken[row]), Record(angle[1:], record[1:]))
+            return angle, observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
+
+        return follow

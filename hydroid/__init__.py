@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from hydroid.commands.design import design as design
     from hydroid.commands.fit import FitResult as FitResult
     from hydroid.commands.fit import fit as fit
-    from hydroid.commands.fit_hyd import fit_hyd as fit_hyd
-    from hydroid.commands.fit_mech import fit_mech as fit_mech
     from hydroid.commands.init import init as init
     from hydroid.commands.inputs import load_settings as load_settings
-    from hydroid.commands.inputs import read_logs as read_logs
+    from hydroid.commands.logs import read_logs as read_logs
     from hydroid.commands.quantity import QuantityResult as QuantityResult
     from hydroid.commands.quantity import quantity as quantity
     from hydroid.commands.report import report as report
     from hydroid.commands.simulate import simulate as simulate
+    from hydroid.commands.stages import fit_hyd as fit_hyd
+    from hydroid.commands.stages import fit_mech as fit_mech
     from hydroid.commands.study import study as study
     from hydroid.commands.suggest import suggest as suggest
     from hydroid.commands.validate import validate as validate
@@ -47,23 +47,21 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_COMMANDS = (
-    *("analyse", "check", "convert", "design", "fit_hyd", "fit_mech", "init", "report"),
-    *("simulate", "study", "suggest", "validate", "view"),
-)
-_NAMES = {
-    "hydroid.commands.fit": "FitResult fit",
-    "hydroid.commands.inputs": "load_settings read_logs",
-    "hydroid.commands.quantity": "QuantityResult quantity",
-    "hydroid.errors": "HydroidError",
-    "hydroid.identified_model": "IdentifiedModel identified load_identified start_values",
-    "hydroid.log": "Log write_log",
-    "hydroid.parallel.cluster": "open_workers",
-    "hydroid.plant": "Plant load_plant",
+_MODULES = {
+    "commands.fit": "FitResult fit",
+    "commands.inputs": "load_settings",
+    "commands.logs": "read_logs",
+    "commands.quantity": "QuantityResult",
+    "commands.stages": "fit_mech fit_hyd",
+    "errors": "HydroidError",
+    "identified_model": "IdentifiedModel identified load_identified start_values",
+    "log": "Log write_log",
+    "parallel.cluster": "open_workers",
+    "plant": "Plant load_plant",
 }
-_HOMES = {
-    **{name: f"hydroid.commands.{name}" for name in _COMMANDS},
-    **{name: module for module, names in _NAMES.items() for name in names.split()},
+_ALONE = "analyse check convert design init quantity report simulate study suggest validate view"
+_HOMES = {name: f"commands.{name}" for name in _ALONE.split()} | {
+    name: module for module, names in _MODULES.items() for name in names.split()
 }
 
 __all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll]
@@ -72,7 +70,7 @@ __all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'hydroid' has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
+    value = getattr(import_module(f"hydroid.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 

@@ -1,16 +1,17 @@
 """`hydroid analyse`: what the logs determine, and what each parameter does to the response."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hydroid.commands.inputs import load_settings, open_model, problem_of, run_logs
+from hydroid.commands.inputs import load_settings, open_model
+from hydroid.commands.logs import problem_of
 from hydroid.commands.options import FIT_HELP, Folder, MoreLogs, OwnConfig, Repair, Set, command, names
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, as_path, rows
+from hydroid.commands.result import Result, rows, written
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.identified_model import start_values
@@ -18,62 +19,15 @@ from hydroid.identified_model import start_values
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ModelSource
     from hydroid.parameters import Array
-    from hydroid.posterior.sweep import Surface, Sweep
     from hydroid.problem.problem import Problem
-    from hydroid.reporting.table import Table
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
 
 SENSITIVITY = ("log", "output", "parameter", "rms_per_percent")
-"""keys of the table of sensitivities"""
-
-
-@dataclass(frozen=True, eq=False)
-class Analysis:
-    """What logs determine at some parameters.
-
-    Attributes:
-        uncertainty: intervals, directions, profiles.
-        sweep: the effect of each parameter over time, if it was asked for.
-        surfaces: the error over pairs of parameters.
-    """
-
-    uncertainty: "UncertaintyStudy"
-    sweep: "Sweep | None"
-    surfaces: "list[Surface]"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AnalyseResult(Result):
-    """An analysis with its page, whose tables are `parameters`, `sensitivity` and `surface`."""
-
-    result: "Analysis"
-
-    def lines(self) -> "list[Table | str]":
-        """Return the tables, and what the logs leave open."""
-        from hydroid.words import sentence
-
-        study, tables = self.result.uncertainty, self.page.tables
-        parts = [tables[name] for name in ("sensitivity", "surface") if name in tables]
-        notes = [f"- {sentence(finding)}" for finding in study.summary.findings]
-        return [study.table, *parts, *([study.moved] if study.moved else []), *notes, *self.written]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the estimate, the findings, and the rows of the further parts."""
-        study, tables = self.result.uncertainty, self.page.tables
-        content, profiles = study.summary.plain(), {p.name: p.interval for p in study.profiles}
-        for name, parameter in content["estimate"].items():
-            ends = profiles.get(name)
-            parameter["profile_interval"] = None if ends is None else [finite(end) for end in ends]
-        error = "error" if study.problem.settings.objective.relative else "error_deg"
-        lowest = ("first_lowest", "second_lowest", f"lowest_{error}")
-        surface = ("parameters", *lowest, "first_estimate", "second_estimate", f"estimate_{error}")
-        parts = {"sensitivity": SENSITIVITY, "surface": surface}
-        return {
-            "at": study.source,
-            "rank": study.identifiability.rank,
-            "findings": content["findings"],
-            "estimate": content["estimate"],
-        } | {name: rows(tables[name], *keys) for name, keys in parts.items() if name in tables}
+SURFACE = (
+    *("parameters", "first_lowest", "second_lowest", "lowest_{}"),
+    *("first_estimate", "second_estimate", "estimate_{}"),
+)
+"""keys of the tables of sensitivities and of surfaces"""
 
 
 @command
@@ -122,7 +76,7 @@ def analyse(
     config: OwnConfig = None,
     set: Set = None,
     repair: Repair = False,
-) -> AnalyseResult:
+) -> "Result[UncertaintyStudy]":
     """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the combinations that the logs
@@ -131,7 +85,7 @@ def analyse(
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
         study = hydroid.analyse("a.csv", fit="runs/a", over=["K,D"])
-        print(study.result.uncertainty.uncertainty.interval)
+        print(study.result.uncertainty.interval)
 
     Raises:
         SettingsError: a name that is no free parameter.
@@ -142,10 +96,11 @@ def analyse(
         model = start_values(load_settings(config or "fit-mech", set))
     else:
         model = open_model(fit, config, set)
-    problem = problem_of(model, logs or run_logs(model), repair=repair)
+    problem = problem_of(model, logs, repair=repair)
     from hydroid.posterior import sweep as sweeps
     from hydroid.reporting.analysis_report import analysis_page
     from hydroid.reporting.uncertainty_report import uncertainty_page
+    from hydroid.words import sentence
 
     grid = points, None if around is None else around / 100
     with Progress() as progress:
@@ -154,7 +109,19 @@ def analyse(
         sweep = sweeps.sweep(problem, theta, progress) if sensitivity else None
         surfaces = [sweeps.surface(problem, theta, pair, *grid, progress) for pair in pairs]
     page = analysis_page(problem, theta, uncertainty_page(study), sweep, surfaces)
-    return AnalyseResult(Analysis(study, sweep, surfaces), page, as_path(out)).write()
+    error = "error" if problem.settings.objective.relative else "error_deg"
+    keys = {"sensitivity": SENSITIVITY, "surface": [key.format(error) for key in SURFACE]}
+    tables = {name: page.tables[name] for name in keys if name in page.tables}
+    known, profiles = study.summary.plain(), {p.name: p.interval for p in study.profiles}
+    for name, parameter in known["estimate"].items():
+        ends = profiles.get(name)
+        parameter["profile_interval"] = None if ends is None else [finite(end) for end in ends]
+    content = {"at": study.source, "rank": study.identifiability.rank}
+    content |= {name: known[name] for name in ("findings", "estimate")}
+    content |= {name: rows(table, *keys[name]) for name, table in tables.items()}
+    notes = [f"- {sentence(finding)}" for finding in study.summary.findings]
+    lines = [study.table, *tables.values(), *filter(None, [study.moved]), *notes, *written(page, out)]
+    return Result(lines, content, study, page)
 
 
 def _uncertainty(

@@ -6,23 +6,20 @@ A command's module is imported when the command is called, so that `--help` answ
 import inspect
 import sys
 from collections.abc import Callable
-from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from hydroid.commands import stopping
-from hydroid.commands.console import log_lines, show, show_error, show_usage_error
-from hydroid.commands.options import command_line
-from hydroid.commands.progress import shown
+import hydroid
+from hydroid.commands.console import log_lines, show, show_error
+from hydroid.commands.options import COMMAND_LINES
+from hydroid.commands.progress import listen, shown, stopped
 from hydroid.errors import HydroidError
 
 if TYPE_CHECKING:
     from typer.core import TyperCommand
 
-STOPPED = 130
-"""exit status of a command that Ctrl-C or a signal stopped, as in shells"""
 GROUPS = {
     "Start with your own arm and log": {"init": "write a project from an arm's CAD and a log"},
     "Look at logs and at the arm": {
@@ -46,19 +43,16 @@ GROUPS = {
     "Use the model": {"simulate": "simulate commands, write a log"},
     "Compare settings": {"study": "fit with several settings, each over many seeds"},
 }
-"""every command with a summary, by the heading of its group; its module has its name"""
+"""every command with a summary, by the heading of its group"""
 COMMANDS = [name for commands in GROUPS.values() for name in commands]
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
-
-
-class Ended(Exception):
-    """Ctrl-C or a signal ended a command; `kept`, what remains of it, follows the word `stopped`."""
-
-    def __init__(self, stop: KeyboardInterrupt) -> None:
-        kept = getattr(stop, "kept", None)
-        self.kept = "" if kept is None else f"; {kept or 'nothing was written'}"
-        super().__init__(self.kept)
+PRINTING = {
+    "json": typer.Option("--json", help="Print the result as JSON (docs/json.md)."),
+    "quiet": typer.Option("-q", "--quiet", help="Print errors only."),
+    "verbose": typer.Option("-v", "--verbose", help="Also print the lines that go to run.log."),
+}
+"""options of every command on the command line"""
 
 
 class LazyGroup(TyperGroup):
@@ -81,46 +75,29 @@ class LazyGroup(TyperGroup):
 
 
 def click_command(command: str) -> "TyperCommand":
-    """Import a command's module and return the command."""
-    name = command.replace("-", "_")
-    function = getattr(import_module(f"hydroid.commands.{name}"), name)
-    text, example, _ = command_line(function)
-    app = typer.Typer(**PLAIN)
-    app.command(command, help=text, epilog=example)(_printing(function))
-    return typer.main.get_command(app)  # pyright: ignore[reportReturnType]  # a group only of several commands
-
-
-def _printing(function: Callable[..., Any]) -> Callable[..., None]:
-    """Return a function that calls a command and prints its result, with the options that say how."""
+    """Return a command, which prints the result of the function of its name."""
+    function: Callable[..., Any] = getattr(hydroid, command.replace("-", "_"))
+    text, example, parameters = COMMAND_LINES[function]
 
     def run(json: bool, quiet: bool, verbose: bool, **given: Any) -> None:
         with log_lines(verbose=verbose, quiet=quiet), shown(not (quiet or json)):
-            try:
-                result = function(**given)
-            except KeyboardInterrupt as stop:
-                raise Ended(stop) from None
+            result = function(**given)
         if json or not quiet:
             show(result, as_json=json)
-        if result.exit_status:
-            raise typer.Exit(result.exit_status)
+        raise typer.Exit(result.exit_status)
 
-    printed = {
-        "json": Annotated[bool, typer.Option("--json", help="Print the result as JSON (docs/json.md).")],
-        "quiet": Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")],
-        "verbose": Annotated[
-            bool, typer.Option("-v", "--verbose", help="Also print the lines that go to run.log.")
-        ],
-    }
-    parameters = [
-        *command_line(function).parameters,
-        *(
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
-            for name, option in printed.items()
-        ),
+    printing = [
+        inspect.Parameter(
+            n, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option]
+        )
+        for n, option in PRINTING.items()
     ]
-    run.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
+    signature = inspect.Signature([*parameters, *printing])
+    run.__signature__ = signature  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ = {name: parameter.annotation for name, parameter in signature.parameters.items()}
+    alone = typer.Typer(**PLAIN)
+    alone.command(command, help=text, epilog=example)(run)
+    return typer.main.get_command(alone)  # pyright: ignore[reportReturnType]  # a group only of several commands
 
 
 app = typer.Typer(
@@ -136,9 +113,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from hydroid import __version__
-
-        typer.echo(f"hydroid {__version__}")
+        typer.echo(f"hydroid {hydroid.__version__}")
         raise typer.Exit
 
 
@@ -153,27 +128,30 @@ def _root(  # pyright: ignore[reportUnusedFunction]  # typer calls it
 
 def main() -> None:
     """Run a command: exit 0 when it is done, 2 for an error of the input, 130 when it was stopped."""
-    stopping.listen()
-    code, kept = 0, ""
+    listen()
+    code, kept = 0, None
+    group: Any = typer.main.get_command(app)
     try:
-        code = app(standalone_mode=False)
+        with group.make_context("hydroid", sys.argv[1:]) as context:
+            group.invoke(context)
     except typer.Exit as end:
         code = end.exit_code
     except HydroidError as error:
         show_error(error)
         code = 2
-    except (Ended, KeyboardInterrupt) as stop:
-        code, kept = STOPPED, str(stop)
+    except KeyboardInterrupt as stop:
+        code, kept = 130, getattr(stop, "kept", None)
     except BrokenPipeError:
         sys.stderr.close()  # the reader has left; Python would complain at exit
     except Exception as error:
-        if stopping.asked():  # what the interrupt met may have made another error of it
-            code = STOPPED
-        elif getattr(error, "show", None) is None:
-            raise  # a defect of hydroid
+        if stopped():  # what the interrupt met may have made another error of it
+            code = 130
+        elif hasattr(error, "format_message"):
+            show_error(error)
+            code = 2
         else:
-            show_usage_error(error)
-            code = int(getattr(error, "exit_code", 2))
-    if code == STOPPED:
-        typer.echo(f"hydroid: stopped{kept}", err=True)
-    sys.exit(code or 0)
+            raise  # a defect of hydroid
+    if code == 130:  # as in shells
+        rest = "" if kept is None else f"; {kept or 'nothing was written'}"
+        typer.echo(f"hydroid: stopped{rest}", err=True)
+    sys.exit(code)

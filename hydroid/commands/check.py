@@ -1,19 +1,19 @@
 """`hydroid check`: what is wrong or unusual about logs."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hydroid.commands.inputs import as_list, joint_ranges, load_settings
+from hydroid.commands.inputs import as_list, load_settings
+from hydroid.commands.logs import joint_ranges
 from hydroid.commands.options import Config, Logs, Repair, Set, command
-from hydroid.commands.result import Printed
+from hydroid.commands.result import Result
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
-    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,92 +30,75 @@ class LogCheck:
     path: Path
     log: "Log | None"
     findings: "Sequence[LogFinding]"
-    moved_deg: dict[int, float] = field(default_factory=dict[int, float])
+    moved_deg: Mapping[int, float]
 
     @property
-    def driven(self) -> list[int]:
-        """Numbers of the joints that take commands."""
-        return [] if self.log is None else (np.flatnonzero(self.log.driven) + 1).tolist()
+    def content(self) -> dict[str, Any]:
+        """Of JSON."""
+        log = self.log
+        return {
+            "log": str(self.path),
+            "usable": log is not None,
+            "samples": log and len(log.time),
+            "duration_s": log and float(log.duration),
+            "driven_joints": [] if log is None else (np.flatnonzero(log.driven) + 1).tolist(),
+            "moved_deg": {str(joint): deg for joint, deg in self.moved_deg.items()},
+            "findings": plain_findings(self.findings),
+        }
+
+    @property
+    def line(self) -> str:
+        """What a terminal shows of a usable log."""
+        content = self.content
+        driven = ", ".join(map(str, content["driven_joints"])) or "none"
+        moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in self.moved_deg.items())
+        text = f"{self.path}: {content['samples']} samples, {content['duration_s']:.2f} s"
+        return f"{text}, driven joints: {driven}" + (f"; moved: {moved}" if moved else "")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Check(Printed):
-    """Several files.
+class Checked(NamedTuple):
+    """Several files, and the findings about all usable ones together."""
 
-    Attributes:
-        logs: each file.
-        findings: about all usable ones together.
-    """
-
-    logs: list[LogCheck]
+    logs: "list[LogCheck]"
     findings: "Sequence[LogFinding]"
-
-    @property
-    def exit_status(self) -> int:
-        """Return 2 if a log is unusable."""
-        return 2 if any(log.log is None for log in self.logs) else 0
-
-    def lines(self) -> "list[Table | str]":
-        """Return findings by level, then the usable logs, one a line."""
-        from hydroid.log import grouped, in_one_line
-
-        every = [*(finding for log in self.logs for finding in log.findings), *self.findings]
-        findings = sorted(every, key=lambda f: ("error", "warning", "note").index(f.level))
-        lines = [f"{finding.level}: {in_one_line(finding, others)}" for finding, others in grouped(findings)]
-        return [*lines, *(_summary(log.path, log.log, log) for log in self.logs if log.log)]
-
-    def plain(self) -> dict[str, Any]:
-        """Return each file with its findings."""
-        logs = [
-            {
-                "log": str(log.path),
-                "usable": log.log is not None,
-                "samples": len(log.log.time) if log.log else None,
-                "duration_s": float(log.log.duration) if log.log else None,
-                "driven_joints": log.driven,
-                "moved_deg": {str(joint): deg for joint, deg in log.moved_deg.items()},
-                "findings": plain_findings(log.findings),
-            }
-            for log in self.logs
-        ]
-        return {"logs": logs, "findings": plain_findings(self.findings)}
 
 
 @command
-def check(logs: Logs, *, config: Config = "fit-mech", set: Set = None, repair: Repair = False) -> Check:
+def check(
+    logs: Logs, *, config: Config = "fit-mech", set: Set = None, repair: Repair = False
+) -> Result[Checked]:
     """List the faults of logs, anything unusual in them, and the commands that none of them has.
 
     A finding shared by several logs is listed once. The exit status is 2 if a log is unusable.
 
     Example: hydroid check LOG.csv
 
-        checked = hydroid.check(["a.csv", "b.csv"])
+        checked = hydroid.check(["a.csv", "b.csv"]).result
         print(*checked.logs[0].findings, *checked.findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    from hydroid.log import check_log, driven_joints, motion_findings, survey
+    from hydroid.log import check_log, driven_joints, grouped, in_one_line, motion_findings, survey
 
-    results: list[LogCheck] = []
+    found: list[LogCheck] = []
     for path in map(Path, as_list(logs)):
         log, findings = check_log(
             path, settings.log, joint_ranges(settings), outputs=settings.outputs, repair=repair
         )
-        if log is None:
-            results.append(LogCheck(path, log, findings))
-            continue
-        motions = {joint: motion.travel for joint, motion in driven_joints(log).items()}
-        results.append(LogCheck(path, log, [*findings, *motion_findings(log)], motions))
-    return Check(results, survey([result.log for result in results if result.log]))
+        joints = driven_joints(log) if log else {}
+        more = motion_findings(log) if log else []
+        moved = {joint: motion.travel for joint, motion in joints.items()}
+        found.append(LogCheck(path, log, [*findings, *more], moved))
+    together = survey([one.log for one in found if one.log])
+    every = [*(finding for one in found for finding in one.findings), *together]
+    every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
+    lines = [f"{finding.level}: {in_one_line(finding, others)}" for finding, others in grouped(every)]
+    content = {"logs": [one.content for one in found], "findings": plain_findings(together)}
+    usable = [one.line for one in found if one.log]
+    status = 0 if len(usable) == len(found) else 2
+    return Result([*lines, *usable], content, Checked(found, together), exit_status=status)
 
 
 def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:
     """Return findings as JSON holds them."""
     keys = ("level", "kind", "what", "where", "hint")
     return [{key: getattr(finding, key) for key in keys} for finding in findings]
-
-
-def _summary(path: Path, log: "Log", check: LogCheck) -> str:
-    driven = ", ".join(map(str, check.driven)) or "none"
-    moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in check.moved_deg.items())
-    text = f"{path}: {len(log.time)} samples, {log.duration:.2f} s, driven joints: {driven}"
-    return f"{text}; moved: {moved}" if moved else text

@@ -11,7 +11,6 @@ import typer
 
 if TYPE_CHECKING:
     from hydroid.commands.result import Printed
-    from hydroid.errors import HydroidError
 
 SCHEMA = 1
 """version of the JSON (docs/json.md)"""
@@ -34,39 +33,31 @@ def show(result: "Printed", *, as_json: bool) -> None:
     if as_json:
         _print_json(result.plain())
         return
-    for line in result.lines():
+    for line in result.lines:
         if isinstance(line, str):
             typer.echo(line)
         else:
             line.show()
 
 
-def show_error(error: "HydroidError") -> None:
-    """Print what the user can correct, in one line or as JSON, by the option that set what is wrong."""
-    key = error.where.removeprefix("--set ")
-    option = OPTIONS.get(key, "")
-    where, what = error.where, error.what
-    if option and any(word.partition("=")[0] == option for word in sys.argv[1:]):
-        where, what = option, what.removeprefix(f"{key}: ")
-    if wants_json():
-        kind = type(error).__name__.removesuffix("Error").lower()
-        _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": error.hint}})
-    else:
-        text = str(type(error)(what, where=where, hint=error.hint))
-        typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
+def show_error(error: Any) -> None:
+    """Print what the user can correct, in one line or as JSON, by the option that set what is wrong.
 
-
-def show_usage_error(error: Any) -> None:
-    """Print a wrong command line, as click does or as JSON."""
-    if wants_json():
-        _print_json({"error": {"kind": "usage", "what": error.format_message(), "where": "", "hint": ""}})
-    else:
+    The error is a `HydroidError`, or a wrong command line, which typer shows.
+    """
+    usage = hasattr(error, "format_message")
+    what, where, hint = (error.format_message(), "", "") if usage else (error.what, error.where, error.hint)
+    key = where.removeprefix("--set ")
+    if key in OPTIONS and any(word.partition("=")[0] == OPTIONS[key] for word in sys.argv[1:]):
+        where, what = OPTIONS[key], what.removeprefix(f"{key}: ")
+    if "--json" in sys.argv[1:]:
+        kind = "usage" if usage else type(error).__name__.removesuffix("Error").lower()
+        _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": hint}})
+    elif usage:
         error.show()
-
-
-def wants_json() -> bool:
-    """Return whether the command line asks for JSON, also where it is otherwise wrong."""
-    return "--json" in sys.argv[1:]
+    else:
+        text = str(type(error)(what, where=where, hint=hint))
+        typer.echo(f"hydroid: {' '.join(text.split())}", err=True)
 
 
 def _print_json(content: dict[str, Any]) -> None:

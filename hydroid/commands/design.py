@@ -1,40 +1,21 @@
 """`hydroid design`: the next experiment."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hydroid.commands.inputs import open_model, read_logs, setting_changes
+from hydroid.commands.inputs import open_model, setting_changes
+from hydroid.commands.logs import read_logs
 from hydroid.commands.options import Fit, Folder, MoreLogs, OwnConfig, Repair, Seed, Set, command, names
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, as_path, rows
+from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
-    from hydroid.reporting.table import Table
 
 PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
 """keys of the table of predicted relative standard deviations"""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DesignResult(Result):
-    """An experiment with the precision that it is predicted to bring."""
-
-    result: "Design"
-
-    @property
-    def _commands(self) -> str | None:
-        return self.out and str(self.out / "commands.csv")
-
-    def lines(self) -> "list[Table | str]":
-        """Return the table of precisions, and the file of commands."""
-        return [self.table, *([self._commands] if self._commands else [])]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the same."""
-        return {"commands": self._commands, "precision": rows(self.table, *PRECISION)}
 
 
 @command
@@ -61,7 +42,7 @@ def design(
     config: OwnConfig = None,
     set: Set = None,
     repair: Repair = False,
-) -> DesignResult:
+) -> "Result[Design]":
     """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
     SAFETY: Keep a hand on the emergency stop during the first run. The limits (design.speed_deg_s,
@@ -81,18 +62,22 @@ def design(
         RunError: the folder cannot be written.
     """
     driven = [int(name) if name.isdigit() else name for name in names(joints)] or None
-    options = {"design__duration_s": duration, "design__criterion": criterion, "design__joints": driven}
-    model = open_model(fit, config, setting_changes(set, **options))
+    options = {"design.duration_s": duration, "design.criterion": criterion, "design.joints": driven}
+    model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
     from hydroid.reporting.design_report import design_page
 
-    settings, folder = model.settings, as_path(out)
+    settings, commands = model.settings, None if out is None else str(Path(out) / "commands.csv")
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    if folder:
-        write_log(folder / "commands.csv", result.log, settings.log)
-        write_log(folder / "predicted.csv", result.predicted, settings.log)
     page = design_page(settings.arm, settings.design, result, model.values)
-    return DesignResult(result, page, folder).write()
+    files = written(page, out)
+    if out is not None:
+        write_log(Path(out) / "commands.csv", result.log, settings.log)
+        write_log(Path(out) / "predicted.csv", result.predicted, settings.log)
+        files.insert(0, str(commands))
+    precision = page.tables["design"]
+    content = {"commands": commands, "precision": rows(precision, *PRECISION)}
+    return Result([precision, *files], content, result, page)

@@ -4,11 +4,10 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import read_logs
+from hydroid.commands.logs import read_logs
 from hydroid.commands.result import Printed
 from hydroid.errors import RunError, SettingsError, Stopped
 from hydroid.estimate import FitSummary
@@ -16,11 +15,10 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import LogSources
+    from hydroid.commands.logs import LogSources
     from hydroid.fitting.fit import Fit, Watcher
-    from hydroid.log import Log, LogFinding
+    from hydroid.log import LogFinding
     from hydroid.problem.problem import Problem, Spread
-    from hydroid.reporting.table import Table
     from hydroid.run.folder import RunFolder
 
 _log = logging.getLogger(__name__)
@@ -34,38 +32,15 @@ class FitResult(Printed):
         problem: the logs and the model.
         fit: estimates, uncertainty, history.
         folder: the run folder; None where nothing was written.
+        summary: the final estimate with its uncertainty, as in `estimate.yaml`.
+        model: at the final estimate; every command takes it as `fit`.
     """
 
     problem: "Problem"
     fit: "Fit"
     folder: Path | None
-
-    @cached_property
-    def summary(self) -> FitSummary:
-        """The final estimate with its uncertainty, as in `estimate.yaml`."""
-        from hydroid.fitting.summary import summarise
-
-        return summarise(self.problem, self.fit)
-
-    @cached_property
-    def model(self) -> IdentifiedModel:
-        """The model at the final estimate, which every command takes as `fit`."""
-        settings = self.problem.settings
-        settings = settings.freed() if self.fit.final == "joint" else settings
-        source = str(self.folder or "the fit")
-        return IdentifiedModel(settings, self.fit.best.theta, source, self.summary)
-
-    def lines(self) -> "list[Table | str]":
-        """Return the table of the estimate, and what must be read before any use."""
-        from hydroid.reporting.fit_report import fit_lines
-        from hydroid.reporting.parameters_report import parameter_table
-
-        table = parameter_table(self.model.settings, self.summary)
-        return [table, *fit_lines(self.summary), *([str(self.folder / "report.html")] if self.folder else [])]
-
-    def plain(self) -> dict[str, Any]:
-        """Return what `estimate.yaml` holds, and the folder."""
-        return self.summary.plain() | {"out": self.folder and str(self.folder)}
+    summary: FitSummary
+    model: IdentifiedModel
 
 
 def fit(
@@ -98,7 +73,10 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation diverged.
     """
     read = read_logs(logs, settings)
-    _refuse_stray_payloads(settings, read)
+    names = [Path(log.source).name for log in read]
+    if stray := sorted(set(settings.payloads) - set(names)):  # misspelt, it would be left out silently
+        hint = f"logs: {', '.join(names)}"
+        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", hint=hint)
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.fitting.search import check_search
     from hydroid.problem.problem import Problem
@@ -108,10 +86,10 @@ def fit(
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
         raise RunError("holds a run already", where=str(out), hint="resume it, or choose another folder")
-    problem = Problem(settings, read) if workers is None else Problem(settings, read, workers)
+    problem = Problem(settings, read, workers)
     check_search(problem)
     if folder is None:
-        return FitResult(problem, run_fit(problem, progress), None)
+        return _result(problem, run_fit(problem, progress), None)
     with folder.owned():
         log_start(settings, read, findings)
         began = time.monotonic()
@@ -124,11 +102,25 @@ def fit(
         except Exception as error:
             _log.error("ended by %s: %s", type(error).__name__, error)
             raise
-        log_end(result, time.monotonic() - began)
-    return FitResult(problem, result, folder.path)
+        log_end(result.fit, time.monotonic() - began)
+    return result
 
 
-def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> "Fit":
+def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
+    from hydroid.fitting.summary import summarise
+    from hydroid.reporting.fit_report import fit_lines
+    from hydroid.reporting.parameters_report import parameter_table
+
+    summary = summarise(problem, fit)
+    settings = problem.settings.freed() if fit.final == "joint" else problem.settings
+    model = IdentifiedModel(settings, fit.best.theta, str(folder or "the fit"), summary)
+    report = [str(folder / "report.html")] if folder else []
+    lines = [parameter_table(settings, summary), *fit_lines(summary), *report]
+    content = summary.plain() | {"out": folder and str(folder)}
+    return FitResult(lines, content, problem, fit, folder, summary, model)
+
+
+def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
@@ -137,26 +129,15 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     from hydroid.run.record import fit_result, save_result
 
     checkpoints = folder.begin_or_continue(problem.settings, problem.logs)
-    result = run_fit(problem, progress, checkpoints)
-    folder.write_estimate(problem, result)
-    began = time.monotonic()
-    last = problem.varied(problem.settings.freed()) if result.final == "joint" else problem
-    suggested = (
-        suggestions(last, result.uncertainty, result.quantities, thorough=False)
-        if result.best.usable
-        else None
-    )
-    advised = None if suggested is None else advice(last, suggested, str(folder.path))
-    save_result(folder.path, fit_result(last, result, advised))
+    fit = run_fit(problem, progress, checkpoints)
+    result = _result(problem, fit, folder.path)
+    folder.write_estimate(problem.logs[0], fit.best.theta, result.summary)
+    began, advised = time.monotonic(), None
+    last = problem.varied(result.model.settings) if fit.final == "joint" else problem
+    if fit.best.usable:
+        suggested = suggestions(last, fit.uncertainty, fit.quantities, thorough=False)
+        advised = advice(last, suggested, str(folder.path))
+    save_result(folder.path, fit_result(last, fit, advised))
     draw([folder.path], folder.path)
-    folder.done(dict(result.seconds) | {"report": time.monotonic() - began})
+    folder.done(dict(fit.seconds) | {"report": time.monotonic() - began})
     return result
-
-
-def _refuse_stray_payloads(settings: FitSettings, logs: "Sequence[Log]") -> None:
-    """Refuse a payload whose log's name is misspelt: it would be left out silently."""
-    names = [Path(log.source).name for log in logs]
-    stray = sorted(set(settings.payloads) - set(names))
-    if stray:
-        hint = f"logs: {', '.join(names)}"
-        raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", hint=hint)

@@ -1,45 +1,19 @@
 """`hydroid init`: a project for your own arm and log."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hydroid.commands.inputs import as_list
 from hydroid.commands.options import command, names
-from hydroid.commands.result import Printed
+from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
     from hydroid.project import Project
-    from hydroid.reporting.table import Table
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InitResult(Printed):
-    """A project that was written."""
-
-    project: "Project"
-
-    def lines(self) -> "list[Table | str]":
-        """Return the files, what was guessed, and what to run next."""
-        project = self.project
-        lines = [f"{project.folder}: {', '.join(project.files)}"]
-        guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
-        for heading, group in (("The arm:", project.notes), (guessed, project.columns)):
-            lines += ["", heading, *(f"  {line}" for line in group)] if group else []
-        if project.unused:
-            lines.append(f"  not used: {', '.join(project.unused)}")
-        next_steps = f"Next: look at {project.folder / 'arm.png'}, then"
-        return [*lines, "", next_steps, *(f"  {line}" for line in project.commands)]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the same by name."""
-        keys = ("files", "notes", "columns", "unused", "commands")
-        return {"out": str(self.project.folder)} | {key: [*getattr(self.project, key)] for key in keys}
 
 
 @command
@@ -82,7 +56,7 @@ def init(
             "branch whose joints the log names, or else of the longest branch].",
         ),
     ] = None,
-) -> InitResult:
+) -> "Result[Project]":
     """Write a project that runs, from your arm's CAD and your log.
 
     It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
@@ -90,7 +64,7 @@ def init(
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
-        project = hydroid.init("mine", arm="robot.urdf", log=["a.csv", "b.csv"]).project
+        project = hydroid.init("mine", arm="robot.urdf", log=["a.csv", "b.csv"]).result
         print(*project.notes, *project.columns, *project.commands, sep="\\n")
 
     Raises:
@@ -98,11 +72,20 @@ def init(
         ModelError, MeshError: the arm's file cannot be used. LogError: the first log cannot.
         RunError: the folder cannot be written.
     """
-    logs = [Path(path) for path in as_list(log)]
-    robot = None if arm is None else Path(arm)
-    for path in (*logs, *([] if robot is None else [robot])):
+    logs, robots = ([Path(path) for path in as_list(given)] for given in (log, arm))
+    for path in (*logs, *robots):
         if not is_file(path):
             raise SettingsError("no such file", where=str(path))
     from hydroid.project import write_project
 
-    return InitResult(write_project(Path(folder), robot, logs, names(joints), tip))
+    project = write_project(Path(folder), robots[0] if robots else None, logs, names(joints), tip)
+    lines = [f"{project.folder}: {', '.join(project.files)}"]
+    guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
+    unused = [f"not used: {', '.join(project.unused)}"] if project.unused else []
+    look = f"Next: look at {project.folder / 'arm.png'}, then"
+    parts = {"The arm:": project.notes, guessed: [*project.columns, *unused], look: project.commands}
+    for heading, group in parts.items():
+        lines += ["", heading, *(f"  {line}" for line in group)] if group else []
+    keys = ("files", "notes", "columns", "unused", "commands")
+    content = {"out": str(project.folder)} | {key: [*getattr(project, key)] for key in keys}
+    return Result(lines, content, project)

@@ -1,18 +1,20 @@
 """Options that several commands share, and what makes a command of a function.
 
 An option is `Annotated[type in Python, typer.Option(...)]`, followed by the type on the command line where
-Python accepts more: a `Log` as well as a file's name.
+Python accepts more, a `Log` as well as a file's name, and by the default where the option stands in a
+`TypedDict` of several commands.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
 import typer
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, LogSources, ModelSource, SettingChanges, Source
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
+    from hydroid.commands.logs import LogSources
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -85,51 +87,45 @@ Pose = Annotated[
     typer.Option(help="Name of the start pose in the arm's file [default: the first angles of the log]."),
 ]
 
+COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]] = {}
+"""text, example and parameters on the command line of every command that is imported"""
+
 
 def command(function: F) -> F:
-    """Make a command of a function: `help()` shows what the options' texts say, and plain types."""
-    own = inspect.signature(function).parameters.values()
-    head, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
-    arguments = [f"    {p.name}: {get_args(p.annotation)[1].help}" for p in own]
-    function.__doc__ = "\n".join(
-        (head, "", "Args:", *arguments, *(["", f"Raises:{raises}"] if raises else []))
-    )
-    shown = [p.replace(annotation=_python_type(p.annotation)) for p in own]
-    function.__signature__ = inspect.Signature(shown)  # pyright: ignore[reportFunctionMemberAccess]
+    """Make a command of a function: its signature has plain types, and its docstring the options' texts.
+
+    `command_line` keeps how a terminal calls it: text, example, and parameters for typer.
+    """
+    text, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
+    plain, typed, arguments = list[inspect.Parameter](), list[inspect.Parameter](), list[str]()
+    for parameter in _parameters(function):
+        kind, option, *more = get_args(parameter.annotation)
+        if kind is bool and parameter.default is False:  # no --no-... beside it
+            option.param_decls = (f"--{parameter.name.replace('_', '-')}",)
+        arguments.append(f"    {parameter.name}: {option.help}")
+        plain.append(parameter.replace(annotation=getattr(kind, "__forward_arg__", kind)))
+        default = None if parameter.default == () else parameter.default
+        annotation = Annotated[more[0] if more else kind, option]
+        typed.append(parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=annotation))
+    summary, _, example = text.partition("\n\nExample:")
+    more = ["", f"Raises:{raises}"] if raises else []
+    function.__doc__ = "\n".join((text, "", "Args:", *arguments, *more))
+    function.__signature__ = inspect.Signature(plain)  # pyright: ignore[reportFunctionMemberAccess]
+    COMMAND_LINES[function] = summary, f"Example:{example.partition(chr(10))[0]}", typed
     return function
 
 
-class CommandLine(NamedTuple):
-    """What `hydroid COMMAND --help` shows of a command: its text, its example and its parameters."""
-
-    text: str
-    example: str
-    parameters: list[inspect.Parameter]
-
-
-def command_line(function: Callable[..., Any]) -> CommandLine:
-    """Return how a terminal calls a command: its docstring without the Python, and typer's parameters."""
-    paragraphs = (function.__doc__ or "").partition("\nArgs:")[0].split("\n\n")
-    text = [p for p in paragraphs if not p.startswith(("    ", "Example:"))]
-    (example,) = (p for p in paragraphs if p.startswith("Example:"))
-    parameters: list[inspect.Parameter] = []
+def _parameters(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
+    """Yield the parameters of a function, with those of the `TypedDict` of its further ones."""
     for parameter in inspect.signature(function).parameters.values():
-        kind, option, *typed = get_args(function.__annotations__[parameter.name])
-        if kind is bool and parameter.default is False:  # no --no-... beside it
-            option.param_decls = (f"--{parameter.name.replace('_', '-')}",)
-        parameters.append(
-            parameter.replace(
-                kind=parameter.KEYWORD_ONLY,
-                default=None if parameter.default == () else parameter.default,
-                annotation=Annotated[typed[0] if typed else kind, option],
-            )
-        )
-    return CommandLine("\n\n".join(text).strip(), example, parameters)
-
-
-def _python_type(declared: Any) -> Any:
-    kind = get_args(declared)[0]
-    return getattr(kind, "__forward_arg__", kind)
+        if parameter.kind is not parameter.VAR_KEYWORD:
+            yield parameter
+            continue
+        (several,) = get_args(parameter.annotation)
+        for name, option in several.__annotations__.items():
+            kind, _, *more = get_args(option)
+            default = more[1] if len(more) > 1 else False if kind is bool else None
+            yield inspect.Parameter(name, parameter.KEYWORD_ONLY, default=default, annotation=option)
 
 
 def names(given: "str | list[str] | tuple[str, ...] | None") -> list[str]:

@@ -1,26 +1,55 @@
-"""How far a command is: a bar on a terminal, plain lines elsewhere, nothing in Python or with -q."""
+"""How far a command is, and whether it is to stop.
 
+A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or with -q. A cluster's notice that
+time is nearly up ends a run as Ctrl-C does: with a checkpoint.
+"""
+
+import signal
 import sys
 import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 import typer
-
-from hydroid.commands import stopping
 
 if TYPE_CHECKING:
     from hydroid.parameters import Array
     from hydroid.settings.fit import FitSettings
 
+NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
 LINE_EVERY = 10.0
 """seconds between plain lines"""
 DEGREES = 57.29577951308232
 NAMES = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
 
 _visible: ContextVar[bool] = ContextVar("visible", default=False)
+_stopped = False
+
+
+def listen() -> None:
+    """Turn the first of the notices into a KeyboardInterrupt: clusters repeat themselves."""
+    for number in NOTICES:
+        signal.signal(number, _stop)
+
+
+def stopped() -> bool:
+    """Whether a notice has come.
+
+    Python drops an exception that is raised in a finalizer. Who asks here between two pieces of work does not
+    miss the notice.
+    """
+    return _stopped
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    global _stopped
+    _stopped = True
+    for notice in NOTICES:
+        signal.signal(notice, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 @contextmanager
@@ -53,21 +82,18 @@ class Progress:
 
     def __call__(self, what: str, done: float, total: float | None, text: str = "") -> None:
         """Show what is being done, how much of it is done, and how much there is."""
-        if stopping.asked():
+        if _stopped:
             raise KeyboardInterrupt
         if not _visible.get():
             return
+        line = f"{self._label} {what} {done:.0f}".strip()
         if sys.stderr.isatty():
-            self._draw(what, done, total, text)
+            self._bar = self._bar or _new_bar()
+            self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
         elif time.monotonic() - self._shown > LINE_EVERY:
             self._shown = time.monotonic()
-            count = f"{done:.0f}" if total is None else f"{done:.0f} of {total:.0f}"
-            typer.echo(f"{self._label} {what}: {count} {text}".strip(), err=True)
-
-    def _draw(self, what: str, done: float, total: float | None, text: str) -> None:
-        if self._bar is None:
-            self._bar, self._task = _new_bar(self._label)
-        self._bar.update(self._task, completed=done, total=total, what=what, text=text)
+            of = "" if total is None else f" of {total:.0f}"
+            typer.echo(f"{line}{of} {text}".strip(), err=True)
 
 
 class FitProgress(Progress):
@@ -100,19 +126,14 @@ class FitProgress(Progress):
         self("refinement, simulations", simulated, None, f"rms error {rms * DEGREES:.4g} deg")
 
 
-def _new_bar(label: str) -> tuple[Any, Any]:
+def _new_bar() -> Any:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    bar = Bar(
-        TextColumn("{task.description} {task.fields[what]} {task.completed:.0f}"),
-        BarColumn(bar_width=20),
-        TextColumn("{task.fields[text]}"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
+    texts = TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.fields[text]}")
+    times = TimeElapsedColumn(), TimeRemainingColumn()
+    bar = Bar(*texts, *times, console=Console(stderr=True), transient=True)
+    bar.add_task("", total=None, text="")
     bar.start()
-    return bar, bar.add_task(label, total=None, what="", text="")
+    return bar

@@ -1,105 +1,70 @@
 """What a command returns: numbers that print themselves in a terminal, as JSON and in a notebook."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
     from hydroid.reporting.page import Page
     from hydroid.reporting.table import Table
 
+T_co = TypeVar("T_co", covariant=True)
 
-class Printed(ABC):
-    """Knows how it is printed."""
 
-    @abstractmethod
-    def lines(self) -> "list[Table | str]":
-        """Return what a terminal shows: tables and sentences."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Printed:
+    """What prints itself.
 
-    @abstractmethod
+    Attributes:
+        lines: what a terminal and a notebook show: tables and sentences.
+        content: what JSON holds (docs/json.md): mappings, lists, text and finite numbers.
+    """
+
+    lines: "Sequence[Table | str]"
+    content: Mapping[str, Any]
+    exit_status = 0
+
     def plain(self) -> dict[str, Any]:
-        """Return what JSON holds (docs/json.md): mappings, lists, text and finite numbers."""
-
-    @property
-    def exit_status(self) -> int:
-        """Of the command: 0 for success."""
-        return 0
+        """Return what JSON holds."""
+        return dict(self.content)
 
     def __repr__(self) -> str:
-        text = next((line for line in self.lines() if isinstance(line, str)), "")
+        text = next((line for line in self.lines if isinstance(line, str)), "")
         return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        return "".join(
-            f"<p>{escape(line)}</p>" if isinstance(line, str) else _html(line) for line in self.lines()
-        )
+        return "".join(_html(line) for line in self.lines)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Printed):
-    """The result of a command that writes a report.
+class Result(Printed, Generic[T_co]):
+    """The result of a command.
 
     Attributes:
         result: the numbers.
-        page: the report, with its tables by name in `page.tables`.
-        out: the folder of the report; None: nothing is written.
+        page: the report, with its tables by name in `page.tables`, of a command that has one.
+        exit_status: of the command; 0 for success.
     """
 
-    result: Any
-    page: "Page"
-    out: Path | None
-
-    @property
-    def table(self) -> "Table":
-        """The first table of the report."""
-        return next(iter(self.page.tables.values()))
-
-    @property
-    def written(self) -> list[str]:
-        """The report's file, if there is one."""
-        return [] if self.out is None else [str(self.out / f"{self.page.name}.html")]
-
-    def write(self) -> Self:
-        """Write the report.
-
-        Raises:
-            RunError: the folder cannot be written.
-        """
-        if self.out is not None:
-            from hydroid.reporting.page_file import write_page
-
-            write_page(self.page, self.out)
-        return self
+    result: T_co
+    page: "Page | None" = None
+    exit_status: int = 0
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Files(Printed):
-    """Files that a command has written.
+def written(page: "Page", out: str | Path | None) -> list[str]:
+    """Write a report to a folder, if there is one; return its file.
 
-    Attributes:
-        content: what JSON holds of them.
-        text: what a terminal shows.
+    Raises:
+        RunError: the folder cannot be written.
     """
+    if out is None:
+        return []
+    from hydroid.reporting.page_file import write_page
 
-    content: Mapping[str, Any]
-    text: tuple[str, ...] = ()
-
-    def lines(self) -> "list[Table | str]":
-        """Return the text."""
-        return [*self.text]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the content."""
-        return dict(self.content)
-
-
-def as_path(out: str | Path | None) -> Path | None:
-    """Return the folder or file to write to."""
-    return None if out is None else Path(out)
+    write_page(page, Path(out))
+    return [str(Path(out) / f"{page.name}.html")]
 
 
 def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:
@@ -107,11 +72,13 @@ def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:
     return [dict(zip(keys, row.values(), strict=True)) for row in table.records()]
 
 
-def _html(table: "Table") -> str:
+def _html(line: "Table | str") -> str:
+    if isinstance(line, str):
+        return f"<p>{escape(line)}</p>"
     from hydroid.reporting.table import shown
 
-    cells = "".join(f"<th>{escape(name)}</th>" for name in table.header)
-    body = "".join(
-        f"<tr>{''.join(f'<td>{escape(shown(cell))}</td>' for cell in row)}</tr>" for row in table.rows
-    )
-    return f"<table><caption>{escape(table.title)}</caption><tr>{cells}</tr>{body}</table>"
+    def row(kind: str, cells: Sequence[str]) -> str:
+        return f"<tr>{''.join(f'<{kind}>{escape(cell)}</{kind}>' for cell in cells)}</tr>"
+
+    body = "".join(row("td", [*map(shown, cells)]) for cells in line.rows)
+    return f"<table><caption>{escape(line.title)}</caption>{row('th', line.header)}{body}</table>"

@@ -2,51 +2,31 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from hydroid.commands.arms import read_arms
 from hydroid.commands.inputs import open_model
+from hydroid.commands.logs import read_arms
 from hydroid.commands.options import Arm, Fit, OwnConfig, Pose, Repair, Seed, Set, command
-from hydroid.commands.result import Printed, as_path
+from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
     from hydroid.log import Log
-    from hydroid.reporting.table import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulation(Printed):
-    """Simulated logs.
-
-    Attributes:
-        logs: by the arm's name: right, left, or alone.
-        out: the log that was written; None: none.
-        trace: the file of pressures and flows; None: none.
-    """
-
-    logs: "dict[str, Log]"
-    out: Path | None
-    trace: Path | None
+class Simulated(Result["dict[str, Log]"]):
+    """Simulated logs by the arm's name: right, left, or alone."""
 
     @property
     def log(self) -> "Log":
         """The log of the first arm."""
-        return next(iter(self.logs.values()))
-
-    def lines(self) -> "list[Table | str]":
-        """Return the files."""
-        return [str(file) for file in (self.out, self.trace) if file is not None]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the files and the length of the log."""
-        files = {"out": self.out and str(self.out), "trace": self.trace and str(self.trace)}
-        return files | {"samples": len(self.log.time), "duration_s": float(self.log.duration)}
+        return next(iter(self.result.values()))
 
 
 @command
@@ -78,7 +58,7 @@ def simulate(
     config: OwnConfig = None,
     set: Set = None,
     repair: Repair = False,
-) -> Simulation:
+) -> Simulated:
     """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit.
 
     Of two arms neither feels the other: the carrier stands still, and they share no pump.
@@ -92,7 +72,7 @@ def simulate(
         LogError: the commands cannot be used.
         RunError: the simulation diverged, or a file cannot be written.
     """
-    target, traced = as_path(out), as_path(trace)
+    target, traced = (None if given is None else Path(given) for given in (out, trace))
     if target and isinstance(commands, str | Path) and target.resolve() == Path(commands).resolve():
         raise SettingsError("would overwrite the commands", where=f"--out {out}", hint="name another file")
     model = open_model(fit, config, set)
@@ -110,11 +90,12 @@ def simulate(
         predicted = predict_log(model, log)
         noise = np.random.default_rng(seed + number).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
         logs[name] = replace(predicted, angle=predicted.angle + noise)
+    columns = model.settings.log
     if target:
-        columns = model.settings.log
-        write_logs(
-            target, [(log, columns if arm is None else columns_of(columns, n)) for n, log in logs.items()]
-        )
+        write_logs(target, [(log, columns_of(columns, n) if arm else columns) for n, log in logs.items()])
     if traced:
         write_atomic(traced, trace_csv(model, *read.values()))
-    return Simulation(logs, target, traced)
+    files = {name: file and str(file) for name, file in {"out": target, "trace": traced}.items()}
+    first = next(iter(logs.values()))
+    content = files | {"samples": len(first.time), "duration_s": float(first.duration)}
+    return Simulated([file for file in files.values() if file], content, logs)

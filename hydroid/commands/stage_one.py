@@ -8,7 +8,7 @@ from typing import Any
 from hydroid.assets import find_config
 from hydroid.commands.inputs import ConfigSource, load_settings
 from hydroid.errors import SettingsError
-from hydroid.estimate import ParameterEstimate, estimate_file, read_values
+from hydroid.estimate import estimate_file, read_values
 from hydroid.files import is_file
 from hydroid.identified_model import ARM, CONFIG
 from hydroid.posterior.flags import Flag
@@ -22,10 +22,24 @@ MOVED = 0.1
 _log = logging.getLogger(__name__)
 
 
+def load_stage(stage: str, config: ConfigSource, changes: Mapping[str, Any]) -> FitSettings:
+    """Read the settings of a stage.
+
+    Raises:
+        SettingsError: as of `load_settings`, or they are those of the other stage.
+    """
+    settings = load_settings(config, changes)
+    if settings.stage != stage:
+        what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
+        hint = f"use hydroid fit-{settings.stage}, or another --config"
+        raise SettingsError(what, where=str(config), hint=hint)
+    return settings
+
+
 def with_mechanics(
-    mech: str | Path | None, config: ConfigSource, overrides: Mapping[str, Any], logs: Sequence[str]
+    mech: str | Path | None, config: ConfigSource, changes: Mapping[str, Any], logs: Sequence[str]
 ) -> dict[str, Any]:
-    """Return overrides that hold the parameters of stage 1 at its estimate.
+    """Return changes of settings that hold the parameters of stage 1 at its estimate.
 
     A run folder also gives its arm, log layout, start pose and payloads where `config` has none, and its
     mechanical parameters where the arm is not the config's.
@@ -35,83 +49,68 @@ def with_mechanics(
             stiffness where `config` states no start or nominal value of its own. None: `config` fixes them,
             or says what is known of them (a prior or a start), and they are estimated with the others.
         config: settings of stage 2.
-        overrides: settings to replace; they have the last word.
+        changes: settings to replace; they have the last word.
         logs: names of the logs' files.
 
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    changes = dict(overrides)
-    if mech is None:
-        settings = load_settings(config, changes)
-        parameters = {name: settings.parameters[name] for name in _mechanical(settings)}
-        free = [name for name, p in parameters.items() if p.fixed is None and not p.states_start]
-        if free:
-            hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
-            raise SettingsError(f"stage 2 needs the values of {', '.join(free)} from stage 1", hint=hint)
-        return changes
-    values, summary = read_values(Path(mech))
-    folder = estimate_file(Path(mech)).parent
-    if summary is not None and is_file(folder / CONFIG):
-        changes = _inherited(folder, config, logs) | changes
-    settings = load_settings(config, changes)
-    wanted = _mechanical(settings)
-    missing = [name for name in wanted if name not in values and settings.parameters[name].fixed is None]
-    if missing:
-        raise SettingsError(f"has no value for {', '.join(missing)}", where=str(mech))
-    own = {name for name, p in settings.parameters.items() if p.states_start and p.quantity != "mass"}
-    given = [
-        name
-        for name in wanted
-        if name in values and name not in own and f"parameters.{name}.fixed" not in changes
-    ]
-    for name in given if summary is not None else ():
-        assert summary is not None
-        _doubt(name, summary.estimate[name], nominal_value(settings, settings.parameters[name]))
-    return changes | {f"parameters.{name}.fixed": values[name] for name in given}
-
-
-def _doubt(name: str, known: ParameterEstimate, nominal: float | None) -> None:
-    """Warn of a mass that stage 1 moved from its nominal value although its logs do not determine it."""
-    if known.unit != "kg" or not nominal or known.flag in (None, Flag.IDENTIFIABLE, Flag.FIXED):
-        return
-    if abs(known.value - nominal) > MOVED * nominal:
-        _log.warning(
-            "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it (%s). "
-            "Without --mech it is estimated here",
-            *(name, known.value, nominal, known.flag),
-        )
+    values, summary = ({}, None) if mech is None else read_values(Path(mech))
+    if mech is not None and summary is not None:
+        changes = {**_inherited(estimate_file(Path(mech)).parent, config, logs), **changes}
+    settings = load_stage("hyd", config, changes)
+    wanted = {name: settings.parameters[name] for name in _mechanical(settings)}
+    open_ones = {name: p for name, p in wanted.items() if name not in values and p.fixed is None}
+    if free := [name for name, p in open_ones.items() if mech is not None or not p.states_start]:
+        hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
+        what = f"stage 2 needs the values of {', '.join(free)} from stage 1"
+        raise SettingsError(what, where=str(mech or ""), hint=hint)
+    held = {
+        name: values[name]
+        for name, p in wanted.items()
+        if name in values
+        and (p.quantity == "mass" or not p.states_start)
+        and f"parameters.{name}.fixed" not in changes
+    }
+    for name, value in held.items() if summary else ():
+        flag = summary.estimate[name].flag if summary else None
+        nominal = nominal_value(settings, wanted[name]) if wanted[name].quantity == "mass" else None
+        doubtful = nominal and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
+        if doubtful and nominal and abs(value - nominal) > MOVED * nominal:
+            _log.warning(
+                "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it "
+                "(%s). Without --mech it is estimated here",
+                *(name, value, nominal, flag),
+            )
+    return {**changes, **{f"parameters.{name}.fixed": value for name, value in held.items()}}
 
 
 def _inherited(folder: Path, config: ConfigSource, logs: Sequence[str]) -> dict[str, Any]:
-    """Settings of stage 1's run that stage 2's config leaves open."""
+    """Settings of stage 1's run that stage 2's config leaves open; none where the folder is no run's."""
+    if not is_file(folder / CONFIG):
+        return {}
     first = load(folder / CONFIG, FitSettings)
     own = {} if isinstance(config, FitSettings) else read_yaml(find_config(config))[0]
     layout = own.get("log")
-    taken: dict[str, Any] = {
+    taken = {
         f"log.{key}": value
         for key, value in first.log.model_dump(mode="json").items()
         if not isinstance(layout, dict) or key not in layout
     }
-    if "start_pose" not in own:
-        taken["start_pose"] = first.start_pose
-    if "payloads" not in own:
-        taken["payloads"] = {name: mass for name, mass in first.payloads.items() if name in logs}
-    if "arm" not in own:
-        taken["arm"] = str((folder / ARM).resolve())
-        taken |= _parameters(first, own.get("parameters"))
-    return taken
-
-
-def _parameters(first: FitSettings, own: Any) -> dict[str, Any]:
-    """Mechanical parameters of stage 1's arm, where those of stage 2's config belong to another arm."""
-    known: dict[str, Any] = own if isinstance(own, dict) else {}
+    payloads = {name: mass for name, mass in first.payloads.items() if name in logs}
+    whole = {"start_pose": first.start_pose, "payloads": payloads, "arm": str((folder / ARM).resolve())}
+    taken |= {key: value for key, value in whole.items() if key not in own}
+    known: Any = own.get("parameters")
+    if "arm" in own or not isinstance(known, dict):
+        return taken
     links = first.arm.link_names
     fitting = {n: p for n, p in known.items() if not isinstance(p, dict) or p.get("link", links[0]) in links}
-    if len(fitting) == len(known):
-        return {}
-    more = {n: first.parameters[n].model_dump(mode="json") for n in _mechanical(first) if n not in fitting}
-    return {"parameters": fitting | more}
+    if len(fitting) < len(known):  # those of another arm: stage 1's take their place
+        more = {
+            n: first.parameters[n].model_dump(mode="json") for n in _mechanical(first) if n not in fitting
+        }
+        taken["parameters"] = fitting | more
+    return taken
 
 
 def _mechanical(settings: FitSettings) -> list[str]:

@@ -1,40 +1,19 @@
 """`hydroid suggest`: what the model lacks, and what would determine more."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import open_model, problem_of, run_logs
+from hydroid.commands.inputs import open_model
+from hydroid.commands.logs import problem_of
 from hydroid.commands.options import Fit, Folder, MoreLogs, OwnConfig, Repair, Set, command
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, as_path
+from hydroid.commands.result import Result, written
 from hydroid.files import is_file
 from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
     from hydroid.advice.proposals import Advice
     from hydroid.reporting.table import Table
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SuggestResult(Result):
-    """What the model lacks, what the residual depends on, and what each action would bring."""
-
-    result: "Advice"
-
-    def lines(self) -> "list[Table | str]":
-        """Return the table of missing terms, and the sentences of each section."""
-        lines: list[Table | str] = [self.page.tables["missing_terms"]]
-        for section in self.page.sections:
-            points = [point for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
-            if section.text or points:
-                text = [section.text] if section.text else []
-                lines += [section.title, *text, *(f"- {point}" for point in points)]
-        return [*lines, *self.written]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the tests, the residuals and the actions."""
-        return dict(self.result.content)
 
 
 @command
@@ -46,7 +25,7 @@ def suggest(
     config: OwnConfig = None,
     set: Set = None,
     repair: Repair = False,
-) -> SuggestResult:
+) -> "Result[Advice]":
     """Find what the model lacks, and what to do next.
 
     Tests every parameter that is kept fixed or switched off, such as a delay or dry friction: would freeing
@@ -64,18 +43,21 @@ def suggest(
         RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
     """
     model = open_model(fit, config, set)
-    given = logs or run_logs(model)
+    problem = problem_of(model, logs, repair=repair)
     from hydroid.advice.proposals import advice
     from hydroid.advice.suggest import suggestions
     from hydroid.posterior.covariance import uncertainty
     from hydroid.reporting.page import log_names
     from hydroid.reporting.suggestion_report import suggestion_page
 
-    problem = problem_of(model, given, repair=repair)
     with Progress() as progress:
         result = suggestions(problem, uncertainty(problem, model.theta), progress=progress)
     folder = Path(model.source).parent
-    run = str(folder) if is_file(folder / CONFIG) else "RUN"
-    advised = advice(problem, result, run)
+    advised = advice(problem, result, str(folder) if is_file(folder / CONFIG) else "RUN")
     page = suggestion_page(problem.settings, advised, log_names(problem.logs), model.name)
-    return SuggestResult(advised, page, as_path(out)).write()
+    lines: list[Table | str] = [page.tables["missing_terms"]]
+    for section in page.sections:
+        points = [f"- {point}" for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
+        if section.text or points:
+            lines += [section.title, *([section.text] if section.text else []), *points]
+    return Result([*lines, *written(page, out)], advised.content, advised, page)

@@ -1,37 +1,20 @@
 """`hydroid validate`: fits on logs that they were not fitted to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hydroid.commands.inputs import as_list, open_model, read_logs
+from hydroid.commands.inputs import as_list, open_model
+from hydroid.commands.logs import read_logs
 from hydroid.commands.options import FIT_HELP, Folder, Logs, Repair, Set, command
-from hydroid.commands.result import Result, as_path
+from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ModelSource
     from hydroid.fitting.validation import Prediction
-    from hydroid.reporting.table import Table
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ValidateResult(Result):
-    """The response of each fit to each log."""
-
-    result: "list[Prediction]"
-
-    def lines(self) -> "list[Table | str]":
-        """Return the table of errors, and what to beware of."""
-        warnings = [f"- {warning}" for warning in self.page.warnings]
-        return [self.page.tables["errors"], *warnings, *self.written]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the errors of each fit, log and joint."""
-        return {"results": [row for result in self.result for row in result.plain()]}
 
 
 @command
@@ -52,7 +35,7 @@ def validate(
     out: Folder = "runs/validation",
     set: Set = None,
     repair: Repair = False,
-) -> ValidateResult:
+) -> "Result[list[Prediction]]":
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots.
 
     Each fit reads the logs with its own settings. The report of each run shows its unseen logs too.
@@ -80,16 +63,13 @@ def validate(
     by_model: list[list[Prediction]] = []
     for model, own in zip(models, read, strict=True):
         seen = [was_fitted(Path(model.source).parent, log) for log in own]
-        unseen = [None if fitted is None else not fitted for fitted in seen]
-        if folds:
-            by_model.append([predicted(fold, log, True) for fold, log in zip(folds, own, strict=True)])
-        else:
-            by_model.append([predicted(model, log, new) for log, new in zip(own, unseen, strict=True)])
+        unseen = [True if folds else None if fitted is None else not fitted for fitted in seen]
+        by_model.append(list(map(predicted, folds or [model] * len(own), own, unseen)))
     results = [result for own in by_model for result in own]
     page = validation_page(results, models[0].settings.arm, folds)
-    validated = ValidateResult(results, page, as_path(out)).write()
+    lines = [page.tables["errors"], *(f"- {warning}" for warning in page.warnings), *written(page, out)]
     if out is not None and not folds:
         for model, own in zip(models, by_model, strict=True):
             if (run := keep_validation(model, own)) is not None:
                 draw([run], run)
-    return validated
+    return Result(lines, {"results": [row for result in results for row in result.plain()]}, results, page)

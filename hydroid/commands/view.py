@@ -1,17 +1,17 @@
 """`hydroid view`: the arm in motion, in a window or a film; its collisions; the curves of its actuators."""
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hydroid.commands.arms import read_arms, read_trajectories
-from hydroid.commands.inputs import load_settings, nominal_model, require_hydraulics, run_logs
+from hydroid.commands.inputs import load_settings, open_model, require_hydraulics
+from hydroid.commands.logs import read_arms, run_logs
 from hydroid.commands.options import FIT_HELP, Arm, Pose, Repair, Set, command
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Files, Printed, Result, as_path
+from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
 from hydroid.files import is_file, write_atomic
 from hydroid.identified_model import IdentifiedModel
@@ -21,48 +21,7 @@ if TYPE_CHECKING:
     from hydroid.arm.collision import Clearance
     from hydroid.commands.inputs import ConfigSource, ModelSource, Source
     from hydroid.log import Log
-    from hydroid.reporting.table import Table
     from hydroid.settings.fit import FitSettings
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Collisions(Result):
-    """Which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
-
-    result: "Clearance"
-
-    @property
-    def exit_status(self) -> int:
-        """Return 1 if bodies meet."""
-        return 1 if self.result.meetings else 0
-
-    def lines(self) -> "list[Table | str]":
-        """Return the tables, and the answer in a sentence."""
-        return [*self.page.tables.values(), self.page.lead, *self.written]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the smallest distance and the meetings."""
-        result = self.result
-        nearest = result.smallest
-        meetings = [
-            {
-                "bodies": [meeting.first, meeting.second],
-                "from_s": meeting.begins,
-                "to_s": meeting.ends,
-                "depth_m": meeting.depth,
-                "deepest_at_s": meeting.deepest,
-            }
-            for meeting in result.meetings
-        ]
-        return {
-            "free": not meetings,
-            "clearance_m": float(result.distance[nearest]),
-            "clearance_at_s": float(result.time[nearest]),
-            "clearance_between": [*result.nearest[nearest]],
-            "collisions": meetings,
-            "checked_pairs": result.checked,
-            "excluded": [[*pair] for pair in result.excluded],
-        }
 
 
 @command
@@ -122,7 +81,7 @@ def view(
     ] = None,
     set: Set = None,
     repair: Repair = False,
-) -> Printed:
+) -> "Result[Clearance | None]":
     """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
 
     Without a log, the sliders in the panel "Control" on the right set the commands in %. Backspace restarts.
@@ -147,53 +106,70 @@ def view(
     if collisions:
         if log is None:
             raise SettingsError("needs a log or a run", where="--collisions", hint="name the log")
-        own = None if fit is None else nominal_model(fit, config, set).settings
-        return _collisions(log, own or load_settings(config or "fit-hyd", set), as_path(out), arm, repair)
+        known = open_model(fit, config, set, nominal=True).settings if fit else None
+        settings = known or load_settings(config or "fit-hyd", set)
+        return _collisions(read_arms(log, settings, arm, angles=True, repair=repair), settings, out)
     if out is not None:
         choose_platform()
-    model = nominal_model(fit, config, set)
+    model = open_model(fit, config, set, nominal=True)
     if actuator is not None:
         return _actuator(model, actuator, Path(out or "runs/actuator"))
     if log is None and (arm is not None or out is not None):
         where = "--arm" if arm is not None else "--out"
         raise SettingsError("needs a log or a run: sliders are those of one arm", where=where)
     logs = None if log is None else read_arms(log, model.settings, arm, pose=pose, repair=repair)
-    if out is not None:
-        return _film(model, logs or {}, Path(out), span)
     from hydroid.viewer.motion import simulated_motion
+
+    if out is not None:
+        from hydroid.viewer.film import check_kind, render_motion
+
+        kind, part = check_kind(Path(out)), _span(span)
+        with Progress() as progress:
+            film = render_motion(simulated_motion(model, logs or {}), kind, part, progress)
+        write_atomic(Path(out), film)
+        return Result([str(out)], {"out": str(out)}, None)
     from hydroid.viewer.playback import Replay, make_sliders
     from hydroid.viewer.window import show
 
     with suppress(KeyboardInterrupt):  # as good as closing the window
         show(make_sliders(model, pose) if logs is None else Replay(simulated_motion(model, logs)))
-    return Files({})
+    return Result([], {}, None)
 
 
-def _film(model: IdentifiedModel, logs: "dict[str, Log]", out: Path, span: str) -> Files:
-    from hydroid.viewer.film import check_kind, render_motion
-    from hydroid.viewer.motion import simulated_motion
-
-    kind, part = check_kind(out), _span(span)
-    with Progress() as progress:
-        write_atomic(out, render_motion(simulated_motion(model, logs), kind, part, progress))
-    return Files({"out": str(out)}, (str(out),))
-
-
-def _collisions(
-    log: "Source | Log", settings: "FitSettings", out: Path | None, arm: str | None, repair: bool
-) -> Collisions:
-    logs = read_trajectories(log, settings, arm, repair=repair)
-    from hydroid.arm.machine import load_machine
+def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | None") -> "Result[Clearance]":
+    """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
+    from hydroid.arm.machine import ALONE, load_machine
     from hydroid.reporting.collision_report import collision_page
 
-    machine = load_machine(settings.arm, pair=arm is not None)
+    machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    return Collisions(result, collision_page(result, machine.arm.name), out).write()
+    page, nearest = collision_page(result, machine.arm.name), result.smallest
+    meetings = [
+        {
+            "bodies": [meeting.first, meeting.second],
+            "from_s": meeting.begins,
+            "to_s": meeting.ends,
+            "depth_m": meeting.depth,
+            "deepest_at_s": meeting.deepest,
+        }
+        for meeting in result.meetings
+    ]
+    content = {
+        "free": not meetings,
+        "clearance_m": float(result.distance[nearest]),
+        "clearance_at_s": float(result.time[nearest]),
+        "clearance_between": [*result.nearest[nearest]],
+        "collisions": meetings,
+        "checked_pairs": result.checked,
+        "excluded": [[*pair] for pair in result.excluded],
+    }
+    lines = [*page.tables.values(), page.lead, *written(page, out)]
+    return Result(lines, content, result, page, exit_status=1 if meetings else 0)
 
 
-def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Files:
+def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Result[None]:
     require_hydraulics(model)
     from hydroid.posterior.posterior import stored_posterior
     from hydroid.problem.bindings import Bindings
@@ -207,7 +183,7 @@ def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Files:
         actuator = replace(actuator, known=known)
     page = actuator_page(actuator)
     files = [str(file) for file in (*write_figures(page, out / "figures"), *write_page(page, out))]
-    return Files({"files": files}, (files[-1],))
+    return Result(files[-1:], {"files": files}, None, page)
 
 
 def _span(text: str) -> tuple[float, float]:

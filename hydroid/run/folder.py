@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import RunError
-from hydroid.estimate import write_estimate
+from hydroid.estimate import FitSummary, write_estimate
 from hydroid.files import remove_parts, write_atomic
-from hydroid.fitting.fit import Fit
-from hydroid.fitting.summary import summarise
 from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
+from hydroid.parameters import Array
 from hydroid.plant import Plant
-from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import CheckpointFile
 from hydroid.run.identity import DESCRIPTION, identity, model_hash, own_hashes, refuse_other_run
 from hydroid.run.lock import LOCK, locked
@@ -117,11 +115,11 @@ class RunFolder:
         self.identity()  # raises the clearer error where the folder holds no run
         return load(self.path / CONFIG, FitSettings, overrides)
 
-    def write_estimate(self, problem: Problem, fit: Fit) -> None:
-        """Write `estimate.yaml`, and the fitted arm in `model/` as it began the first log."""
-        write_estimate(self.path, summarise(problem, fit))
-        log, settings = problem.logs[0], self.settings()
-        model = IdentifiedModel(settings, fit.best.theta, str(self.path / "estimate.yaml"))
+    def write_estimate(self, log: Log, theta: Array, summary: FitSummary) -> None:
+        """Write `estimate.yaml`, and the fitted arm in `model/` as it began a log."""
+        write_estimate(self.path, summary)
+        settings = self.settings()
+        model = IdentifiedModel(settings, theta, str(self.path / "estimate.yaml"))
         driven = {int(j) + 1 for j in np.flatnonzero(log.driven)} | set(settings.outputs)
         plant = Plant(model, joints=sorted(driven), payload=settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)

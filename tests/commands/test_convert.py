@@ -32,8 +32,8 @@ def test_a_jittering_log_with_signs_reads_back_to_the_same_bits(name: str, tmp_p
     np.testing.assert_array_equal(back.command, log.command)
     # degrees that were interpolated in rad: no cell may exist that is read as these very bits
     np.testing.assert_allclose(back.angle, log.angle, rtol=4e-16, atol=0)
-    np.testing.assert_array_equal(done.log.command, log.command)
-    assert done.guess is None
+    np.testing.assert_array_equal(done.result.log.command, log.command)
+    assert done.result.guess is None
 
 
 def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
@@ -42,8 +42,8 @@ def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
     (log,), (back,) = (hydroid.read_logs(path, settings) for path in (RIG, tmp_path / "plain.csv"))
     np.testing.assert_array_equal(back.command, log.command)
     np.testing.assert_array_equal(back.angle, log.angle)
-    assert done.guess is not None
-    assert len(done.guess.reasons) == 15
+    assert done.result.guess is not None
+    assert len(done.result.guess.reasons) == 15
 
 
 def test_a_matlab_file_with_names_of_its_own(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_guess_is_corrected_and_joints_go_by_the_arms_names(tmp_path: Path) ->
     hydroid.convert(tmp_path / "a.parquet", out=out, config="fit-mech")
     assert out.read_text().startswith("time_s,u2_pct,q2_deg\n")
     turned = hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scale": -10})
-    np.testing.assert_allclose(turned.log.command[:, 0], -u, rtol=1e-15)
+    np.testing.assert_allclose(turned.result.log.command[:, 0], -u, rtol=1e-15)
     with pytest.raises(SettingsError, match="is no setting of `log`"):
         hydroid.convert(tmp_path / "a.parquet", out=out, set={"search.seed": 3})
     with pytest.raises(SettingsError, match=r"unknown setting 'joints\.1\.command\.scal'"):

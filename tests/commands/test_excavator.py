@@ -66,7 +66,7 @@ def test_the_raw_logs_lead_through_init_to_a_first_fit(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     logs = [*LOGS[6:8], LOGS[0]]
     joints = ["boom", "arm", "bucket", "swing"]
-    project = hydroid.init("dig", arm=FOLDER / "arm.yaml", log=logs, joints=joints).project
+    project = hydroid.init("dig", arm=FOLDER / "arm.yaml", log=logs, joints=joints).result
     settings = hydroid.load_settings("dig/fit.yaml")
     assert [settings.log.columns("command", j).scale for j in (1, 2, 3, 4)] == [1, -1, -1, -1]
     assert [settings.log.columns("command", j).column for j in (1, 2)] == [("u4_pct",), ("u1_pct",)]

@@ -79,13 +79,13 @@ def test_a_motion_is_written_where_pictures_can_be_rendered(tmp_path: Path):
 
 
 def test_one_log_moves_both_arms_as_mirror_images(model: IdentifiedModel, study_log: Log, tmp_path: Path):
-    both = hydroid.simulate(study_log, fit=model, arm="both", out=tmp_path / "both.csv").logs
+    both = hydroid.simulate(study_log, fit=model, arm="both", out=tmp_path / "both.csv").result
     alone = hydroid.simulate(study_log, fit=model, out=None).log
     for side in ("right", "left"):
         np.testing.assert_array_equal(both[side].angle, alone.angle)
     header = (tmp_path / "both.csv").read_text().partition("\n")[0].split(",")
     assert {"time_s", "right_u2_pct", "left_u2_pct", "left_q7_deg"} <= set(header)
-    again = hydroid.simulate(tmp_path / "both.csv", fit=model, arm="left", out=None).logs
+    again = hydroid.simulate(tmp_path / "both.csv", fit=model, arm="left", out=None).result
     assert list(again) == ["left"]
     np.testing.assert_allclose(again["left"].angle, alone.angle, atol=1e-9)
 
@@ -96,7 +96,7 @@ def test_each_arm_has_its_own_columns(model: IdentifiedModel, tmp_path: Path):
     rows[:100, 1:] = 50.0, -50.0
     header = "time_s,right_u2_pct,left_u3_pct"
     np.savetxt(tmp_path / "own.csv", rows, "%.9g", ",", header=header, comments="")
-    both = hydroid.simulate(tmp_path / "own.csv", fit=model, arm="both", out=None).logs
+    both = hydroid.simulate(tmp_path / "own.csv", fit=model, arm="both", out=None).result
     assert [np.flatnonzero(log.driven).tolist() for log in both.values()] == [[1], [2]]
     np.testing.assert_array_equal(both["left"].command[:, 2], rows[:, 2])
     with pytest.raises(LogError, match="u1_pct"):

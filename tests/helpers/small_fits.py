@@ -6,6 +6,7 @@ from conftest import step_log
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit
+from hydroid.fitting.summary import summarise
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -51,5 +52,5 @@ class Study:
         """A fit in a folder, continued where the folder has a checkpoint."""
         checkpoints = folder.begin_or_continue(self.settings, read_logs([self.path], self.settings))
         result = fit(self.problem, watcher, checkpoints)
-        folder.write_estimate(self.problem, result)
+        folder.write_estimate(self.problem.logs[0], result.best.theta, summarise(self.problem, result))
         return result

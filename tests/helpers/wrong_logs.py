@@ -241,7 +241,7 @@ def told(wrong: Wrong, folder: Path) -> list[str]:
 
     overrides = {f"log.{key}": value for key, value in wrong.settings.items()}
     result = hydroid.check(save(wrong, folder), set=overrides)
-    return [line.replace(f"{folder}/", "") for line in result.lines()]
+    return [line.replace(f"{folder}/", "") for line in result.lines]
 
 
 def table() -> str:

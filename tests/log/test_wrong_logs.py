@@ -19,7 +19,7 @@ def test_it_is_said_and_the_page_shows_it(wrong: Wrong, tmp_path: Path) -> None:
 
 
 def findings(folder: Path, *tables: dict) -> list[tuple[str, str]]:
-    result = hydroid.check(save(Wrong("", "", "", lambda: [*tables]), folder), config=SETTINGS)
+    result = hydroid.check(save(Wrong("", "", "", lambda: [*tables]), folder), config=SETTINGS).result
     every = [f for log in result.logs for f in log.findings] + result.findings
     return [(finding.level, finding.kind) for finding in every]
 
@@ -45,6 +45,6 @@ def test_a_finding_of_several_logs_is_said_once(tmp_path: Path) -> None:
 
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (path,) = save(Wrong("", "", "", lambda: [boom([50])]), tmp_path)
-    (log,) = hydroid.check([path], config=SETTINGS).logs
+    (log,) = hydroid.check([path], config=SETTINGS).result.logs
     angle = log.log.angle[:, 1]
     assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}

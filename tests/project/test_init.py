@@ -27,7 +27,7 @@ QUICK = {
 
 
 def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
-    return hydroid.init(folder, arm=arm, log=logs, **more).project
+    return hydroid.init(folder, arm=arm, log=logs, **more).result
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +82,10 @@ def test_a_fit_and_what_follows_run(place: Path, tmp_path: Path):
     units = {name: one.unit for name, one in hyd.results[0].summary.estimate.items()}
     assert {units[f"size_{name}"] for name in ("swing", "boom", "stick")} == {"cm³/rad"}
     assert {"M_boom", "open_A_boom", "lag_boom"} <= set(units)
-    hydroid.view(hyd.out, actuator=3, out=tmp_path / "actuator")
-    hydroid.simulate(logs[0], fit=hyd.out, out=tmp_path / "again.csv")
+    hydroid.view(hyd.best.folder, actuator=3, out=tmp_path / "actuator")
+    hydroid.simulate(logs[0], fit=hyd.best.folder, out=tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_text().startswith("t_ms,")
-    plant = hydroid.load_plant(hyd.out)
+    plant = hydroid.load_plant(hyd.best.folder)
     assert plant.step(np.array([50.0, 0, 0])).shape == (3,)
 
 

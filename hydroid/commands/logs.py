@@ -1,0 +1,156 @@
+"""Logs that commands read: files, or logs that were read before, of an arm alone or of the arms of a pair."""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hydroid.commands.inputs import ModelSource, as_list
+from hydroid.errors import RunError, SettingsError
+from hydroid.files import is_file
+from hydroid.identified_model import IdentifiedModel
+from hydroid.progress import NOTE
+from hydroid.settings.fit import FitSettings
+from hydroid.settings.two_arms import angles_only, columns_of
+
+if TYPE_CHECKING:
+    from hydroid.log import Log, LogFinding
+    from hydroid.problem.problem import Problem
+
+    LogSource = str | Path | Log
+    LogSources = LogSource | Sequence[LogSource] | None
+
+_log = logging.getLogger(__name__)
+
+
+def read_logs(logs: "LogSources", settings: FitSettings, *, repair: bool = False) -> "list[Log]":
+    """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
+
+        logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
+
+    Args:
+        logs: files, or logs that were read before; one or several.
+        settings: of the fit; joints that a log does not measure stand in its `start_pose`.
+        repair: fill holes up to `log.repair_s`.
+
+    Raises:
+        LogError: the first fault that keeps a log from being used.
+    """
+    return read_with_findings(logs, settings, repair=repair)[0]
+
+
+def read_with_findings(
+    logs: "LogSources", settings: FitSettings, *, repair: bool = False, commands: bool = False
+) -> "tuple[list[Log], list[LogFinding]]":
+    """Do as `read_logs`, and return the warnings and notes too; logs of `commands` need no angles."""
+    from hydroid.log import Log, grouped, in_one_line, read_log
+
+    read: list[Log] = []
+    findings: list[LogFinding] = []
+    outputs = () if commands else settings.outputs
+    for source in as_list(logs):
+        if isinstance(source, Log):
+            read.append(source)
+            continue
+        ranges = joint_ranges(settings)
+        log, more = read_log(
+            Path(source), settings.log, ranges, outputs=outputs, angles_required=not commands, repair=repair
+        )
+        findings += more
+        pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
+        read.append(replace(log, angle=pose))
+    for finding, others in grouped(findings):
+        level = logging.WARNING if finding.level == "warning" else NOTE
+        _log.log(level, "%s: %s", finding.level, in_one_line(finding, others))
+    return read, findings
+
+
+def read_arms(
+    log: "LogSource",
+    settings: FitSettings,
+    arm: str | None,
+    *,
+    pose: str | None = None,
+    angles: bool = False,
+    repair: bool = False,
+) -> "dict[str, Log]":
+    """Read commands of an arm, or of the arms of a pair that move.
+
+    Args:
+        log: a file or a log. Columns that begin with `right_` and `left_` are those of the two arms. Without
+            them every arm that moves has the same commands: both move as mirror images.
+        settings: which map its columns.
+        arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
+        pose: pose of the arm's file in which the arms stand; None: as logged.
+        angles: read joint angles over time instead.
+        repair: fill holes up to `log.repair_s`.
+
+    Returns:
+        Logs by the arm's name: right, left, or alone.
+
+    Raises:
+        LogError: a fault that keeps the log from being used.
+        SettingsError: no such arm or pose.
+    """
+    from hydroid.arm.machine import ALONE, SIDES
+    from hydroid.log import open_table
+
+    if arm not in (None, *SIDES, "both"):
+        hint = f"choose {', '.join(SIDES)} or both"
+        raise SettingsError(f"{arm!r} is no arm of a pair", where="--arm", hint=hint)
+    moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
+    columns = angles_only(settings.log) if angles else settings.log
+    layouts = {moving[0]: columns}
+    if isinstance(log, str | Path) and arm is not None:
+        prefixes = tuple(f"{side}_" for side in SIDES)
+        if any(name.startswith(prefixes) for name in open_table(Path(log), settings.log).names):
+            layouts = {side: columns_of(columns, side) for side in moving}
+    stand = None if pose is None else settings.arm.pose(pose)
+    logs: dict[str, Log] = {}
+    for side, layout in layouts.items():
+        own = settings.model_copy(update={"log": layout} | ({"outputs": ()} if angles else {}))
+        ((one,), _) = read_with_findings(log, own, repair=repair, commands=not angles)
+        logs[side] = one if stand is None else replace(one, angle=np.zeros_like(one.angle) + stand)
+    return {side: logs.get(side, logs[moving[0]]) for side in moving}
+
+
+def run_logs(run: ModelSource) -> list[Path]:
+    """Return the logs that a run folder was fitted to.
+
+    Raises:
+        SettingsError: it is no run folder. RunError: a log is not there.
+    """
+    folder = Path(run.source).parent if isinstance(run, IdentifiedModel) else Path(run)
+    if not is_file(folder / "run.json"):
+        hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
+        raise SettingsError("no log is given", hint=hint)
+    from hydroid.run.folder import RunFolder
+
+    logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
+    missing = [str(log) for log in logs if not log.is_file()]
+    if missing or not logs:
+        raise RunError(f"its log {', '.join(missing)} is not there", where=str(folder), hint="name the log")
+    return logs
+
+
+def problem_of(model: IdentifiedModel, logs: "LogSources", *, repair: bool = False) -> "Problem":
+    """Return the estimation problem of a model and logs, or those of its run where none is given.
+
+    Raises:
+        RunError: the simulation diverges at the model's parameters.
+    """
+    read = read_logs(logs or run_logs(model), model.settings, repair=repair)
+    from hydroid.problem.problem import Problem
+
+    problem = Problem(model.settings, read)
+    if not np.isfinite(problem.residuals(model.theta[None])).all():
+        raise RunError("the simulation diverged with these parameters", where=model.source)
+    return problem
+
+
+def joint_ranges(settings: FitSettings) -> np.ndarray:
+    """Return the ranges of the arm's joints [rad], shape (J, 2)."""
+    return np.stack([settings.arm.lower, settings.arm.upper], axis=1)

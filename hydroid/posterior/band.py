@@ -18,6 +18,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.open_start import start_deviations
 from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, stored_posterior
+from hydroid.problem.free_start import start_slopes
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
 
@@ -122,7 +123,7 @@ def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> d
     `levels` [rad] are those of the compared angles' noise, by joint. The problem has one log.
     """
     rows = np.zeros((0, len(problem.measured)))
-    for each in problem.start_slopes(theta, everywhere=True):
+    for each in start_slopes(problem, theta):
         rows = start_deviations(problem.logs[0], each.joints, levels)[:, None] * each.slopes
     angles = (channel for channel in problem.channels if channel.quantity == "angle")
     return {channel.joint: rows[:, channel.rows] / channel.weight for channel in angles}

@@ -15,8 +15,8 @@ import numpy as np
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.noise import channel_noise, prior_weight
-from hydroid.problem.free_start import OpenStart
-from hydroid.problem.problem import Problem
+from hydroid.problem.free_start import start_slopes
+from hydroid.problem.problem import OpenStart, Problem
 
 WORST = float(np.radians(0.2))
 """noise of a joint's sensor above which a residual is the model's error (ours)"""
@@ -38,7 +38,7 @@ def with_open_start(problem: Problem, theta: Array) -> Problem:
 @lru_cache(maxsize=1)  # a refinement asks for the same once more
 def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
     theta = np.array(values)
-    slopes = problem.start_slopes(theta)
+    slopes = start_slopes(problem, theta)
     compared = problem.settings.outputs
     without_prior = problem.with_open_starts(
         [each.opened(np.where(np.isin(each.joints, compared), UNBOUND, 0.0)) for each in slopes]

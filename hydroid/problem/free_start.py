@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hydroid.arm.model import load_model
 from hydroid.parameters import Array
+from hydroid.problem.problem import OpenStart, Problem, compared_pressures, make_simulation
 
 STEP = float(np.radians(0.05))
 """of the differences by a start angle"""
@@ -35,27 +37,37 @@ class StartSlopes:
     joints: tuple[int, ...]
     slopes: Array
 
-    def opened(self, weights: Array) -> "OpenStart":
+    def opened(self, weights: Array) -> OpenStart:
         """Open the start angles. `weights`, (k,) [1]: of each, its prior's sd over the noise's level."""
         _, values, basis = np.linalg.svd(weights[:, None] * self.slopes, full_matrices=False)
-        return OpenStart(self.rows, basis, 1 - 1 / np.sqrt(1 + values**2))
+        taken = 1 - 1 / np.sqrt(1 + values**2)  # 1 without a prior
+
+        def close(residuals: Array) -> None:
+            part = residuals[:, self.rows]
+            part -= (part @ basis.T * taken) @ basis
+
+        return close
 
 
-@dataclass(frozen=True, eq=False)
-class OpenStart:
-    """Start angles of one log that are open.
+def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
+    """Differentiate the residuals at theta, shape (P,), by each log's start angles that are simulated from.
 
-    Attributes:
-        rows: the log's residuals in a row of all.
-        basis: orthonormal rows that span what the start angles do to them, shape (k, rows).
-        taken: part of a residual along each that is taken out, shape (k,): 1 without a prior.
+    One simulation for each. A start angle from which the simulation diverges has no effect.
     """
-
-    rows: slice
-    basis: Array
-    taken: Array
-
-    def close(self, residuals: Array) -> None:
-        """Take what the start angles can explain out of residuals, shape (n, R)."""
-        part = residuals[:, self.rows]
-        part -= (part @ self.basis.T * self.taken) @ self.basis
+    spec, candidates = load_model(problem.settings.arm), problem.bindings.candidates(theta[None])
+    base, slopes = problem.output_errors(theta[None])[0], list[StartSlopes]()
+    for i, log in enumerate(problem.logs):
+        joints, pressures = problem.started(log), compared_pressures(log, problem.settings)
+        channels = [channel for channel in problem.channels if channel.log == i]
+        rows = slice(channels[0].rows.start, channels[-1].rows.stop)
+        moved: list[Array] = []
+        for joint in joints:
+            start = log.moved(joint, STEP)
+            simulation = make_simulation(spec, start, problem.outputs, problem.settings, pressures)
+            response = {i: simulation.simulate(candidates)}
+            moved.append(np.concatenate([channel.residual(response)[0] for channel in channels]))
+        if moved:
+            slope = (np.array(moved) - base[rows]) / STEP
+            slope[~np.isfinite(slope).all(axis=1)] = 0.0
+            slopes.append(StartSlopes(i, rows, tuple(joints), slope))
+    return slopes

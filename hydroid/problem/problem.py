@@ -4,7 +4,7 @@ Evaluating a population is one function, `Problem.evaluate`; the search knows on
 simulated by threads of this process, or on workers (`Spread`); no bit of a result depends on how many.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,7 +21,6 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.free_start import STEP, OpenStart, StartSlopes
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
@@ -30,6 +29,9 @@ from hydroid.simulation.scenario import Scenario
 
 CHUNK = 2**23
 """residuals that are held in memory at a time, 64 MiB"""
+
+OpenStart = Callable[[Array], None]
+"""takes what one log's open start angles can explain out of residuals, shape (n, R)"""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class Problem:
         if not self.parameters.free.any():
             raise SettingsError("no parameter is free", where="parameters", hint="fix fewer of them")
         self.priors = Priors(settings.priors, self.parameters)
-        self._pressures = pressures = [compared_pressures(log, settings) for log in logs]
+        pressures = [compared_pressures(log, settings) for log in logs]
         self._simulations = [
             make_simulation(spec, log, outputs, settings, joints)
             for log, joints in zip(logs, pressures, strict=True)
@@ -104,36 +106,7 @@ class Problem:
     @property
     def leaves_start_open(self) -> bool:
         """Whether the start angle of any log is open."""
-        return self.settings.free_start and any(self._started(log) for log in self.logs)
-
-    def start_slopes(self, theta: Array, *, everywhere: bool = False) -> list[StartSlopes]:
-        """Differentiate the residuals at theta, shape (P,), by the start angles that logs leave open.
-
-        Where `everywhere`, by all that are measured. One simulation for each. A start angle from which the
-        simulation diverges has no effect.
-        """
-        if not (everywhere or self.settings.free_start):
-            return []
-        spec = load_model(self.settings.arm)  # cannot be pickled: not kept
-        candidates, found = self.bindings.candidates(theta[None]), list[StartSlopes]()
-        for i, log in enumerate(self.logs):
-            joints = self._started(log)
-            if not joints:
-                continue
-            own = [channel for channel in self.channels if channel.log == i]
-            moved = [
-                make_simulation(spec, log.moved(j, STEP), self.outputs, self.settings, self._pressures[i])
-                for j in joints
-            ]
-            rows = [
-                np.concatenate([channel.residual({i: one.simulate(candidates)})[0] for channel in own])
-                for one in (self._simulations[i], *moved)
-            ]
-            slopes = (np.array(rows[1:]) - rows[0]) / STEP
-            slopes[~np.isfinite(slopes).all(axis=1)] = 0.0
-            part = slice(own[0].rows.start, own[-1].rows.stop)
-            found.append(StartSlopes(i, part, tuple(joints), slopes))
-        return found
+        return self.settings.free_start and any(self.started(log) for log in self.logs)
 
     def with_open_starts(self, open_starts: Sequence[OpenStart]) -> "Problem":
         """Return the problem whose residuals hold for any start angle that its logs leave open."""
@@ -141,7 +114,7 @@ class Problem:
         opened.open_starts = tuple(open_starts)
         return opened
 
-    def _started(self, log: Log) -> list[int]:
+    def started(self, log: Log) -> list[int]:
         """Joints whose measured angle only their start is simulated from, numbered from 1."""
         follows = self.settings.simulation.other_joints == "measured"
         compared = np.isin(np.arange(log.joints), self.outputs)
@@ -187,8 +160,8 @@ class Problem:
             rows = self.output_errors(theta)
         else:
             rows = self._spread(self._on_worker, "output_errors", theta, len(self.measured))
-        for start in self.open_starts:
-            start.close(rows)
+        for close in self.open_starts:
+            close(rows)
         return rows
 
     def output_errors(self, theta: Array) -> Array:

@@ -9,7 +9,7 @@ from conftest import step_log
 from hydroid import load_settings
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
-from hydroid.problem.free_start import StartSlopes
+from hydroid.problem.free_start import StartSlopes, start_slopes
 from hydroid.problem.problem import Problem
 
 LEVELS = [60.0, -40.0, 80.0, -70.0]
@@ -28,7 +28,7 @@ def test_an_open_start_whitens_the_residuals_for_a_random_start():
     effect = np.zeros((2, 40))
     effect[:, 5:35] = weights[:, None] * slopes
     closed = rows.copy()
-    StartSlopes(0, slice(5, 35), (2, 3), slopes).opened(weights).close(closed)
+    StartSlopes(0, slice(5, 35), (2, 3), slopes).opened(weights)(closed)
     values, axes = np.linalg.eigh(np.eye(40) + effect.T @ effect)
     np.testing.assert_allclose(closed, rows @ (axes / np.sqrt(values)) @ axes.T, atol=1e-12)
 
@@ -38,7 +38,7 @@ def test_the_slopes_are_what_a_wrong_start_does(config: str):
     log, wrong = clean_log(config), np.radians(0.2)
     problem = Problem(load_settings(config, {"free_start": True}), [log])
     theta = problem.parameters.start
-    (slopes,) = problem.start_slopes(theta)
+    (slopes,) = start_slopes(problem, theta)
     angle = log.angle.copy()
     angle[0, 1] += wrong
     off = Problem(problem.settings, [replace(log, angle=angle)]).residuals(theta[None])[0]
@@ -50,5 +50,5 @@ def test_the_slopes_are_what_a_wrong_start_does(config: str):
 def test_joints_that_follow_the_log_have_no_start_of_their_own():
     settings = load_settings("article-mech", {"free_start": True, "simulation.other_joints": "measured"})
     problem = Problem(settings, [clean_log("article-mech")])
-    (slopes,) = problem.start_slopes(problem.parameters.start)
+    (slopes,) = start_slopes(problem, problem.parameters.start)
     assert slopes.joints == (2,)

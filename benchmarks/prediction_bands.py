@@ -12,9 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid import load_settings
-from hydroid.estimate import FitSummary
 from hydroid.fitting.refinement import refine
-from hydroid.fitting.summary import noise_levels, parameter_estimates
+from hydroid.fitting.summary import account
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.band import prediction_bands
@@ -53,13 +52,7 @@ def fitted(settings: FitSettings, log: Log) -> IdentifiedModel:
     )
     theta = problem.parameters.from_unit(found.point[None])[0]
     known = uncertainty(problem, theta)
-    summary = FitSummary(
-        stage="mech",
-        estimate=parameter_estimates(problem, known),
-        covariance=known.posterior.stored(problem.parameters),
-        noise_deg=noise_levels(problem, known),
-    )
-    return IdentifiedModel(settings, theta, "fit", summary)
+    return IdentifiedModel(settings, theta, "fit", account(problem, known))
 
 
 def main() -> None:

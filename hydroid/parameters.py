@@ -71,10 +71,6 @@ class Parameter:
             return np.log(np.asarray(value) / self.lower) / np.log(self.upper / self.lower)
         return (np.asarray(value) - self.lower) / (self.upper - self.lower)
 
-    def width(self, value: float) -> float:
-        """Return the change of the value per change of its position there."""
-        return value * float(np.log(self.upper / self.lower)) if self.log else self.upper - self.lower
-
     def at(self, position: Array | float) -> Array:
         """Return the values at positions; the ends are the bounds to the last digit. Equations (15), (16)."""
         low, high = self.lower, self.upper
@@ -141,6 +137,11 @@ class ParameterSet:
         free = theta[:, self.free].T
         columns = [p.position(values) for p, values in zip(self._free, free, strict=True)]
         return np.clip(np.stack(columns, axis=1), 0.0, 1.0)
+
+    def width(self, theta: Array) -> Array:
+        """Change of each value per change of its position on its scale, at theta, shape (P,)."""
+        lower, upper = self.lower, self.upper
+        return np.where(self.log, theta * np.log(upper / np.where(self.log, lower, 1.0)), upper - lower)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.

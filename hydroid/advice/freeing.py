@@ -47,8 +47,7 @@ class Freeing:
         free = problem.parameters.free
         self._point = problem.parameters.to_unit(uncertainty.theta[None])[0]
         slopes = np.nan_to_num(np.hstack([at.slopes, at.prior_weight * at.prior_slopes])[free])
-        parameters = zip(problem.parameters.parameters, uncertainty.theta, free, strict=True)
-        widths = np.array([p.width(value) for p, value, is_free in parameters if is_free])
+        widths = problem.parameters.width(uncertainty.theta)[free]
         self._columns = slopes * (widths / at.scale[free])[:, None]
         self._prior_weight = at.prior_weight
 

@@ -1,7 +1,5 @@
 """What a reader must know before using an estimate, the most important first."""
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 
 from hydroid.findings import Finding
@@ -9,106 +7,78 @@ from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import FEW, ByLog
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import DirectionKind, Identifiability
-from hydroid.posterior.flags import Flag, ParameterStatus, Source
+from hydroid.posterior.flags import Flag, Source
 from hydroid.problem.problem import Problem
 
 _MOST_DIRECTIONS = 6
-_LOST_ABOVE = 1.0
-"""half of a 95 % interval, relative to the value, above which a quantity counts as open"""
 
 
 def fit_findings(fit: Fit) -> tuple[Finding, ...]:
     """Return what is to be said about a fit's way to its estimate."""
-    return (
-        *_endings(fit),
-        *_strains(fit),
-        *(Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable),
-        *_open_quantities(fit),
-    )
+    findings = [] if fit.refinements else [Finding("not refined", "warning")]
+    findings += [
+        Finding("not converged", "warning", (name,), {"ending": refinement.ending.value})
+        for name, refinement in fit.refinements.items()
+        if not refinement.converged
+    ]
+    for prior, score in fit.strains.items():
+        numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}
+        findings.append(Finding("strained prior", "warning", (prior,), numbers))
+    findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
+    # half of a 95 % interval as large as the value, or without end
+    lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)
+    return (*findings, *([Finding("quantities open", "note", tuple(lost))] if lost else []))
+
+
+def log_findings(logs: ByLog | None) -> tuple[Finding, ...]:
+    """Return which parameters differ from log to log by more than the noise explains."""
+    if logs is None or not logs.differing:
+        return ()
+    few = max(logs.freedom[np.isfinite(logs.freedom)], default=0.0) < FEW
+    return (Finding("few logs disagree" if few else "logs disagree", "warning", logs.differing),)
 
 
 def parameter_findings(
     problem: Problem, known: Uncertainty, logs: ByLog | None, directions: Identifiability | None
 ) -> tuple[Finding, ...]:
-    """Return what is to be said about what the logs determine."""
-    names = problem.parameters.names
-    return (
-        *_bounds(problem, known.status),
-        *log_findings(logs),
-        *_flags(names, known.status),
-        *_doubts(names, known.status),
-        *(() if directions is None else _directions(directions)),
-    )
-
-
-def log_findings(logs: ByLog | None) -> Iterator[Finding]:
-    """Yield which parameters differ from log to log by more than the noise explains."""
-    if logs is not None and logs.differing:
-        few = max(logs.freedom[np.isfinite(logs.freedom)], default=0.0) < FEW
-        yield Finding("few logs disagree" if few else "logs disagree", "warning", logs.differing)
-
-
-def _bounds(problem: Problem, statuses: Sequence[ParameterStatus]) -> Iterator[Finding]:
-    """Yield which parameters lie at a bound; a bound of 0 cannot be widened."""
+    """Return what is to be said about what the logs determine; a bound of 0 cannot be widened."""
     at: dict[tuple[str, str], list[str]] = {}
-    for parameter, status in zip(problem.parameters.parameters, statuses, strict=True):
-        if status.at_bound and status.flag is not Flag.NO_EFFECT:
+    kinds: dict[str, list[str]] = {
+        kind: [] for kind in ("no effect", "not identifiable", "prior only", "weakly identifiable")
+    }
+    diverging: list[str] = []
+    doubts: dict[str, float] = {}
+    for parameter, status in zip(problem.parameters.parameters, known.status, strict=True):
+        name, idle = parameter.name, status.flag is Flag.NO_EFFECT
+        if status.at_bound and not idle:
             zero = status.at_bound == "lower" and parameter.lower == 0
-            at.setdefault(("at zero" if zero else "at bound", status.at_bound), []).append(parameter.name)
-    for (kind, side), names in sorted(at.items(), reverse=True):
-        yield Finding(kind, "note" if kind == "at zero" else "warning", tuple(names), {"side": side})
+            at.setdefault(("at zero" if zero else "at bound", status.at_bound), []).append(name)
+        by_prior = status.source is Source.PRIOR and not idle
+        kinds.get(Source.PRIOR.value if by_prior else status.flag.value, []).append(name)
+        if status.diverges and status.flag is not Flag.FIXED:
+            diverging.append(name)
+        if status.doubt is not None:
+            doubts[name] = status.doubt
+    findings = [
+        Finding(kind, "note" if kind == "at zero" else "warning", tuple(names), {"side": side})
+        for (kind, side), names in sorted(at.items(), reverse=True)
+    ]
+    findings += log_findings(logs)
+    findings += [Finding(kind, "note", tuple(names)) for kind, names in kinds.items() if names]
+    if diverging:
+        findings.append(Finding("effect unknown", "warning", tuple(diverging)))
+    if doubts:
+        findings.append(
+            Finding("interval rough", "note", tuple(doubts), {"percent": 100 * max(doubts.values())})
+        )
+    return (*findings, *(() if directions is None else _combinations(directions)))
 
 
-def _flags(names: Sequence[str], statuses: Sequence[ParameterStatus]) -> Iterator[Finding]:
-    kinds = {
-        Flag.NO_EFFECT: "no effect",
-        Flag.UNIDENTIFIABLE: "not identifiable",
-        Source.PRIOR: "prior only",
-        Flag.WEAK: "weakly identifiable",
-    }
-    which: dict[str, Flag | Source] = {
-        name: s.source if s.source is Source.PRIOR and s.flag is not Flag.NO_EFFECT else s.flag
-        for name, s in zip(names, statuses, strict=True)
-    }
-    for flag, kind in kinds.items():
-        if chosen := tuple(name for name, its in which.items() if its is flag):
-            yield Finding(kind, "note", chosen)
-
-
-def _doubts(names: Sequence[str], statuses: Sequence[ParameterStatus]) -> Iterator[Finding]:
-    pairs = list(zip(names, statuses, strict=True))
-    if diverging := tuple(n for n, s in pairs if s.diverges and s.flag is not Flag.FIXED):
-        yield Finding("effect unknown", "warning", diverging)
-    if doubtful := {n: s.doubt for n, s in pairs if s.doubt is not None}:
-        yield Finding("interval rough", "note", tuple(doubtful), {"percent": 100 * max(doubtful.values())})
-
-
-def _directions(found: Identifiability) -> Iterator[Finding]:
-    """Yield the combinations that the logs leave open; a single parameter has its flag."""
-    single = DirectionKind.NO_EFFECT, DirectionKind.SINGLE
-    several = [one for one in found.unidentifiable if one.kind not in single]
-    for one in several[:_MOST_DIRECTIONS]:
-        kind = "common scale" if one.kind is DirectionKind.COMMON_SCALE else "combination"
-        yield Finding(kind, "note", tuple(one.parameters))
+def _combinations(directions: Identifiability) -> list[Finding]:
+    """What the logs leave open of several parameters together; a single one has its flag."""
+    kinds = {DirectionKind.COMMON_SCALE: "common scale", DirectionKind.COMBINATION: "combination"}
+    several = [one for one in directions.unidentifiable if one.kind in kinds]
+    findings = [Finding(kinds[one.kind], "note", tuple(one.parameters)) for one in several[:_MOST_DIRECTIONS]]
     if more := len(several[_MOST_DIRECTIONS:]):
-        yield Finding("more combinations", "note", (), {"count": str(more)})
-
-
-def _endings(fit: Fit) -> Iterator[Finding]:
-    if fit.refinement is None:
-        yield Finding("not refined", "warning")
-    for name, refinement in fit.refinements.items():
-        if not refinement.ending.converged:
-            yield Finding("not converged", "warning", (name,), {"ending": refinement.ending.value})
-
-
-def _strains(fit: Fit) -> Iterator[Finding]:
-    for prior, score in fit.strains.items():
-        side = "above" if score > 0 else "below"
-        yield Finding("strained prior", "warning", (prior,), {"score": abs(score), "side": side})
-
-
-def _open_quantities(fit: Fit) -> Iterator[Finding]:
-    lost = [q.label for q in fit.quantities.scalars.values() if not q.within <= _LOST_ABOVE]
-    if lost:
-        yield Finding("quantities open", "note", tuple(dict.fromkeys(lost)))
+        findings.append(Finding("more combinations", "note", (), {"count": str(more)}))
+    return findings

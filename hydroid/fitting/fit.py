@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
@@ -46,19 +45,19 @@ class Estimate:
 
     @property
     def usable(self) -> bool:
-        """Whether it could be simulated: a compromise between sets that could need not."""
+        """Whether it could be simulated: the mean of several candidates that could need not."""
         return bool(np.isfinite(self.rms))
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What a fit found.
+    """The estimates of a fit, and what is known of the one to use.
 
-    estimates: by name; `final` names the one to use. front: the non-dominated candidates, shape (n, P), and
-    their objectives. history: shape (G, len(HISTORY)). refinements: by the estimate that each gave.
-    uncertainty, identifiability, quantities: of the final estimate. strains: standard
-    deviations between it and the priors that are far from it, by name. seconds:
-    wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
+    estimates: by name, that of the search first; `final` names the one to use. front: the non-dominated
+    candidates, shape (n, P), and their objectives. history: shape (G, len(HISTORY)). refinements: by the
+    estimate that each gave. uncertainty, identifiability, quantities: of the final estimate. strains:
+    standard deviations between it and the priors that are far from it, by name. seconds: wall-clock time of
+    "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
     estimates: dict[str, Estimate]
@@ -92,37 +91,19 @@ class Fit:
         """The search's own estimate, before the refinement."""
         return next(iter(self.estimates.values()))
 
-    @property
-    def effects(self) -> Array:
-        """Rms change of the response per 1 % of each parameter [rad], shape (P,)."""
-        return self.uncertainty.jacobian.effects
-
-    @property
-    def without_effect(self) -> NDArray[np.bool_]:
-        """Parameters that the outputs do not feel at all, shape (P,)."""
-        return self.uncertainty.jacobian.without_effect
-
 
 class Watcher(Protocol):
     """Takes the progress of a fit."""
 
     def generation(self, row: Array) -> None:
         """Take a row of HISTORY."""
-        ...
 
     def refining(self, simulated: int, rms: float) -> None:
         """Take the number of simulations of the refinement, and its rms error [rad] so far."""
-        ...
 
 
-class Silent:
+class Silent(Watcher):
     """Progress that is not shown."""
-
-    def generation(self, row: Array) -> None:
-        """Do nothing."""
-
-    def refining(self, simulated: int, rms: float) -> None:
-        """Do nothing."""
 
 
 def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints | None = None) -> Fit:
@@ -137,29 +118,33 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         RunError: every simulated candidate diverged.
     """
     watch, checkpoints = watch or Silent(), {} if checkpoints is None else checkpoints
-    began = time.perf_counter()
+    times, settings = [time.perf_counter()], problem.settings
     searched = search(problem, watch.generation, watch.refining, checkpoints)
-    estimates = _usable_first(_estimates(problem, _candidates(problem, searched)))
+    estimates = _estimates(problem, _candidates(problem, searched))
     final, last = next(iter(estimates)), problem
     start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
-    search_ended = time.perf_counter()
+    times.append(time.perf_counter())
     refinements = dict[str, Descent]()
-    for name, last in _refined(problem):
-        assert problem.settings.refinement is not None
-        result = refine(last, start.theta, problem.settings.refinement, watch.refining, checkpoints, name)
-        if not result.converged:
-            _log.warning(
-                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
-                "optimum.",
-                result.ending.value,
-                name,
-            )
-        estimates |= _estimates(last, {name: last.parameters.from_unit(result.point[None])[0]})
-        refinements[name], start, final = result, estimates[name], name
-    refined = time.perf_counter()
+    if settings.refinement is not None:
+        for final in ("refined", "joint") if settings.joint_refinement else ("refined",):
+            last = problem if final == "refined" else problem.varied(settings.freed())
+            result = refine(last, start.theta, settings.refinement, watch.refining, checkpoints, final)
+            if not result.converged:
+                _log.warning(
+                    "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
+                    "optimum.",
+                    result.ending.value,
+                    final,
+                )
+            estimates |= _estimates(last, {final: last.parameters.from_unit(result.point[None])[0]})
+            refinements[final], start = result, estimates[final]
+    times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
-    directions = identifiability(last, about)
-    determined = quantities(last, about)
+    directions, determined = identifiability(last, about), quantities(last, about)
+    scores = zip(last.priors.names, last.priors.scores(about.theta[None])[0].tolist(), strict=True)
+    farthest = sorted(scores, key=lambda pair: -abs(pair[1]))
+    strains = {name: score for name, score in farthest if abs(score) > STRAINED_ABOVE}
+    seconds = np.diff([*times, time.perf_counter()]).tolist()
     return Fit(
         estimates,
         final,
@@ -169,12 +154,8 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         about,
         directions,
         determined,
-        _strained(last, about.theta),
-        {
-            "search": search_ended - began,
-            "refinement": refined - search_ended,
-            "uncertainty": time.perf_counter() - refined,
-        },
+        strains,
+        dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True)),
     )
 
 
@@ -184,26 +165,9 @@ def _slopes(problem: Problem, descent: Descent | None) -> Array | None:
         return None
     free, samples = problem.parameters.free, problem.measured.size
     theta = problem.parameters.from_unit(descent.point[None])[0]
-    width = np.array([p.width(theta[i]) for i, p in enumerate(problem.parameters.parameters) if free[i]])
+    width = problem.parameters.width(theta)[free]
     scale = estimate_box(problem.parameters, theta).scale[free]
     return descent.jacobian[:samples].T * (scale / width)[:, None]
-
-
-def _strained(problem: Problem, theta: Array) -> dict[str, float]:
-    """Standard deviations between theta, (P,), and the priors that it strains, the farthest first."""
-    scores = problem.priors.scores(theta[None])[0].tolist()
-    by_distance = sorted(zip(problem.priors.names, scores, strict=True), key=lambda pair: -abs(pair[1]))
-    return {name: score for name, score in by_distance if abs(score) > STRAINED_ABOVE}
-
-
-def _refined(problem: Problem) -> list[tuple[str, Problem]]:
-    """Names of the estimates that refinements give, with what each refines, in order."""
-    if problem.settings.refinement is None:
-        return []
-    refined = [("refined", problem)]
-    if problem.settings.joint_refinement:
-        refined.append(("joint", problem.varied(problem.settings.freed())))
-    return refined
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
@@ -212,42 +176,30 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     if searched.single:
         return {"best": compromise.best(theta, searched.population.objectives[:, 0])}
     segments = memo.evaluate(theta).segments
-    found = {
+    candidates = {
         "average": compromise.average(theta, segments),
         "utopia": compromise.utopia(theta, segments),
         "best": memo.best,  # over the whole record it may have left the population
     }
     first = problem.settings.search.compromise
-    return {first: found[first]} | found
+    return {first: candidates[first]} | candidates
 
 
 def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Estimate]:
-    """Simulate candidates by name, each of shape (P,), and measure them."""
+    """Simulate candidates by name, each of shape (P,), and measure them; those that diverged come last."""
     theta = np.array(list(candidates.values()))
     responses = problem.responses(theta)
     errors = np.concatenate([channel.residual(responses) for channel in problem.channels], axis=1)
     objective = problem.settings.objective
     segments = segment_objectives(errors, problem.measured, problem.bounds, objective)
     overall, rms = overall_objective(errors, problem.measured, objective), problem.rms(errors)
-    return {
-        name: Estimate(
-            name,
-            theta[i],
-            segments[i],
-            float(overall[i]),
-            float(rms[i]),
-            tuple(r.angle[i] for r in responses),
-        )
-        for i, name in enumerate(candidates)
-    }
-
-
-def _usable_first(estimates: dict[str, Estimate]) -> dict[str, Estimate]:
-    """The same with those that diverged behind the others; the first is the search's own."""
-    for name, estimate in estimates.items():
-        if not estimate.usable:
+    estimates: list[Estimate] = []
+    for i, name in enumerate(candidates):
+        angles = tuple(response.angle[i] for response in responses)
+        estimates.append(Estimate(name, theta[i], segments[i], float(overall[i]), float(rms[i]), angles))
+        if not estimates[-1].usable:
             _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
-    return dict(sorted(estimates.items(), key=lambda item: not item[1].usable))
+    return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}
 
 
 def _front(searched: Searched) -> tuple[Array, Evaluation]:

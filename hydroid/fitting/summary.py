@@ -5,7 +5,7 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
-from hydroid.posterior.by_log import ByLog, by_log, left_out_errors
+from hydroid.posterior.by_log import by_log, left_out_errors
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
 from hydroid.problem.problem import Problem
@@ -16,26 +16,26 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     last = problem.varied(problem.settings.freed()) if fit.final == "joint" else problem
     objective = 1.0 if problem.settings.objective.relative else 180 / np.pi
     known = account(last, fit.uncertainty, fit.identifiability)
-    ending = None if fit.refinement is None else fit.refinement.ending
+    estimates = {
+        e.name: NamedEstimate(
+            values=problem.parameters.mapping(e.theta),
+            rms_deg=finite(np.degrees(e.rms)),
+            objective=finite(objective * e.overall),
+        )
+        for e in fit.estimates.values()
+    }
     own = {
         "joints": problem.active_joints,
         "final": fit.final,
-        "converged": None if ending is None else fit.converged,
-        "ending": None if ending is None else ending.value,
+        "converged": fit.converged if fit.refinements else None,
+        "ending": [r.ending.value for r in fit.refinements.values()][-1] if fit.refinements else None,
         "rms_deg": finite(np.degrees(fit.best.rms)),
         "seed": problem.settings.search.seed,
         "simulations": int(fit.history[-1, 2]),
         "diverged": int(fit.history[-1, 3]),
         "findings": (*fit_findings(fit), *known.findings),
         "strained_priors": dict(fit.strains),
-        "estimates": {
-            e.name: NamedEstimate(
-                values=problem.parameters.mapping(e.theta),
-                rms_deg=finite(np.degrees(e.rms)),
-                objective=finite(objective * e.overall),
-            )
-            for e in fit.estimates.values()
-        },
+        "estimates": estimates,
         "quantities": fit.quantities.scalars,
         "curves": fit.quantities.curves,
     }
@@ -44,37 +44,10 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 
 def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:
     """Return an estimate with what its logs say about it, whatever led to it."""
-    logs = by_log(problem, known)
-    return FitSummary(
-        stage=problem.settings.stage,
-        estimate=parameter_estimates(problem, known, logs),
-        findings=parameter_findings(problem, known, logs, directions),
-        covariance=known.posterior.stored(problem.parameters),
-        noise_deg=noise_levels(problem, known),
-        left_out_deg={
-            f"q{joint}": tuple(np.degrees(errors).tolist())
-            for joint, errors in left_out_errors(problem, known).items()
-        },
-    )
-
-
-def noise_levels(problem: Problem, known: Uncertainty) -> dict[str, float]:
-    """Standard deviation of each angle's noise over all logs [deg]."""
-    squares: dict[str, list[float]] = {}
-    for channel, noise in zip(problem.channels, known.noise, strict=True):
-        if channel.quantity == "angle":
-            squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
-    return {angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()}
-
-
-def parameter_estimates(
-    problem: Problem, known: Uncertainty, logs: ByLog | None = None
-) -> dict[str, ParameterEstimate]:
-    """Return each parameter with its uncertainty, by name."""
-    count, scale = len(known.theta), known.jacobian.scale
+    logs, scale, count = by_log(problem, known), known.jacobian.scale, len(known.theta)
     relative = np.full(count, np.nan) if logs is None else logs.relative
     by_logs = np.full((count, 2), np.nan) if logs is None else logs.interval
-    return {
+    estimate = {
         parameter.name: ParameterEstimate(
             value=float(known.theta[i]),
             unit=parameter.unit,
@@ -90,3 +63,18 @@ def parameter_estimates(
         )
         for i, (parameter, status) in enumerate(zip(problem.parameters.parameters, known.status, strict=True))
     }
+    squares: dict[str, list[float]] = {}
+    for channel, noise in zip(problem.channels, known.noise, strict=True):
+        if channel.quantity == "angle":
+            squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
+    return FitSummary(
+        stage=problem.settings.stage,
+        estimate=estimate,
+        findings=parameter_findings(problem, known, logs, directions),
+        covariance=known.posterior.stored(problem.parameters),
+        noise_deg={angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()},
+        left_out_deg={
+            f"q{joint}": tuple(np.degrees(errors).tolist())
+            for joint, errors in left_out_errors(problem, known).items()
+        },
+    )

@@ -36,7 +36,7 @@ def test_every_estimate_of_every_parameter_is_in_the_table():
     assert column(table, "name") == list(MODEL)
     for name, estimate in fit.estimates.items():
         assert column(table, name) == list(estimate.theta)
-    assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.effects))
+    assert column(table, "effect [deg]") == pytest.approx(np.degrees(fit.uncertainty.jacobian.effects))
     assert column(table, "from") == pytest.approx(fit.uncertainty.interval[:, 0])
     assert column(table, "to") == pytest.approx(fit.uncertainty.interval[:, 1])
     assert set(table.optional) < set(table.header)

@@ -90,8 +90,8 @@ def refit(arm, settings, log: Log, truth: np.ndarray, count: int) -> np.ndarray:
         problem = Problem(known, [replace(log, angle=log.angle + noise)])
         start = truth * np.exp(rng.uniform(-0.05, 0.05, len(truth)))
         how = RefinementSettings(gain_tolerance=1e-6)
-        point = refine(problem, start, how, lambda n, rms: None).point
-        errors.append(problem.parameters.from_unit(point[None])[0] / truth - 1)
+        point = refine(problem, start, how).point
+        errors.append(problem.parameters.from_unit(point) / truth - 1)
     return np.array(errors)
 
 

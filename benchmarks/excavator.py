@@ -62,7 +62,7 @@ def fitted(settings: FitSettings, logs: list[hydroid.Log]) -> tuple[IdentifiedMo
     searched = search(problem, lambda row: None, lambda simulated, rms: None, {})
     assert settings.refinement is not None
     result = refine(problem, searched.theta[0], settings.refinement, lambda simulated, rms: None)
-    theta = problem.parameters.from_unit(result.point[None])[0]
+    theta = problem.parameters.from_unit(result.point)
     return (
         IdentifiedModel(settings, theta, "a fit"),
         result,

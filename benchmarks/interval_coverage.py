@@ -92,8 +92,8 @@ def study(correlation_time: float, logs: int, seconds: float, *, start: bool, op
         rng = np.random.default_rng([seed, int(1000 * phi)])
         one = Problem(settings, [with_noise(clean, phi, rng, start=start)])
         first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-        found = refine(one, first, settings.refinement, lambda n, rms: None)
-        theta = one.parameters.from_unit(found.point[None])[0]
+        found = refine(one, first, settings.refinement)
+        theta = one.parameters.from_unit(found.point)
         result = uncertainty(one, theta)
         estimates.append(theta[free])
         deviations.append(result.standard_deviation[free])

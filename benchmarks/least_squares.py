@@ -112,15 +112,15 @@ def problems() -> dict[str, Callable[[], tuple[Problem, np.ndarray]]]:
 
     def stage_2() -> tuple[Problem, np.ndarray]:
         mech, theta = searched("fit-mech", ga)
-        point = refine(mech, theta, RefinementSettings(), lambda n, rms: None).point
-        values = mech.parameters.mapping(mech.parameters.from_unit(point[None])[0])
+        point = refine(mech, theta, RefinementSettings()).point
+        values = mech.parameters.mapping(mech.parameters.from_unit(point))
         masses = {f"parameters.{n}.fixed": v for n, v in values.items() if n[0] == "M"}
         return searched("fit-hyd", ga | masses)
 
     def joint() -> tuple[Problem, np.ndarray]:
         problem, theta = stage_2()
-        point = refine(problem, theta, RefinementSettings(), lambda n, rms: None).point
-        return problem.varied(problem.settings.freed()), problem.parameters.from_unit(point[None])[0]
+        point = refine(problem, theta, RefinementSettings()).point
+        return problem.varied(problem.settings.freed()), problem.parameters.from_unit(point)
 
     def article() -> tuple[Problem, np.ndarray]:
         settings = load_settings("article-mech")

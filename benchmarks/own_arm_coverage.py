@@ -72,8 +72,8 @@ def study(truth: IdentifiedModel, settings: FitSettings, fits: int) -> None:
         problem = Problem(settings, logs)
         start = true * np.random.default_rng(number).uniform(0.95, 1.05, len(true))
         assert settings.refinement is not None
-        found = refine(problem, start, settings.refinement, lambda n, rms: None)
-        theta = problem.parameters.from_unit(found.point[None])[0]
+        found = refine(problem, start, settings.refinement)
+        theta = problem.parameters.from_unit(found.point)
         known = uncertainty(problem, theta)
         errors.append(theta - true)
         deviations.append(known.standard_deviation)

@@ -50,7 +50,7 @@ def fitted(settings: FitSettings, log: Log) -> IdentifiedModel:
     found = refine(
         problem, problem.parameters.vector(TRUTH, "truth"), settings.refinement, lambda n, rms: None
     )
-    theta = problem.parameters.from_unit(found.point[None])[0]
+    theta = problem.parameters.from_unit(found.point)
     known = uncertainty(problem, theta)
     return IdentifiedModel(settings, theta, "fit", account(problem, known))
 

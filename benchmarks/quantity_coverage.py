@@ -78,8 +78,8 @@ def main() -> None:
         log = replace(clean, angle=clean.angle + noise)
         one = Problem(settings, [log])
         first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-        found = refine(one, first, settings.refinement, lambda n, rms: None)
-        theta = one.parameters.from_unit(found.point[None])[0]
+        found = refine(one, first, settings.refinement)
+        theta = one.parameters.from_unit(found.point)
         told = uncertainty(one, theta)
         known = told.posterior.propagate(values, positive)
         intervals.append(known.interval)

@@ -115,8 +115,8 @@ def one(case: str, k: int, seconds: float) -> dict[str, Any]:
     start = problem.parameters.vector(TRUTH, "truth")
     start *= np.random.default_rng([k, 5]).uniform(0.95, 1.05, start.size)
     assert model.refinement is not None
-    found = refine(problem, start, model.refinement, lambda n, rms: None)
-    theta = problem.parameters.from_unit(found.point[None])[0]
+    found = refine(problem, start, model.refinement)
+    theta = problem.parameters.from_unit(found.point)
     result = missing_terms(problem, uncertainty(problem, theta))
     mine = [t for t in result.tests if own(t.term.settings.quantity) == case]
     return {

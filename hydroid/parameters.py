@@ -112,31 +112,27 @@ class ParameterSet:
     @property
     def has_start(self) -> bool:
         """Whether a free parameter states where a search starts."""
-        return any(p.start is not None for p in self._free)
+        return any(p.start is not None and p.fixed is None for p in self.parameters)
 
     @property
     def start(self) -> Array:
         """Where a search starts, shape (P,): as stated, or in the middle of the bounds on their scale."""
-        middle = self.from_unit(np.full((1, len(self._free)), 0.5))[0]
+        middle = self.from_unit(np.full(int(self.free.sum()), 0.5))
         stated = [p.start if p.fixed is None else None for p in self.parameters]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 
-    @property
-    def _free(self) -> list[Parameter]:
-        return [p for p in self.parameters if p.fixed is None]
-
     def from_unit(self, unit: Array) -> Array:
-        """Map points of the unit box, shape (n, free), to theta, shape (n, P)."""
-        theta = np.tile([p.fixed if p.fixed is not None else 0.0 for p in self.parameters], (len(unit), 1))
-        for column, p, positions in zip(np.flatnonzero(self.free), self._free, unit.T, strict=True):
-            theta[:, column] = p.at(positions)
+        """Map points of the unit box, shape (.., free), to theta, shape (.., P)."""
+        theta, places = np.empty((*unit.shape[:-1], len(self.parameters))), iter(np.moveaxis(unit, -1, 0))
+        for column, p in enumerate(self.parameters):
+            theta[..., column] = p.at(next(places)) if p.fixed is None else p.fixed
         return theta
 
     def to_unit(self, theta: Array) -> Array:
-        """Map theta, shape (n, P), to the unit box, shape (n, free); values beyond a bound are clipped."""
-        free = theta[:, self.free].T
-        columns = [p.position(values) for p, values in zip(self._free, free, strict=True)]
-        return np.clip(np.stack(columns, axis=1), 0.0, 1.0)
+        """Map theta, shape (.., P), to the unit box, shape (.., free); values beyond a bound are clipped."""
+        values = np.moveaxis(theta, -1, 0)
+        columns = [p.position(v) for p, v in zip(self.parameters, values, strict=True) if p.fixed is None]
+        return np.clip(np.stack(columns, axis=-1), 0.0, 1.0)
 
     def width(self, theta: Array) -> Array:
         """Change of each value per change of its position on its scale, at theta, shape (P,)."""

@@ -45,7 +45,7 @@ class Freeing:
     def __init__(self, problem: Problem, uncertainty: Uncertainty, model: ExtendedModel) -> None:
         at, self._problem, self._model = uncertainty.jacobian, problem, model
         free = problem.parameters.free
-        self._point = problem.parameters.to_unit(uncertainty.theta[None])[0]
+        self._point = problem.parameters.to_unit(uncertainty.theta)
         slopes = np.nan_to_num(np.hstack([at.slopes, at.prior_weight * at.prior_slopes])[free])
         widths = problem.parameters.width(uncertainty.theta)[free]
         self._columns = slopes * (widths / at.scale[free])[:, None]

@@ -148,8 +148,8 @@ def _uncertainty(
     if better is None:
         return study
     refinement = problem.settings.refinement or RefinementSettings()
-    unit = refine(problem, better, refinement, lambda simulated, rms: None).point
-    theta = problem.parameters.from_unit(unit[None])[0]
+    unit = refine(problem, better, refinement).point
+    theta = problem.parameters.from_unit(unit)
     values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
     moved = f"A profile found a better optimum. It was refined, and all results are of it: {values}."
     return replace(at(theta, f"a better optimum than that of {source}"), moved=moved)

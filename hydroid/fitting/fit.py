@@ -136,7 +136,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
                     result.ending.value,
                     final,
                 )
-            estimates |= _estimates(last, {final: last.parameters.from_unit(result.point[None])[0]})
+            estimates |= _estimates(last, {final: last.parameters.from_unit(result.point)})
             refinements[final], start = result, estimates[final]
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
@@ -164,7 +164,7 @@ def _slopes(problem: Problem, descent: Descent | None) -> Array | None:
     if descent is None or not len(descent.jacobian):
         return None
     free, samples = problem.parameters.free, problem.measured.size
-    theta = problem.parameters.from_unit(descent.point[None])[0]
+    theta = problem.parameters.from_unit(descent.point)
     width = problem.parameters.width(theta)[free]
     scale = estimate_box(problem.parameters, theta).scale[free]
     return descent.jacobian[:samples].T * (scale / width)[:, None]

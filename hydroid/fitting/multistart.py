@@ -167,7 +167,7 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
 
 
 def _theta(problem: Problem, result: Descent) -> Array:
-    return problem.parameters.from_unit(result.point[None])[0]
+    return problem.parameters.from_unit(result.point)
 
 
 def _moves(part: Problem, whole: Problem) -> bool:

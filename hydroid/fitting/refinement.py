@@ -48,7 +48,7 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[int, float], None],
+    progress: Callable[[int, float], None] | None = None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Descent:
@@ -73,12 +73,12 @@ def refine(
     checkpoints = {} if checkpoints is None else checkpoints
     stored = checkpoints.get(name)
     if stored is None:
-        now = _estimated(problem, problem.parameters.to_unit(theta[None])[0])
+        now = _estimated(problem, problem.parameters.to_unit(theta))
     else:
         own = float(stored["weight"]), stored["anchor"], int(stored["noises"])
         now = _Refinement(Descent.from_arrays(stored), *own)
-    if stored is not None and now.descent.ended:
-        return now.descent
+        if now.descent.ended:
+            return now.descent
     residuals = _residuals(problem, now)
     with saving(checkpoints, name) as keep:
         while not now.descent.ended:
@@ -88,8 +88,9 @@ def refine(
                 now = after
                 keep(now.arrays)
             now = replace(now, descent=step(now.descent, residuals, settings))
-            error = problem.rms(now.descent.residual[None, : problem.measured.size])[0]
-            progress(now.descent.evaluations, float(error))
+            if progress is not None:
+                error = problem.rms(now.descent.residual[None, : problem.measured.size])[0]
+                progress(now.descent.evaluations, float(error))
         keep(now.arrays)
     _log.info("refinement of %d parameters: %s", now.descent.point.size, now.descent)
     return now.descent
@@ -98,10 +99,10 @@ def refine(
 def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
     """Begin at a point of the unit box, (p,), with the noise there; `row`, (R,): its residuals, if known."""
     theta, weight = problem.parameters.from_unit(unit[None]), 0.0
-    rows = with_open_start(problem, theta[0]).residuals(theta) if row is None else row[None]
+    row = with_open_start(problem, theta[0]).residuals(theta)[0] if row is None else row
     if len(problem.priors) or problem.leaves_start_open:
-        weight = prior_weight(problem.channels, rows[0], problem.settings.objective)
-    return _Refinement(start(unit, _with_priors(problem, rows, unit[None], weight)[0]), weight, unit)
+        weight = prior_weight(problem.channels, row, problem.settings.objective)
+    return _Refinement(start(unit, np.append(row, weight * problem.priors.scores(theta))), weight, unit)
 
 
 def _following(problem: Problem, now: _Refinement) -> _Refinement:
@@ -119,17 +120,10 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
 
 def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:
     """What least squares minimises: points of the unit box, (n, p), to residuals and weighed scores."""
-    opened = with_open_start(problem, problem.parameters.from_unit(now.anchor[None])[0])
+    opened = with_open_start(problem, problem.parameters.from_unit(now.anchor))
 
     def residuals(unit: Array) -> Array:
-        rows = opened.residuals(problem.parameters.from_unit(unit))
-        return _with_priors(problem, rows, unit, now.weight)
+        theta = problem.parameters.from_unit(unit)
+        return np.hstack([opened.residuals(theta), now.weight * problem.priors.scores(theta)])
 
     return residuals
-
-
-def _with_priors(problem: Problem, rows: Array, unit: Array, weight: float) -> Array:
-    """Rows of residuals, (n, R), with the scores of the priors at points of the unit box, (n, p)."""
-    if not len(problem.priors):
-        return rows
-    return np.column_stack([rows, weight * problem.priors.scores(problem.parameters.from_unit(unit))])

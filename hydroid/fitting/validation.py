@@ -93,17 +93,17 @@ class Prediction:
         """What the prediction shows: its error, and whether the fitted logs lead to expect it."""
         numbers = {"rms": self.rms_deg}
         if bands := list(self.bands.values()):
-            inside = 100 * min(band.inside for band in bands)
-            expected = degrees(sqrt(sum(band.expected**2 for band in bands) / len(bands)))
-            numbers |= {"inside": inside, "expected": expected}
+            numbers["inside"] = 100 * min(band.inside for band in bands)
+            numbers["expected"] = degrees(sqrt(sum(band.expected**2 for band in bands) / len(bands)))
         kinds = {True: "error as expected", False: "error not expected", None: "error without band"}
         level = "warning" if self.as_expected is False else "note"
         return Finding(kinds[self.as_expected], level, (self.fit, Path(self.log.source).name), numbers)
 
     def plain(self) -> list[dict[str, Any]]:
         """Return one mapping per joint, as JSON has them (docs/json.md)."""
-        return [
-            {
+        rows: list[dict[str, Any]] = []
+        for joint, indices in self.indices.items():
+            row: dict[str, Any] = {
                 "fit": self.fit,
                 "log": self.log.source,
                 "joint": joint,
@@ -111,31 +111,29 @@ class Prediction:
                 "rms_deg": finite(degrees(indices.rms)),
                 "max_deg": finite(degrees(indices.largest)),
                 "fit_percent": finite(indices.fit),
-                **_plain(self.bands.get(joint)),
             }
-            for joint, indices in self.indices.items()
-        ]
-
-
-def error_indices(measured: Array, simulated: Array) -> ErrorIndices:
-    """Compare a simulated response with a measured one [rad], both of shape (T,)."""
-    return pooled_indices([(measured, simulated)])
+            if (band := self.bands.get(joint)) is not None:
+                row |= {
+                    "noise_deg": degrees(band.noise),
+                    "expected_deg": finite(degrees(band.expected)),
+                    "model_error_deg": degrees(band.model_error),
+                    "inside_percent": 100 * band.inside,
+                    "model_limits": band.model_limits,
+                }
+            rows.append(row)
+        return rows
 
 
 def pooled_indices(pairs: Sequence[tuple[Array, Array]]) -> ErrorIndices:
-    """Compare several channels at once: measured and simulated [rad], both of shape (T,), T of each its own.
+    """Compare channels at once: measured and simulated [rad] of each, both of shape (T,).
 
     In `fit` each channel has its own mean: how far apart the poses of two joints are is no motion.
     """
     error = np.concatenate([measured - simulated for measured, simulated in pairs])
     motion = np.concatenate([measured - measured.mean() for measured, _ in pairs])
     rms, spread = (float(np.sqrt(np.mean(a**2))) for a in (error, motion))
-    return ErrorIndices(
-        float(np.mean(np.abs(error))),
-        rms,
-        float(np.max(np.abs(error))),
-        100 * (1 - rms / spread) if spread > STILL else float("nan"),
-    )
+    fit = 100 * (1 - rms / spread) if spread > STILL else float("nan")
+    return ErrorIndices(float(np.mean(np.abs(error))), rms, float(np.max(np.abs(error))), fit)
 
 
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:
@@ -146,36 +144,27 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     """
     joints = tuple(model.settings.outputs)
     response = predict(model, log, joints)
-    return Prediction(
-        model.name, log, joints, {model.name: response}, prediction_bands(model, log, response), unseen
-    )
+    bands = prediction_bands(model, log, response)
+    return Prediction(model.name, log, joints, {model.name: response}, bands, unseen)
 
 
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
     """Return what the estimates of a fit make of its own logs, the final estimate first."""
     known = fit.uncertainty.posterior
-    slopes = fit.uncertainty.jacobian.slopes[known.box.varied]
-    bands: dict[int, dict[int, Band]] = {}
+    slopes = np.nan_to_num(fit.uncertainty.jacobian.slopes[known.box.varied])
+    bands: list[dict[int, Band]] = [{} for _ in problem.logs]
     for channel, noise in zip(problem.channels, fit.uncertainty.noise, strict=True):
         if channel.quantity == "angle":
-            sd = known.sd(np.nan_to_num(slopes[:, channel.rows])) / channel.weight
-            level = noise.level / channel.weight
+            sd, level = known.sd(slopes[:, channel.rows]) / channel.weight, noise.level / channel.weight
             error = channel.measured - fit.best.responses[channel.log][:, channel.column]
             half = known.quantile * np.hypot(sd, level)
             inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
             expected = float(np.sqrt(np.mean(sd**2) + level**2))
-            bands.setdefault(channel.log, {})[channel.joint] = Band(
-                level, half, inside, rms, expected, np.inf
-            )
-    names = [fit.final, *(name for name in fit.estimates if name != fit.final)]
+            bands[channel.log][channel.joint] = Band(level, half, inside, rms, expected, np.inf)
+    names, joints = dict.fromkeys([fit.final, *fit.estimates]), tuple(problem.settings.outputs)
     return tuple(
         Prediction(
-            fit.final,
-            log,
-            tuple(problem.settings.outputs),
-            {name: fit.estimates[name].responses[i] for name in names},
-            bands.get(i, {}),
-            unseen=False,
+            fit.final, log, joints, {n: fit.estimates[n].responses[i] for n in names}, bands[i], unseen=False
         )
         for i, log in enumerate(problem.logs)
     )
@@ -191,19 +180,6 @@ def without_one(model: IdentifiedModel, logs: Sequence[Log], left_out: int) -> I
         raise SettingsError("needs two logs or more", where="--leave-one-out")
     problem = Problem(model.settings, [log for i, log in enumerate(logs) if i != left_out])
     refinement = model.settings.refinement or RefinementSettings()
-    unit = refine(problem, model.theta, refinement, lambda simulated, rms: None).point
-    theta = problem.parameters.from_unit(unit[None])[0]
+    theta = problem.parameters.from_unit(refine(problem, model.theta, refinement).point)
     name = f"{model.name} without {Path(logs[left_out].source).stem}"
     return IdentifiedModel(model.settings, theta, name, account(problem, uncertainty(problem, theta)))
-
-
-def _plain(band: Band | None) -> dict[str, Any]:
-    if band is None:
-        return {}
-    return {
-        "noise_deg": degrees(band.noise),
-        "expected_deg": finite(degrees(band.expected)),
-        "model_error_deg": degrees(band.model_error),
-        "inside_percent": 100 * band.inside,
-        "model_limits": band.model_limits,
-    }

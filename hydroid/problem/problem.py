@@ -128,7 +128,7 @@ class Problem:
     def start(self) -> Array | None:
         """The point of the search's unit box where it starts, shape (p,); None: not stated."""
         searched = self.priors.searched
-        return searched.to_unit(searched.start[None])[0] if searched.has_start else None
+        return searched.to_unit(searched.start) if searched.has_start else None
 
     def evaluate(self, theta: Array) -> Evaluation:
         """Evaluate theta, shape (n, P); memory does not grow with n beyond the result."""

@@ -8,7 +8,7 @@ from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
-from hydroid.fitting.validation import error_indices, fitted, pooled_indices
+from hydroid.fitting.validation import fitted, pooled_indices
 from hydroid.reporting.page import log_names
 from hydroid.reporting.parameters_report import parameter_table
 from hydroid.reporting.predictions import error_table
@@ -80,7 +80,7 @@ def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
 
 def test_a_joint_that_moves_by_rounding_has_no_fit():
     rest = 0.3 + 1e-16 * np.arange(50)
-    assert np.isnan(error_indices(rest, rest + 0.1).fit)
+    assert np.isnan(pooled_indices([(rest, rest + 0.1)]).fit)
 
 
 @pytest.mark.parametrize(

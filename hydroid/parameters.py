@@ -136,8 +136,8 @@ class ParameterSet:
 
     def width(self, theta: Array) -> Array:
         """Change of each value per change of its position on its scale, at theta, shape (P,)."""
-        lower, upper = self.lower, self.upper
-        return np.where(self.log, theta * np.log(upper / np.where(self.log, lower, 1.0)), upper - lower)
+        lower, upper = (np.where(self.log, ends, 1.0) for ends in (self.lower, self.upper))
+        return np.where(self.log, theta * np.log(upper / lower), self.upper - self.lower)
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.

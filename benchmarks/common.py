@@ -1,30 +1,61 @@
-"""What several benchmarks share: a table, the time a fit takes, and a log of the true arm off its stops."""
+"""What the benchmarks share: options, tables, a clock, simulated logs of known truth, refits, coverage."""
 
+import argparse
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from hydroid.advice.pseudo_random import pseudo_random_log
+from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.search.descent import Descent
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.search import RefinementSettings
 
 OFF = 0.05
 """distance from the stops [rad]"""
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[object]] = ()) -> None:
-    """Print a table in Markdown; further rows may follow by `row`."""
-    row(header)
-    row(["---"] * len(header))
-    for each in rows:
-        row(each)
+def options(text: str | None, **defaults: Any) -> Any:
+    """Parse the flags of a benchmark whose docstring is `text`.
+
+    A default's type is its flag's. Of a list several may be given, of a list of names only these; of a tuple
+    of names some may be given, none by default.
+    """
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in defaults.items():
+        how: dict[str, Any] = {"type": type(default), "default": default}
+        if isinstance(default, bool):
+            how = {"action": "store_true"}
+        elif isinstance(default, tuple):
+            how = {"nargs": "*", "default": [], "choices": default}
+        elif isinstance(default, list):
+            kind = type(default[0])
+            how = {
+                "nargs": "*",
+                "type": kind,
+                "default": default,
+                "choices": default if kind is str else None,
+            }
+        parser.add_argument(f"--{name.replace('_', '-')}", **how)
+    return parser.parse_args()
 
 
-def row(cells: Sequence[object]) -> None:
+def table(header: str, line: str = "", *columns: Iterable[Any]) -> None:
+    """Print a table in Markdown: the header, then `line` with one value of every column in each row."""
+    print(f"\n| {header} |\n|{' --- |' * (1 + header.count('|'))}", flush=True)
+    for cells in zip(*columns, strict=True):
+        row(line.format(*cells))
+
+
+def row(line: str) -> None:
     """Print one row of a table."""
-    print(f"| {' | '.join(map(str, cells))} |", flush=True)
+    print(f"| {line} |", flush=True)
 
 
 class Clock:
@@ -39,7 +70,7 @@ class Clock:
 
 
 def true_log(
-    settings: FitSettings, truth: Mapping[str, float], joints: Sequence[int], seconds: float, seed: int = 3
+    settings: FitSettings, truth: Mapping[str, float], joints: Iterable[int], seconds: float, seed: int = 3
 ) -> Log:
     """Return the response to pseudo-random commands of some joints that keeps off the stops."""
     low, high = settings.arm.lower + OFF, settings.arm.upper - OFF
@@ -51,3 +82,63 @@ def true_log(
     pose = settings.arm.pose("study")
     drive = pseudo_random_log(pose, list(joints), duration=seconds, seed=seed, allowed=off_the_stops)
     return simulate_log(settings, drive, truth, "truth")
+
+
+def noisy(
+    log: Log, rng: np.random.Generator, deg: float = 0.1, phi: float = 0.0, *, start: bool = False
+) -> Log:
+    """Add stationary noise to every angle, white or AR(1); the first sample has none unless `start`."""
+    noise = rng.normal(0.0, np.deg2rad(deg), log.angle.shape)
+    if phi:
+        for i in range(1, len(noise)):
+            noise[i] = phi * noise[i - 1] + np.sqrt(1 - phi**2) * noise[i]
+    if not start:
+        noise[0] = 0.0
+    return replace(log, angle=log.angle + noise)
+
+
+def near(problem: Problem, truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return the truth with its free parameters moved by random factors within 5 %, shape (P,)."""
+    return truth * np.where(problem.parameters.free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
+
+
+def refined(
+    problem: Problem, start: np.ndarray, how: RefinementSettings | None = None
+) -> tuple[np.ndarray, Descent]:
+    """Refine an estimate, by default as the settings say; return where it ended, shape (P,), and how."""
+    how = how or problem.settings.refinement
+    assert how is not None
+    result = refine(problem, start, how)
+    return problem.parameters.from_unit(result.point), result
+
+
+@dataclass
+class Coverage:
+    """What fits say of values that are known: lists of arrays, shapes (P,), (P,) and (P, 2)."""
+
+    truth: np.ndarray
+    values: list[np.ndarray] = field(default_factory=list[np.ndarray])
+    sds: list[np.ndarray] = field(default_factory=list[np.ndarray])
+    intervals: list[np.ndarray] = field(default_factory=list[np.ndarray])
+
+    def add(self, value: np.ndarray, sd: np.ndarray, interval: np.ndarray) -> None:
+        """Add what one fit says."""
+        self.values.append(value)
+        self.sds.append(sd)
+        self.intervals.append(interval)
+
+    @property
+    def hits(self) -> np.ndarray:
+        """Whether each interval holds the truth, shape (n, P)."""
+        low, high = np.moveaxis(np.array(self.intervals), 2, 0)
+        return (low <= self.truth) & (self.truth <= high)
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviation of the estimates, shape (P,)."""
+        return np.std(self.values, axis=0, ddof=1)
+
+
+def named(names: Sequence[str], chosen: np.ndarray) -> list[str]:
+    """Return the names that are chosen, shape (P,)."""
+    return [name for name, yes in zip(names, chosen, strict=True) if yes]

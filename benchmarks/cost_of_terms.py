@@ -37,44 +37,41 @@ for line in sys.stdin:
     problems[int(line)].objectives(theta)
     print(time.process_time() - began, flush=True)
 """
+"""times one case for each line of its input; it runs on both commits, so it uses what both have"""
 
 
-def worker(tree: Path) -> "subprocess.Popen[str]":
-    """Start a process that times one case per line of its input."""
-    command = [sys.executable, "-c", WORKER, str(list(CASES.values()))]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(
-        command, cwd=tree, env={"PYTHONPATH": str(tree)}, stdin=pipe, stdout=pipe, text=True
-    )
+class Worker:
+    """A process that times cases with the code of one tree."""
+
+    def __init__(self, tree: Path) -> None:
+        command, pipe = [sys.executable, "-c", WORKER, str(list(CASES.values()))], subprocess.PIPE
+        where = {"cwd": tree, "env": {"PYTHONPATH": str(tree)}}
+        self.process = subprocess.Popen(command, **where, stdin=pipe, stdout=pipe, text=True)
+
+    def seconds(self, case: int) -> float:
+        """CPU seconds of one case."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        print(case, file=self.process.stdin, flush=True)
+        return float(self.process.stdout.readline())
 
 
-def ask(process: "subprocess.Popen[str]", case: int) -> float:
-    """CPU seconds of one case."""
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(f"{case}\n")
-    process.stdin.flush()
-    return float(process.stdout.readline())
-
-
-def main(commit: str, rounds: int) -> None:
-    """Print one line per case."""
+def main(commit: str, rounds: int = 21) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        older = Path(folder) / "older"
-        git = ["git", "-C", str(ROOT), "worktree"]
+        older, git = Path(folder) / "older", ["git", "-C", str(ROOT), "worktree"]
         subprocess.run([*git, "add", "--quiet", "--detach", str(older), commit], check=True)
         try:
-            both = worker(ROOT), worker(older)
+            both = Worker(ROOT), Worker(older)
             for number, name in enumerate(CASES):
-                _ = [ask(process, number) for process in both]  # compile and warm up
-                seconds = np.array([[ask(process, number) for process in both] for _ in range(rounds)])
-                low, median, high = np.quantile(seconds[:, 0] / seconds[:, 1], [0.25, 0.5, 0.75])
+                # the first round compiles and warms up
+                took = [[one.seconds(number) for one in both] for _ in range(1 + rounds)][1:]
+                low, median, high = np.quantile(np.divide(*np.transpose(took)), [0.25, 0.5, 0.75])
                 print(f"{name:28}{median:7.3f}  ({low:.3f} to {high:.3f})", flush=True)
-            for process in both:
-                process.communicate()
+            for one in both:
+                one.process.communicate()
         finally:
             subprocess.run([*git, "remove", "--force", str(older)], check=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 21)
+    main(sys.argv[1], *map(int, sys.argv[2:]))

@@ -1,13 +1,12 @@
 """Thousands of damaged files of every kind: each is read correctly, or refused in one line.
 
-    python benchmarks/fuzz.py [--inputs 4000] [--only KIND]
+    python benchmarks/fuzz.py [--inputs 4000] [--first 0] [--only KIND]
 
 A file is made from the name of its kind and a number: `--only KIND --first N --inputs 1` repeats a failure.
 Each batch runs in a process of its own. A batch that takes too long, crashes, ends with a traceback,
 or misreads a log counts as failed, and is named.
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -16,11 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from pathlib import Path
 
+from common import options
+
 HERE = Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "tests" / "helpers"))
 
-BATCH = 50
-SECONDS_PER_BATCH = 600.0
+BATCH, SECONDS_PER_BATCH = 50, 600.0
+RUNS = ("run.json", "config.yaml", "arm.yaml", "estimate.yaml", "checkpoint.npz")
 
 
 def read(name: str, first: int, count: int) -> int:
@@ -40,47 +41,36 @@ def read(name: str, first: int, count: int) -> int:
     return failed
 
 
-def batch(name: str, first: int, count: int) -> tuple[str, int, str]:
+def batch(job: tuple[str, int, int]) -> tuple[str, int, str]:
     """Read some files in another process; return their kind, whether it failed, and what it printed."""
+    name, first, count = job
     command = [sys.executable, str(HERE), "--batch", name, "--first", str(first), "--inputs", str(count)]
+    how = {"capture_output": True, "text": True, "errors": "replace", "timeout": SECONDS_PER_BATCH}
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=SECONDS_PER_BATCH, errors="replace"
-        )
+        done = subprocess.run(command, **how)
     except subprocess.TimeoutExpired:
         return name, 1, f"FAILED {name} {first} to {first + count}: more than {SECONDS_PER_BATCH:g} s\n"
     return name, int(done.returncode != 0), done.stdout + (done.stderr[-2000:] if done.returncode else "")
 
 
-def main() -> None:
-    """Read all kinds, two processes at a time, and print a line per kind."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--inputs", type=int, default=4000, help="files in all")
-    parser.add_argument("--first", type=int, default=0, help="number of the first file of each kind")
-    parser.add_argument("--only", help="one kind")
-    parser.add_argument("--batch", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.batch:
-        sys.exit(read(given.batch, given.first, given.inputs) > 0)
-    from fuzz import KINDS
-
-    runs = ("run.json", "config.yaml", "arm.yaml", "estimate.yaml", "checkpoint.npz")
-    names = [given.only] if given.only else [*KINDS, *runs]
-    count = max(1, given.inputs // len(names))
-    jobs = [
-        (name, given.first + start, min(BATCH, count - start))
-        for name in names
-        for start in range(0, count, BATCH)
-    ]
-    failed = dict.fromkeys(names, 0)
+def study(names: list[str], first: int, inputs: int) -> int:
+    """Read all kinds, two processes at a time, and print a line per kind; return how many batches failed."""
+    count, failed = max(1, inputs // len(names)), dict.fromkeys(names, 0)
+    starts = range(first, first + count, BATCH)
+    jobs = [(name, start, min(BATCH, first + count - start)) for name in names for start in starts]
     with ThreadPoolExecutor(2) as pool:
-        for name, failure, text in pool.map(lambda job: batch(*job), jobs):
+        for name, failure, text in pool.map(batch, jobs):
             failed[name] += failure
             print(text, end="", flush=True)
     for name in names:
         print(f"{name:16} {count:6} files, {failed[name]} failed batches")
-    sys.exit(any(failed.values()))
+    return sum(failed.values())
 
 
 if __name__ == "__main__":
-    main()
+    given = options(__doc__, inputs=4000, first=0, only="", batch="")
+    if given.batch:
+        sys.exit(read(given.batch, given.first, given.inputs) > 0)
+    from fuzz import KINDS
+
+    sys.exit(study([given.only] if given.only else [*KINDS, *RUNS], given.first, given.inputs) > 0)

@@ -12,25 +12,18 @@ fits leave it open. "width" is the mean width of the intervals, divided by that 
 noise. "bound" is the Cramér-Rao bound of the true noise at the true parameters. Both are of a known start.
 """
 
-import argparse
-import time
 from dataclasses import replace
 
 import numpy as np
+from common import Clock, Coverage, named, near, noisy, options, refined, row, table, true_log
 from scipy.linalg import solve_toeplitz
 
 from hydroid import load_settings
-from hydroid.advice.pseudo_random import pseudo_random_log
-from hydroid.fitting.refinement import refine
-from hydroid.log import Log
 from hydroid.posterior.covariance import quantile, uncertainty, uncertainty_from
 from hydroid.posterior.jacobian import Jacobian, jacobian
 from hydroid.posterior.noise import Noise
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.settings.fit import FitSettings
 
-LEVEL = np.deg2rad(0.1)
 JOINTS = [2, 3]
 TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 """masses as in the article; K, D, S are ours: with the article's the arm is too slow to feel its masses"""
@@ -43,16 +36,6 @@ CHANGES = {
 }
 
 
-def with_noise(log: Log, phi: float, rng: np.random.Generator, *, start: bool) -> Log:
-    """Add stationary noise of LEVEL to every angle, white (phi 0) or AR(1)."""
-    noise = rng.normal(0.0, LEVEL, log.angle.shape)
-    for i in range(1, len(noise)):
-        noise[i] = phi * noise[i - 1] + np.sqrt(1 - phi**2) * noise[i]
-    if not start:
-        noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
-
-
 def bound(problem: Problem, at: Jacobian, noise: tuple[Noise, ...]) -> np.ndarray:
     """The Cramér-Rao bound of each free parameter's standard deviation, for the true noise."""
     free, information = problem.parameters.free, 0.0
@@ -62,82 +45,50 @@ def bound(problem: Problem, at: Jacobian, noise: tuple[Noise, ...]) -> np.ndarra
     return np.sqrt(np.diag(np.linalg.inv(information))) * at.scale[free]
 
 
-def clean_log(settings: FitSettings, seconds: float) -> Log:
-    """Return the response of the true arm to pseudo-random commands that keep it off its stops."""
-
-    def off_the_stops(log: Log) -> bool:
-        angle = simulate_log(settings, log, TRUTH, "truth").angle
-        return bool(np.all(angle > settings.arm.lower + 0.05) and np.all(angle < settings.arm.upper - 0.05))
-
-    pose = settings.arm.pose("study")
-    drive = pseudo_random_log(pose, JOINTS, duration=seconds, seed=3, allowed=off_the_stops)
-    return simulate_log(settings, drive, TRUTH, "truth")
-
-
 def study(correlation_time: float, logs: int, seconds: float, *, start: bool, open_start: bool) -> None:
     """Fit every log, and print how often each parameter's interval holds the truth."""
-    settings = load_settings("article-mech", CHANGES | {"free_start": open_start})
-    clean = clean_log(settings, seconds)
+    settings, clock = load_settings("article-mech", CHANGES | {"free_start": open_start}), Clock()
+    clean = true_log(settings, TRUTH, JOINTS, seconds)
     phi = float(np.exp(-clean.period / correlation_time)) if correlation_time else 0.0
     problem = Problem(settings.model_copy(update={"free_start": False}), [clean])
     truth, free = problem.parameters.vector(TRUTH, "truth"), problem.parameters.free
-    at, true = jacobian(problem, truth), Noise(len(clean.time), LEVEL, np.array([-phi] if phi else []))
-    true = (replace(true, source="settings"),) * len(problem.channels)
-    least = bound(problem, at, true)
-    known = 2 * quantile(0.0) * uncertainty_from(problem, truth, at, true).standard_deviation[free]
-    estimates, deviations, widths, hits = [], [], [], []
-    started = time.perf_counter()
-    assert settings.refinement is not None
+    at, true = (
+        jacobian(problem, truth),
+        Noise(len(clean.time), np.deg2rad(0.1), np.array([-phi] if phi else [])),
+    )
+    noise = (replace(true, source="settings"),) * len(problem.channels)
+    least = bound(problem, at, noise)
+    known = 2 * quantile(0.0) * uncertainty_from(problem, truth, at, noise).standard_deviation[free]
+    fits = Coverage(truth[free])
     for seed in range(logs):
         rng = np.random.default_rng([seed, int(1000 * phi)])
-        one = Problem(settings, [with_noise(clean, phi, rng, start=start)])
-        first = truth * np.where(free, rng.uniform(0.95, 1.05, len(truth)), 1.0)
-        found = refine(one, first, settings.refinement)
-        theta = one.parameters.from_unit(found.point)
+        one = Problem(settings, [noisy(clean, rng, phi=phi, start=start)])
+        theta, _ = refined(one, near(one, truth, rng))
         result = uncertainty(one, theta)
-        estimates.append(theta[free])
-        deviations.append(result.standard_deviation[free])
-        widths.append(np.diff(result.interval[free], axis=1)[:, 0])
-        hits.append((result.interval[free, 0] <= truth[free]) & (truth[free] <= result.interval[free, 1]))
-    spread = np.std(estimates, axis=0, ddof=1)
+        fits.add(theta[free], result.standard_deviation[free], result.interval[free])
     kind = f"correlation time {correlation_time:g} s" if phi else "white noise"
-    print(f"\n{kind}, {logs} logs of {seconds:g} s, {time.perf_counter() - started:.0f} s", end="")
-    print(", the start pose with noise" if start else "")
-    print("\n| parameter | covered | width | spread [%] | spread / bound | predicted / spread |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    names = [n for n, is_free in zip(problem.parameters.names, free, strict=True) if is_free]
-    cover, predicted, width = (np.mean(x, axis=0) for x in (hits, deviations, widths))
-    for i, name in enumerate(names):
-        print(
-            f"| {name} | {100 * cover[i]:.1f} % | {width[i] / known[i]:.2f} "
-            f"| {100 * spread[i] / truth[free][i]:.3f} | {spread[i] / least[i]:.2f} "
-            f"| {predicted[i] / spread[i]:.2f} |"
-        )
-    print(
-        f"| all | {100 * np.mean(hits):.1f} % | {np.mean(width / known):.2f} | "
-        f"| {np.mean(spread / least):.2f} | {np.mean(predicted / spread):.2f} |",
-        flush=True,
+    print(f"\n{kind}, {logs} logs of {seconds:g} s, {clock}{', the start pose with noise' * start}")
+    spread, predicted = fits.spread, np.mean(fits.sds, axis=0)
+    width = np.mean(np.diff(fits.intervals, axis=2)[:, :, 0], axis=0) / known
+    ratios = width, 100 * spread / truth[free], spread / least, predicted / spread
+    table(
+        "parameter | covered | width | spread [%] | spread / bound | predicted / spread",
+        "{} | {:.1f} % | {:.2f} | {:.3f} | {:.2f} | {:.2f}",
+        *(named(problem.parameters.names, free), 100 * np.mean(fits.hits, axis=0), *ratios),
     )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--logs", type=int, default=200)
-    parser.add_argument("--seconds", type=float, nargs="+", default=[20.0, 75.0])
-    parser.add_argument("--correlation-times", type=float, nargs="+", default=[0.0, 0.15, 1.0, 4.0])
-    parser.add_argument("--noisy-start", action="store_true")
-    parser.add_argument("--free-start", action="store_true")
-    arguments = parser.parse_args()
-    for seconds in arguments.seconds:
-        for correlation_time in arguments.correlation_times:
-            study(
-                correlation_time,
-                arguments.logs,
-                seconds,
-                start=arguments.noisy_start,
-                open_start=arguments.free_start,
-            )
+    means = f"{np.mean(spread / least):.2f} | {np.mean(predicted / spread):.2f}"
+    row(f"all | {100 * np.mean(fits.hits):.1f} % | {np.mean(width):.2f} | | {means}")
 
 
 if __name__ == "__main__":
-    main()
+    given = options(
+        __doc__,
+        logs=200,
+        seconds=[20.0, 75.0],
+        correlation_times=[0.0, 0.15, 1.0, 4.0],
+        noisy_start=False,
+        free_start=False,
+    )
+    for seconds in given.seconds:
+        for time in given.correlation_times:
+            study(time, given.logs, seconds, start=given.noisy_start, open_start=given.free_start)

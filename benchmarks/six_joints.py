@@ -1,17 +1,15 @@
 """Six hydraulic joints at once, 54 parameters, one log of 75 s: time, simulations and error; then per joint.
 
-    python benchmarks/six_joints.py [SECONDS]
+    python benchmarks/six_joints.py [--seconds 75]
 
 Each joint is fitted alone while the others follow their logged motion, then all are refined together. Start
-values are those of the arm's file and of `START`, none of them tuned to this log. SECONDS cuts the log, for a
-quick look.
+values are those of the arm's file and of `START`, none of them tuned to this log. --seconds cuts the log.
 """
 
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
+from common import Clock, options
 
 import hydroid
 
@@ -37,25 +35,16 @@ SETTINGS = {
     "joint_refinement": False,
 }
 
-
-def main(seconds: float) -> None:
-    """Fit and print."""
+if __name__ == "__main__":
     settings = hydroid.load_settings("fit-hyd", SETTINGS)
-    logs = [log.first(seconds) for log in hydroid.read_logs([LOG], settings)]
-    wall, cpu = time.monotonic(), time.process_time()
-    result = hydroid.fit(settings, logs)
+    logs = [log.first(options(__doc__, seconds=1e9).seconds) for log in hydroid.read_logs([LOG], settings)]
+    clock, result = Clock(), hydroid.fit(settings, logs)
     fit = result.fit
     assert fit.refinement is not None
-    simulations = int(fit.history[-1, 2]) + fit.refinement.evaluations
     print(f"{len(result.problem.parameters.names)} parameters, {logs[0].duration:g} s of log")
-    spent = f"{time.monotonic() - wall:.0f} s, {time.process_time() - cpu:.0f} s of CPU"
-    print(f"{spent}, {simulations} simulations")
+    print(f"{clock}, {int(fit.history[-1, 2]) + fit.refinement.evaluations} simulations")
     for estimate in fit.estimates.values():
         print(f"{estimate.name}: rms {np.rad2deg(estimate.rms):.3f} deg")
     print(f"converged: {fit.converged} ({fit.refinement.ending.value})")
     error = np.rad2deg(np.abs(logs[0].angle[:, :6] - fit.best.responses[0]).mean(axis=0))
     print("mean absolute [deg], joints 1 to 6:", *(f"{e:.3f}" for e in error))
-
-
-if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 1e9)

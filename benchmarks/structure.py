@@ -16,8 +16,11 @@ import statistics
 import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 MOST = {
     "files": 160,
@@ -32,10 +35,7 @@ MOST = {
     "lines of tests": 12_000,
     "lines of benchmarks": 2_000,
 }
-COMMANDS = {"cli", "commands"}
 TOKENS = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
-
-Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def tokens(text: str) -> int:
@@ -51,28 +51,16 @@ def statements(tree: ast.Module) -> int:
 
 def constants(tree: ast.Module) -> int:
     """Return how many names in capitals a file defines at its top level."""
-    names: list[str] = []
-    for node in tree.body:
-        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        names += [
-            name.id
-            for target in targets
-            for name in ast.walk(target or ast.Pass())
-            if isinstance(name, ast.Name)
-        ]
-    return sum(bool(re.fullmatch(r"_?[A-Z][A-Z0-9_]*", name)) for name in names)
+    assigned = (getattr(node, "targets", [getattr(node, "target", None)]) for node in tree.body)
+    names = (name for target in chain(*assigned) for name in ast.walk(target or ast.Pass()))
+    return sum(isinstance(n, ast.Name) and bool(re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n.id)) for n in names)
 
 
-def arguments(function: Function) -> int:
+def arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     """Return how many arguments a function takes besides `self` or `cls`."""
     given = function.args
     named = [*given.posonlyargs, *given.args, *given.kwonlyargs]
     return len(named) - (bool(named) and named[0].arg in ("self", "cls"))
-
-
-def functions(tree: ast.Module) -> Iterator[Function]:
-    """Yield every function and method of a file, nested ones included."""
-    return (node for node in ast.walk(tree) if isinstance(node, Function))
 
 
 def imports(tree: ast.Module) -> set[str]:
@@ -88,27 +76,12 @@ def imports(tree: ast.Module) -> set[str]:
 
 def cycles(package: Path, trees: dict[Path, ast.Module]) -> int:
     """Return the number of groups of files that import each other (strongly connected components)."""
-    names = {module(package, path): path for path in trees}
-    graph = {name: imports(trees[path]) & names.keys() - {name} for name, path in names.items()}
-    after = {name: reachable(graph, name) for name in graph}
-    return len({frozenset(m for m in after[n] if n in after[m]) for n in graph if n in after[n]})
-
-
-def module(package: Path, path: Path) -> str:
-    """Return a file's name as an import gives it."""
-    parts = [package.name, *path.relative_to(package).with_suffix("").parts]
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
-    """Return what a node leads to."""
-    found: set[str] = set()
-    waiting = [start]
-    while waiting:
-        new = graph[waiting.pop()] - found
-        found |= new
-        waiting += new
-    return found
+    paths = (path.relative_to(package.parent).with_suffix("").as_posix() for path in trees)
+    names = [path.replace("/", ".").removesuffix(".__init__") for path in paths]
+    graph = np.array([[name in imports(tree) and name != own for name in names]
+                      for own, tree in zip(names, trees.values(), strict=True)])  # fmt: skip
+    groups = np.bincount(connected_components(graph, connection="strong")[1])
+    return int(np.count_nonzero(groups > 1))
 
 
 COUNT_SETTINGS = """
@@ -142,9 +115,8 @@ print(sum(line[:2] == "  " and line[2:3].islower() and "  " in line.strip() for 
 def counted(checkout: Path, program: str) -> int:
     """Return the number that a program prints about a checkout."""
     environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=True)
-    return int(done.stdout)
+    how = {"cwd": checkout, "env": environment, "capture_output": True, "text": True, "check": True}
+    return int(subprocess.run([sys.executable, "-c", program], **how).stdout)
 
 
 def lines(folder: Path) -> int:
@@ -158,9 +130,9 @@ def measure(checkout: Path) -> dict[str, float]:
     texts = {path: path.read_text() for path in sorted(package.rglob("*.py"))}
     trees = {path: ast.parse(text) for path, text in texts.items()}
     sizes = [len(text.splitlines()) for text in texts.values()]
-    every = [(path, f) for path, tree in trees.items() for f in functions(tree)]
-    lengths = [(f.end_lineno or f.lineno) - f.lineno + 1 for _, f in every]
-    wide = [path for path, f in every if arguments(f) > 6 and not COMMANDS & set(path.parts)]
+    nodes = [(path, node) for path, tree in trees.items() for node in ast.walk(tree)]
+    functions = [(p, f) for p, f in nodes if isinstance(f, ast.FunctionDef | ast.AsyncFunctionDef)]
+    wide = [f for path, f in functions if arguments(f) > 6 and not {"cli", "commands"} & set(path.parts)]
     targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (checkout / "Makefile").read_text(), re.MULTILINE)
     return {
         "files": len(trees),
@@ -171,27 +143,21 @@ def measure(checkout: Path) -> dict[str, float]:
         "settings": counted(checkout, COUNT_SETTINGS),
         "commands": counted(checkout, COUNT_COMMANDS),
         "make targets": len(set(targets)),
-        "classes": sum(isinstance(node, ast.ClassDef) for tree in trees.values() for node in ast.walk(tree)),
-        "functions": len(every),
+        "classes": sum(isinstance(node, ast.ClassDef) for _, node in nodes),
+        "functions": len(functions),
         "functions with more than 6 arguments": len(wide),
         "import cycles": cycles(package, trees),
         "median file": statistics.median(sizes),
         "largest file": max(sizes),
-        "largest function": max(lengths),
+        "largest function": max((f.end_lineno or f.lineno) - f.lineno + 1 for _, f in functions),
         "lines of tests": lines(checkout / "tests"),
         "lines of benchmarks": lines(checkout / "benchmarks"),
     }
 
 
-def main() -> None:
-    """Print one column per checkout, and what may be at most."""
+if __name__ == "__main__":
     checkouts = [Path(name) for name in sys.argv[1:]] or [Path(__file__).parents[1]]
     columns = [measure(checkout) for checkout in checkouts]
-    width = max(map(len, columns[0]))
     for name in columns[0]:
         most = f"{MOST[name]:,}" if name in MOST else ""
-        print(name.ljust(width), *(f"{column[name]:9,g}" for column in columns), f"   {most}")
-
-
-if __name__ == "__main__":
-    main()
+        print(f"{name:36}", *(f"{column[name]:9,g}" for column in columns), f"   {most}")

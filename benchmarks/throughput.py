@@ -2,17 +2,17 @@
 
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
 on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
-search's own share of the wall time.
+search's own share of the wall time; and how fast a plant steps, as a multiple of real time.
 """
 
-import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from common import row, table
 from mujoco.batch import Batch
 
 from hydroid import load_settings
@@ -21,25 +21,31 @@ from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.estimate import read_values
 from hydroid.fitting.search import search
+from hydroid.plant import load_plant
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.settings.arm import Arm
 
 TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
-MEMBERS, REPEATS = 70, 9
+CANDIDATES, REPEATS = 70, 9
+ALL = list(range(1, 8))
 
 
-def make_problem(other_joints: str, algorithm: str = "ga") -> tuple[Problem, Arm]:
+def make_problem(other_joints: str, algorithm: str = "ga") -> Problem:
     changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
     settings = load_settings("article-mech", changes)
     log = pseudo_random_log(settings.arm.pose("study"), [2], duration=75.01)
-    log = simulate_log(settings, log, read_values(TRUTH)[0], str(TRUTH))
-    return Problem(settings, [log]), settings.arm
+    return Problem(settings, [simulate_log(settings, log, read_values(TRUTH)[0], str(TRUTH))])
 
 
-def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], object]:
+def population(problem: Problem) -> np.ndarray:
+    """Random candidates, shape (n, P)."""
+    unit = np.random.default_rng(0).random((CANDIDATES, int(problem.parameters.free.sum())))
+    return problem.parameters.from_unit(unit)
+
+
+def bare_rollout(problem: Problem, theta: np.ndarray) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
-    log, candidates = problem.logs[0], problem.bindings.candidates(theta)
+    log, candidates, arm = problem.logs[0], problem.bindings.candidates(theta), problem.settings.arm
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
@@ -57,98 +63,96 @@ def bare_rollout(problem: Problem, arm: Arm, theta: np.ndarray) -> Callable[[], 
     batch.forward()
     torque = bias[:, None] + candidates.joints.gain[:, None, moving] * log.command[:-1, moving]
     out = {"qpos": np.empty((len(theta), steps, len(moving)))}
-    applied = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
 
-    def roll() -> object:
+    def roll() -> float:
         batch.reset()
         batch.bind("qpos")[:] = log.angle[0, moving]
         started = time.perf_counter()
-        batch.rollout(steps, torque, applied, out=out)
+        batch.rollout(steps, torque, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, out=out)
         return time.perf_counter() - started
 
     return roll
 
 
-def seconds(call: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    result = call()
-    return result if isinstance(result, float) else time.perf_counter() - started
+def in_turn(calls: Mapping[str, Callable[[], object]]) -> dict[str, np.ndarray]:
+    """Seconds of each call in every round, shape (REPEATS,); a call may time itself."""
+    rounds = dict[str, list[float]]()
+    for _ in range(1 + REPEATS):  # the first one compiles and warms up
+        for name, call in calls.items():
+            started = time.perf_counter()
+            result = call()
+            took = result if isinstance(result, float) else time.perf_counter() - started
+            rounds.setdefault(name, []).append(took)
+    return {name: np.array(times[1:]) for name, times in rounds.items()}
 
 
-def measure(theta: np.ndarray) -> None:
-    """Print evaluation against bare rollout, and locked against passive, each pair in turn."""
-    calls: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {}
+def against_mujoco() -> None:
+    """Print evaluation against bare rollout, and locked against passive."""
+    calls: dict[str, Callable[[], object]] = {}
     for mode in ("passive", "locked"):
-        problem, arm = make_problem(mode)
-        calls[mode] = (partial(problem.evaluate, theta), bare_rollout(problem, arm, theta))
-    for pair in calls.values():  # warm up
-        _ = [call() for call in pair]
-    rounds = [
-        {mode: [seconds(call) for call in pair] for mode, pair in calls.items()} for _ in range(REPEATS)
-    ]
-    print("| other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s |")
-    print("| --- | --- | --- | --- | --- |")
-    for mode in calls:
-        ours, bare = (statistics.median(r[mode][k] for r in rounds) for k in (0, 1))
-        ratio = statistics.median(r[mode][1] / r[mode][0] for r in rounds)
-        print(f"| {mode} | {ours:.3f} | {bare:.3f} | {ratio:.3f} | {MEMBERS / ours:.0f} |")
-    gain = statistics.median(r["passive"][0] / r["locked"][0] for r in rounds)
-    print(f"locked against passive: {gain:.2f} times the throughput")
+        problem = make_problem(mode)
+        theta = population(problem)
+        calls |= {mode: partial(problem.evaluate, theta), f"{mode}, bare": bare_rollout(problem, theta)}
+    took = in_turn(calls)
+    table("other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s")
+    for mode in ("passive", "locked"):
+        ours, bare = took[mode], took[f"{mode}, bare"]
+        middle, ratio = np.median(ours), np.median(bare / ours)
+        row(f"{mode} | {middle:.3f} | {np.median(bare):.3f} | {ratio:.3f} | {CANDIDATES / middle:.0f}")
+    print(f"locked against passive: {np.median(took['passive'] / took['locked']):.2f} times the throughput")
 
 
 def hydraulic_cost() -> None:
-    """Print stage 2's evaluation against stage 1's on the same seven-joint model, in turn."""
-    mechanical, _ = make_problem("passive")
-    problems = {"mechanical": mechanical}
-    for what, joints in (("the shoulder's hydraulics", [2]), ("all seven joints'", list(range(1, 8)))):
+    """Print stage 2's evaluation against stage 1's on the same seven-joint model."""
+    problems = {"mechanical": make_problem("passive")}
+    for what, joints in (("the shoulder's hydraulics", [2]), ("all seven joints'", ALL)):
         settings = load_settings("article-hyd", {"simulation.other_joints": "passive"})
         log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
         problems[what] = Problem(settings, [log])
-    rng = np.random.default_rng(0)
-    calls = {
-        what: partial(p.evaluate, p.parameters.from_unit(rng.random((MEMBERS, int(p.parameters.free.sum())))))
-        for what, p in problems.items()
-    }
-    _ = [call() for call in calls.values()]  # compile and warm up
-    rounds = [{what: seconds(call) for what, call in calls.items()} for _ in range(REPEATS)]
-    print("| evaluation of the seven-joint model | seconds | ratio |")
-    print("| --- | --- | --- |")
-    for what in calls:
-        took = statistics.median(r[what] for r in rounds)
-        ratio = statistics.median(r[what] / r["mechanical"] for r in rounds)
-        print(f"| {what} | {took:.3f} | {ratio:.2f} |")
+    took = in_turn({what: partial(p.evaluate, population(p)) for what, p in problems.items()})
+    ratios = [np.median(times / took["mechanical"]) for times in took.values()]
+    medians = [np.median(times) for times in took.values()]
+    table(
+        "evaluation of the seven-joint model | seconds | ratio", "{} | {:.3f} | {:.2f}", took, medians, ratios
+    )
 
 
 def search_share(algorithm: str) -> float:
     """Return the share of a search's wall time [%] that is not spent in evaluating populations."""
-    problem, _ = make_problem("locked", algorithm)
-    spent = 0.0
+    problem, spent = make_problem("locked", algorithm), []
     evaluate = problem.evaluate
 
     def timed(theta: np.ndarray) -> object:
-        nonlocal spent
         started = time.perf_counter()
         result = evaluate(theta)
-        spent += time.perf_counter() - started
+        spent.append(time.perf_counter() - started)
         return result
 
     problem.evaluate = timed  # type: ignore[method-assign]
     started = time.perf_counter()
     search(problem, lambda row: None, lambda simulated, rms: None, {})
-    wall = time.perf_counter() - started
-    return 100 * (wall - spent) / wall
+    return 100 * (1 - sum(spent) / (time.perf_counter() - started))
 
 
-def main() -> None:
-    rng = np.random.default_rng(0)
-    problem, _ = make_problem("locked")
-    theta = problem.parameters.from_unit(rng.random((MEMBERS, int(problem.parameters.free.sum()))))
-    print(f"{MEMBERS} candidates, {len(problem.logs[0].time) - 1} steps; medians of {REPEATS} rounds")
-    measure(theta)
-    hydraulic_cost()
-    for algorithm in ("ga", "nsga2"):
-        print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
+def plant_speed(joints: list[int], steps: int = 2000) -> None:
+    """Print how long a step of a plant with hydraulics on some joints takes, at 0.01 s."""
+    plant = load_plant("article-hyd", overrides={"start_pose": "study"}, joints=joints)
+    commands = 30.0 * np.isin(ALL, joints) * np.sin(np.arange(steps)[:, None] / 50 + np.arange(7))
+
+    def run() -> None:
+        plant.reset()
+        for command in commands:
+            plant.step(command)
+
+    step = min(in_turn({"plant": run})["plant"]) / steps
+    row(f"{len(joints)} | {1e6 * step:.0f} | {plant.period / step:.0f}")
 
 
 if __name__ == "__main__":
-    main()
+    against_mujoco()
+    hydraulic_cost()
+    for algorithm in ("ga", "nsga2"):
+        print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
+    table("joints with hydraulics | step [µs] | times real time")
+    plant_speed([2])
+    plant_speed(ALL)

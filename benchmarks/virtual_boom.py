@@ -10,25 +10,23 @@ a machine, not that a real machine is one.
 It is logged at constant duties of 40, 60 and 100 %, up from its stop and down from above, and predicted at
 50, 70, 80 and 90 %.
 
-    python benchmarks/virtual_boom.py [SEEDS]
+    python benchmarks/virtual_boom.py [--seeds 3]
 """
 
-import sys
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, exp, radians, sin, sqrt, tanh
-from typing import Any
 
 import numpy as np
+from common import Clock, options
 from scipy.integrate import Radau
 
 import hydroid
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
+from hydroid.settings.fit import FitSettings
 
-Parameters = Mapping[str, Mapping[str, object]]
 FITTED, UNSEEN = (40, 60, 100), (50, 70, 80, 90)
 PERIOD, REST, LENGTH, NOISE_DEG = 0.01, 0.5, 5.0, 0.02
 STAGES = {"up": (-30.0, 1.0), "down": (60.0, -1.0)}
@@ -150,66 +148,41 @@ def log_of(duty: float, way: str, pose: np.ndarray, rng: np.random.Generator) ->
     return Log(f"{way}_{duty:g}", time, command, measured, PERIOD)
 
 
-def row(quantity: str, low: float, high: float, start: float) -> dict[str, Any]:
-    """One parameter of the fit; those of the pump have no joints."""
-    pump = quantity.startswith("pump_")
-    return {"quantity": quantity, "bounds": [low, high], "start": start} | ({} if pump else {"joints": [2]})
-
-
 COMMON = {
-    "D": {"quantity": "damping", "bounds": [20.0, 2000.0], "start": 230.0},
-    "M3": {"quantity": "mass", "link": "link3", "bounds": [15.0, 35.0], "start": 22.5},
-    "open_A": row("opening_a", 0.05, 3.0, 0.4),
-    "open_B": row("opening_b", 0.05, 3.0, 0.4),
-    "overlap_A": row("overlap_a", 0.0, 1.5, 0.3),
-    "overlap_B": row("overlap_b", 0.0, 1.5, 0.3),
-    "friction": row("dry_friction", 0.0, 2000.0, 100.0),
-    "volume": row("dead_volume", 10.0, 300.0, 50.0),
-}
+    "opening_a": (0.05, 3.0, 0.4), "opening_b": (0.05, 3.0, 0.4),
+    "overlap_a": (0.0, 1.5, 0.3), "overlap_b": (0.0, 1.5, 0.3),
+    "dry_friction": (0.0, 2000.0, 100.0), "dead_volume": (10.0, 300.0, 50.0),
+}  # fmt: skip
 BEFORE = COMMON | {
-    "delay": row("delay", 0.0, 0.5, 0.1),
-    "lag": row("plunger_damping", 5.0, 2000.0, 100.0),
-    "exponent": row("opening_exponent", 0.5, 4.0, 1.5),
-    "limit": row("flow_limit", 0.2, 20.0, 3.0),
-}
-"""one value for both directions, no pump, no stop: what hydroid had before"""
+    "delay": (0.0, 0.5, 0.1), "plunger_damping": (5.0, 2000.0, 100.0),
+    "opening_exponent": (0.5, 4.0, 1.5), "flow_limit": (0.2, 20.0, 3.0),
+}  # fmt: skip
+"""quantities with lowest, highest and start value: one for both directions, no pump, no stop"""
 NOW = COMMON | {
-    "delay_A": row("delay_a", 0.0, 0.5, 0.1),
-    "delay_B": row("delay_b", 0.0, 0.5, 0.1),
-    "lag_A": row("plunger_damping_a", 5.0, 2000.0, 100.0),
-    "lag_B": row("plunger_damping_b", 5.0, 2000.0, 100.0),
-    "exponent_A": row("opening_exponent_a", 0.5, 4.0, 1.5),
-    "exponent_B": row("opening_exponent_b", 0.5, 4.0, 1.5),
-    "out_A": row("return_a", 0.1, 10.0, 1.0),
-    "out_B": row("return_b", 0.1, 10.0, 1.0),
-    "trapped": row("trapped_pressure", 0.0, 100.0, 20.0),
-    "flow": row("pump_flow", 0.3, 20.0, 3.0),
-    "droop": row("pump_droop", 0.0, 120.0, 30.0),
-    "idle": row("pump_idle", 0.1, 1.0, 0.7),
-    "after": row("pump_delay", 0.0, 3.0, 1.0),
-    "rise": row("pump_rise", 0.01, 2.0, 0.3),
-}
+    "delay_a": (0.0, 0.5, 0.1), "delay_b": (0.0, 0.5, 0.1),
+    "plunger_damping_a": (5.0, 2000.0, 100.0), "plunger_damping_b": (5.0, 2000.0, 100.0),
+    "opening_exponent_a": (0.5, 4.0, 1.5), "opening_exponent_b": (0.5, 4.0, 1.5),
+    "return_a": (0.1, 10.0, 1.0), "return_b": (0.1, 10.0, 1.0), "trapped_pressure": (0.0, 100.0, 20.0),
+    "pump_flow": (0.3, 20.0, 3.0), "pump_droop": (0.0, 120.0, 30.0), "pump_idle": (0.1, 1.0, 0.7),
+    "pump_delay": (0.0, 3.0, 1.0), "pump_rise": (0.01, 2.0, 0.3),
+}  # fmt: skip
 
 
-def errors(model: hydroid.FitResult, logs: dict[tuple[str, int], Log]) -> dict[tuple[str, int], float]:
-    """Mean absolute error over each whole log [deg]."""
-    problem = Problem(model.model.settings, list(logs.values()))
-    error = problem.residuals(model.model.theta[None])[0]
-    return {
-        key: float(np.degrees(np.mean(abs(error[channel.rows]))))
-        for key, channel in zip(logs, problem.channels, strict=True)
+def make_settings(seed: int, rows: Mapping[str, tuple[float, float, float]]) -> FitSettings:
+    """Settings of a fit of these quantities; those of the pump have no joints."""
+    parameters: dict[str, object] = {
+        "S": {"quantity": "stiffness", "fixed": 0.0},
+        "D": {"quantity": "damping", "bounds": [20.0, 2000.0], "start": 230.0},
+        "M3": {"quantity": "mass", "link": "link3", "bounds": [15.0, 35.0], "start": 22.5},
     }
-
-
-def study(
-    seed: int, what: str, parameters: Mapping[str, Mapping[str, object]]
-) -> dict[tuple[str, int], float]:
-    """Fit the logs of the fitted duties, print the errors of all, return those of the unseen ones."""
+    for quantity, (low, high, start) in rows.items():
+        joints = {} if quantity.startswith("pump_") else {"joints": [2]}
+        parameters[quantity] = {"quantity": quantity, "bounds": [low, high], "start": start} | joints
     changes = {
-        "parameters": {"S": {"quantity": "stiffness", "fixed": 0.0}} | dict(parameters),
+        "parameters": parameters,
         "joint_refinement": False,
         "hydraulics.substeps": 10,
-        "hydraulics.anticavitation": 2.0 if "out_A" in parameters else 0.0,
+        "hydraulics.anticavitation": 2.0 if "return_a" in rows else 0.0,
         "search.algorithm": "multistart",
         "search.seed": seed,
         # the stated start, and whole logs at once: a boom on its stop says nothing in its first half second
@@ -217,35 +190,32 @@ def study(
         "search.multistart.horizons": (),
         "objective": {"norm": 2, "segments": {"equal": 1}},
     }
-    settings = hydroid.load_settings("fit-hyd-machine", changes)
-    rng, pose = np.random.default_rng(seed), settings.arm.pose("study")
-    logs = {(way, d): log_of(d, way, pose, rng) for way in STAGES for d in (*FITTED, *UNSEEN)}
-    began = time.perf_counter()
-    fitted = hydroid.fit(settings, [log for (_, d), log in logs.items() if d in FITTED])
-    took = time.perf_counter() - began
-    error = errors(fitted, logs)
-    seen, unseen = ({k: e for k, e in error.items() if k[1] in duties} for duties in (FITTED, UNSEEN))
-    print(
-        f"{what}, seed {seed}: {took:.0f} s, fitted: {describe(seen)}; unseen: {describe(unseen)}", flush=True
-    )
-    return unseen
+    return hydroid.load_settings("fit-hyd-machine", changes)
 
 
-def describe(error: dict[tuple[str, int], float]) -> str:
-    """The errors of some logs in words."""
+def describe(error: Mapping[tuple[str, int], float]) -> str:
+    """The mean absolute errors of some logs [deg] in words."""
     values = np.array(list(error.values()))
     each = ", ".join(f"{way} {duty} %: {value:.2f}" for (way, duty), value in error.items())
     return f"median {np.median(values):.2f}, worst {values.max():.2f} deg ({each})"
 
 
-def main() -> None:
-    seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 3
-    for what, parameters in (("before", BEFORE), ("now", NOW)):
-        unseen = [value for seed in range(seeds) for value in study(seed, what, parameters).values()]
-        print(
-            f"{what}: unseen median {np.median(unseen):.2f}, worst {max(unseen):.2f} deg over {seeds} seeds\n"
-        )
+def study(seed: int, what: str, rows: Mapping[str, tuple[float, float, float]]) -> list[float]:
+    """Fit the logs of the fitted duties, print the errors of all, return those of the unseen ones."""
+    settings, rng, clock = make_settings(seed, rows), np.random.default_rng(seed), Clock()
+    duties, pose = [(way, d) for way in STAGES for d in (*FITTED, *UNSEEN)], settings.arm.pose("study")
+    logs = {(way, d): log_of(d, way, pose, rng) for way, d in duties}
+    fitted = hydroid.fit(settings, [log for (_, d), log in logs.items() if d in FITTED]).model
+    problem = Problem(fitted.settings, list(logs.values()))
+    residual = np.degrees(np.abs(problem.residuals(fitted.theta[None])[0]))
+    error = {k: float(residual[c.rows].mean()) for k, c in zip(logs, problem.channels, strict=True)}
+    known, unseen = ({k: e for k, e in error.items() if k[1] in some} for some in (FITTED, UNSEEN))
+    print(f"{what}, seed {seed}: {clock}, fitted: {describe(known)}; unseen: {describe(unseen)}", flush=True)
+    return list(unseen.values())
 
 
 if __name__ == "__main__":
-    main()
+    seeds = options(__doc__, seeds=3).seeds
+    for what, rows in (("before", BEFORE), ("now", NOW)):
+        errors = [error for seed in range(seeds) for error in study(seed, what, rows)]
+        print(f"{what}: unseen median {np.median(errors):.2f}, worst {max(errors):.2f} deg, {seeds} seeds\n")

@@ -63,8 +63,9 @@ class Run:
             os.dup2(errors.fileno(), 1)
         checkpoints.SAVE_EVERY = 0.0
         page_file.write_page = lambda *_: []
-        log, out = str(self.folder.parent / "log.csv"), ["--out", str(self.folder), "--resume", "--quiet"]
-        sys.argv = ["hydroid", "fit-mech", log, *KINDS[self.kind].split(), *out]
+        os.chdir(self.folder.parent)  # what a run stores names its folder as it was given
+        out = ["--out", self.folder.name, "--resume", "--quiet"]
+        sys.argv = ["hydroid", "fit-mech", "../log.csv", *KINDS[self.kind].split(), *out]
         code = 99
         try:
             hydroid()
@@ -147,13 +148,10 @@ class Run:
 
 def study(kind: str, work: Path, share: int, rng: random.Random) -> tuple[Counter[str], int]:
     """Kill runs of a kind; return how often each phase was met, and how many runs differ."""
-    whole, killed, met, trials, failed = (
-        Run(work / "whole", kind),
-        Run(work / "killed", kind),
-        Counter(),
-        0,
-        0,
-    )
+    whole, killed = (Run(work / name / "run", kind) for name in ("whole", "killed"))
+    for run in (whole, killed):
+        run.folder.parent.mkdir()
+    met, trials, failed = Counter[str](), 0, 0
     duration = whole.finish()
     while met.total() < share:
         shutil.rmtree(killed.folder, ignore_errors=True)

@@ -41,8 +41,6 @@ class Verdict:
         ours: the statement is not the article's.
         p: of a claim, corrected by Holm's method; nan where nothing was tested.
         effect: of a claim: rank-biserial correlation, from -1 to 1; nan where nothing was tested.
-        medians: of the cell that should be lower, and of the other one; nan where nothing was tested.
-        seeds: pairs.
     """
 
     says: str
@@ -52,8 +50,6 @@ class Verdict:
     ours: bool = False
     p: float = np.nan
     effect: float = np.nan
-    medians: tuple[float, float] = (np.nan, np.nan)
-    seeds: int = 0
 
     @property
     def sentence(self) -> str:
@@ -67,19 +63,27 @@ def verdicts(claims: Sequence[Claim], rows: Sequence[Row]) -> list[Verdict]:
     Where even a difference on every seed would not be significant after the correction, none is tested.
     """
     pairs = [_pairs(claim, rows) for claim in claims]
-    least = [2.0 ** (1 - len(p)) if len(p) else 1.0 for p in pairs]
-    able = [p < SIGNIFICANT for p in least]
-    family = sum(able)
-    enough = family and min(least) * family < SIGNIFICANT
+    least = np.array([2.0 ** (1 - len(p)) if len(p) else 1.0 for p in pairs])
+    able = least < SIGNIFICANT
+    family = int(able.sum())
+    able &= least.min(initial=1.0) * family < SIGNIFICANT
     raw = [
-        signed_rank(p[:, 1] - p[:, 0]) if each and enough else (np.nan, np.nan)
-        for p, each in zip(pairs, able, strict=True)
+        signed_rank(p[:, 1] - p[:, 0]) if tested else (np.nan, np.nan)
+        for p, tested in zip(pairs, able, strict=True)
     ]
-    corrected = holm(np.array([p for p, _ in raw]))
-    return [
-        _verdict(claim, pair, p, effect, family)
-        for claim, pair, p, (_, effect) in zip(claims, pairs, corrected.tolist(), raw, strict=True)
-    ]
+    corrected = holm(np.array([p for p, _ in raw])).tolist()
+    found = zip(claims, pairs, corrected, raw, strict=True)
+    return [_verdict(claim, pair, p, effect, family) for claim, pair, p, (_, effect) in found]
+
+
+def _pairs(claim: Claim, rows: Sequence[Row]) -> Array:
+    """Return the measure of both cells on the seeds that both have, shape (n, 2)."""
+    lower, than = (
+        {row.seed: row.values[claim.column] for row in rows if row.cell == cell and not row.failed}
+        for cell in (claim.lower, claim.than)
+    )
+    pairs = np.array([(lower[seed], than[seed]) for seed in lower if seed in than], float).reshape(-1, 2)
+    return pairs[np.isfinite(pairs).all(axis=1)]
 
 
 def _verdict(claim: Claim, pairs: Array, p: float, effect: float, family: int) -> Verdict:
@@ -88,13 +92,12 @@ def _verdict(claim: Claim, pairs: Array, p: float, effect: float, family: int) -
         few = f"{seeds} are too few for {f'{family} claims' if family else 'any answer'}"
         return Verdict(claim.says, Outcome.UNTESTED, claim.untested or few, claim.item, claim.ours)
     low, high = np.median(pairs, axis=0).tolist()
+    detail = f"median {claim.column} {low:.3g} against {high:.3g}; p = {p:.2g}, effect {effect:+.2f}, {seeds}"
     if np.array_equal(pairs[:, 0], pairs[:, 1]):
         detail = f"{claim.column} is the same in both, seed by seed; median {low:.3g}, {seeds}"
-    else:
-        test = f"p = {p:.2g}, effect {effect:+.2f}, {seeds}"
-        detail = f"median {claim.column} {low:.3g} against {high:.3g}; {test}"
-    outcome, medians = _outcome(p, effect), (low, high)
-    return Verdict(claim.says, outcome, detail, claim.item, claim.ours, p, effect, medians, len(pairs))
+    outcome = Outcome.CONFIRMED if effect > 0 else Outcome.CONTRADICTED
+    outcome = outcome if p < SIGNIFICANT else Outcome.OPEN
+    return Verdict(claim.says, outcome, detail, claim.item, claim.ours, p, effect)
 
 
 def signed_rank(difference: Array) -> tuple[float, float]:
@@ -106,9 +109,8 @@ def signed_rank(difference: Array) -> tuple[float, float]:
     if not changed.size:
         return 1.0, 0.0
     ranks = rankdata(np.abs(changed))
-    effect = float(np.sum(np.sign(changed) * ranks) / ranks.sum())
     test: Any = wilcoxon(changed)  # the stubs leave its type open
-    return float(test.pvalue), effect
+    return float(test.pvalue), float(np.sum(np.sign(changed) * ranks) / ranks.sum())
 
 
 def holm(p: Array) -> Array:
@@ -117,20 +119,3 @@ def holm(p: Array) -> Array:
     order = known[np.argsort(p[known], kind="stable")]
     corrected[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * np.arange(len(order), 0, -1)))
     return corrected
-
-
-def _pairs(claim: Claim, rows: Sequence[Row]) -> Array:
-    """Return the measure of both cells on the seeds that both have, shape (n, 2)."""
-    by_cell = [
-        {row.seed: row.values[claim.column] for row in rows if row.cell == cell and not row.failed}
-        for cell in (claim.lower, claim.than)
-    ]
-    both = [[values[seed] for values in by_cell] for seed in by_cell[0] if seed in by_cell[1]]
-    pairs = np.array(both, dtype=float).reshape(-1, 2)
-    return pairs[np.isfinite(pairs).all(axis=1)]
-
-
-def _outcome(p: float, effect: float) -> Outcome:
-    if p >= SIGNIFICANT:
-        return Outcome.OPEN
-    return Outcome.CONFIRMED if effect > 0 else Outcome.CONTRADICTED

@@ -55,13 +55,11 @@ def _convergence(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     """Best objective by generation: the median over seeds, with the middle half of them shaded."""
     axes = _axes(drawing, "generation", "best objective" + ", 0 to 1" * figure.normalized)
     for cell, color in _cells(runs, figure).items():
-        histories = [
-            np.array([step[2] for step in result["history"]], dtype=float) for _, result in runs.of(cell)
-        ]
-        length = max(map(len, histories), default=0)
-        curves = np.array([np.pad(h, (0, length - len(h)), mode="edge") for h in histories])
-        if not len(curves):
+        histories = [np.array([step[2] for step in run["history"]], dtype=float) for _, run in runs.of(cell)]
+        if not histories:
             continue
+        length = max(map(len, histories))
+        curves = np.array([np.pad(h, (0, length - len(h)), mode="edge") for h in histories])
         if figure.normalized:
             low, high = curves[:, -1:], np.nanmax(curves, axis=1, keepdims=True)
             curves = (curves - low) / np.where(high > low, high - low, 1.0)
@@ -71,26 +69,6 @@ def _convergence(drawing: Drawing, runs: Runs, figure: Figure) -> None:
         axes.fill_between(at, lower, upper, color=color, alpha=0.12, linewidth=0)
     axes.set_yscale("linear" if figure.normalized else "log")
     axes.legend(fontsize=8)
-
-
-def _spread(drawing: Drawing, runs: Runs, figure: Figure) -> None:
-    """One dot per run, a line at the median, and a cross at the article's value."""
-    axes = _axes(drawing, figure.column, "")
-    printed = {
-        cell: values[table.columns.index(figure.column)]
-        for table in runs.plan.study.tables
-        if figure.column in table.columns
-        for cell, values in table.article.items()
-    }
-    cells = list(_cells(runs, figure))
-    for height, cell in enumerate(cells):
-        values = np.array([row.values[figure.column] for row, _ in runs.of(cell)])
-        axes.plot(values, np.full(len(values), height), "o", color=COLORS[0], alpha=0.6, markersize=4)
-        axes.plot([np.nanmedian(values)] * 2, [height - 0.3, height + 0.3], color=COLORS[1], lw=2)
-        if (value := printed.get(cell)) is not None:
-            axes.plot(value, height, "x", color="black", markersize=7)
-    axes.set_yticks(range(len(cells)), cells)
-    axes.invert_yaxis()
 
 
 def _response(runs: Runs, cell: str, values: Mapping[str, float]) -> Array:
@@ -204,7 +182,6 @@ def _arm(drawing: Drawing, runs: Runs, figure: Figure) -> None:
 
 KINDS: dict[str, Callable[[Drawing, Runs, Figure], None]] = {
     "convergence": _convergence,
-    "spread": _spread,
     "responses": _responses,
     "commands": _commands,
     "segments": _segments,

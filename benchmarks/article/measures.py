@@ -5,7 +5,6 @@ determine: there an estimate is where chance left it. `identifiable error` sums 
 projecting them on the directions that the data determine (choices.md).
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,48 +19,46 @@ from hydroid.studies.study import Row
 
 CONVERGED = 0.05
 """part of the objective's whole descent that is left when a search counts as converged"""
-
-UNITS = {
-    "objective": "", "largest error": "deg", "mean absolute error": "deg", "rms error": "deg",
-    "mean squared error": "deg²", "generations": "", "simulations": "", "diverged": "", "seconds": "",
-    "total mass": "kg", "parameter error": "", "identifiable error": "", "mass error": "kg",
-}  # fmt: skip
-"""units; `value NAME` has the parameter's, `check NAME` deg, `error NAME` none"""
+UNITS = dict.fromkeys(("largest error", "mean absolute error", "rms error"), "deg")
+UNITS |= {"mean squared error": "deg²", "total mass": "kg", "mass error": "kg"}
+"""of measures that have one; `value NAME` has the parameter's, `check NAME` deg"""
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
     """What the data determine at the true parameters.
 
-    names: of the p free parameters. truth: their values, (p,). relative_sd: of each direction, smallest
-    first, (p,). axes: these directions, relative changes of unit length, one a row, (p, p).
+    names: of the p free parameters. truth: their values, (p,). rank: how many directions are known to
+    WEAK_ABOVE of the values or better. axes: these directions, relative changes of unit length, (rank, p).
     """
 
     names: tuple[str, ...]
     truth: Array
-    relative_sd: Array
+    rank: int
     axes: Array
 
-    @property
-    def rank(self) -> int:
-        """Directions known to WEAK_ABOVE of the values or better."""
-        return int(np.sum(self.relative_sd <= WEAK_ABOVE))
-
-    def determined(self, relative: Array) -> Array:
-        """Project relative errors, shape (p,), on the directions that the data determine."""
-        known = self.axes[: self.rank]
-        return known.T @ (known @ relative)
+    def measures(self, theta: Mapping[str, float]) -> dict[str, float]:
+        """Return the errors of an estimate."""
+        estimate = np.array([theta[n] for n in self.names])
+        errors = relative_error(estimate, self.truth)
+        determined = self.axes.T @ (self.axes @ ((estimate - self.truth) / self.truth))
+        values = {
+            "parameter error": float(errors.sum()),
+            "identifiable error": float(np.abs(determined).sum()),
+        }
+        return values | {f"error {n}": float(e) for n, e in zip(self.names, errors, strict=True)}
 
 
 def true_directions(problem: Problem, truth: Mapping[str, float], noise_deg: float) -> Directions:
     """Return what the data determine at the truth, with white noise of that standard deviation."""
     theta, free = problem.parameters.vector(truth, "truth"), problem.parameters.free
-    slopes = np.nan_to_num(jacobian(problem, theta).slopes[free])
-    axes, singular, _ = np.linalg.svd(slopes, full_matrices=False)
+    axes, singular, _ = np.linalg.svd(
+        np.nan_to_num(jacobian(problem, theta).slopes[free]), full_matrices=False
+    )
     with np.errstate(divide="ignore"):
-        relative = np.radians(noise_deg) / singular
+        rank = int(np.sum(np.radians(noise_deg) / singular <= WEAK_ABOVE))  # the largest comes first
     names = tuple(n for n, f in zip(problem.parameters.names, free, strict=True) if f)
-    return Directions(names, theta[free], relative, axes.T)
+    return Directions(names, theta[free], rank, axes.T[:rank])
 
 
 def with_truth(row: Row, task: Task, result: Result, directions: Directions | None) -> Row:
@@ -75,15 +72,10 @@ def with_truth(row: Row, task: Task, result: Result, directions: Directions | No
     if masses:
         values["total mass"] = sum(theta[n] for n in masses)
     if directions is not None:
-        estimate = np.array([theta[n] for n in directions.names])
-        errors = relative_error(estimate, directions.truth)
-        signed = (estimate - directions.truth) / directions.truth
-        values["parameter error"] = float(errors.sum())
-        values["identifiable error"] = float(np.abs(directions.determined(signed)).sum())
-        values |= {f"error {n}": float(e) for n, e in zip(directions.names, errors, strict=True)}
-        true_mass = dict(zip(directions.names, directions.truth.tolist(), strict=True))
-        if masses and set(masses) <= set(true_mass):
-            values["mass error"] = abs(values["total mass"] - sum(true_mass[n] for n in masses))
+        values |= directions.measures(theta)
+        true = dict(zip(directions.names, directions.truth.tolist(), strict=True))
+        if masses and set(masses) <= set(true):
+            values["mass error"] = abs(values["total mass"] - sum(true[n] for n in masses))
     return replace(row, values=values)
 
 
@@ -93,9 +85,9 @@ def generations_to_converge(history: Sequence[Sequence[float | None]]) -> float:
     `history` has rows of generation, simulations and best objective; the descent begins with the first
     finite one.
     """
-    best = np.array([math.inf if row[2] is None else row[2] for row in history], dtype=float)
+    best = np.array([np.inf if row[2] is None else row[2] for row in history], dtype=float)
     finite = best[np.isfinite(best)]
     if not finite.size:
-        return math.nan
+        return np.nan
     limit = finite[-1] + CONVERGED * (finite[0] - finite[-1])
     return float(history[int(np.argmax(best <= limit))][0] or 0)

@@ -69,9 +69,7 @@ def page(results: Path) -> str:
 def evaluated(name: str, study: ArticleStudy, about: dict[str, Any], results: Path) -> Evaluated:
     """Read the runs of a study and test its claims."""
     rows = read_rows(results / f"{name}_runs.csv") if study.seeds else []
-    judged = [
-        Verdict(v["says"], Outcome(v["outcome"]), v["detail"], v["item"]) for v in about["findings"][name]
-    ]
+    judged = [Verdict(**v | {"outcome": Outcome(v["outcome"])}) for v in about["findings"][name]]
     return Evaluated(name, study, tuple(rows), tuple(verdicts(study.claims, rows)), tuple(judged))
 
 
@@ -81,24 +79,26 @@ def overview(made: Sequence[Evaluated]) -> str:
     claimed = sorted((v for each in made for v in each.claimed), key=lambda v: order(v.item))
     judged = sorted((v for each in made for v in each.judged), key=lambda v: order(v.item))
     theirs, ours = ([v for v in claimed if v.ours == mine] for mine in (False, True))
-    lines = [
-        "\n## In short\n",
-        f"\n- {len(theirs)} conclusions of the article, tested over the seeds: {tally(theirs)}.",
-        f"\n- {len(judged)} statements on its figures, judged without a test: {tally(judged)}.",
-        f"\n- {len(ours)} claims of ours, on other searches and another measure: {tally(ours)}.\n",
-        MEANING,
-    ]
-    where = {
-        item: ", ".join(f"[{e.study.title}](#{anchor(e.study.title)})" for e in made if item in e.study.items)
-        for item in items
-    }
-    found = {item: tally(v for v in (*theirs, *judged) if v.item == item) for item in items}
-    header = ("item", "verdicts on what the article says", "made in")
-    lines.append(table("", header, [(whole(item), found[item], where[item]) for item in items]))
-    lines.append(claims("What the article concludes", theirs))
-    rows = [(whole(v.item), v.says, whole(v.outcome.value), v.detail) for v in judged]
-    lines.append(table("What its figures show", ("item", "statement", "verdict", "what that rests on"), rows))
-    return "".join([*lines, claims("Claims of ours", ours)])
+
+    def links(item: str) -> str:
+        titles = (e.study.title for e in made if item in e.study.items)
+        return ", ".join(f"[{title}](#{anchor(title)})" for title in titles)
+
+    found = [(whole(i), tally(v for v in (*theirs, *judged) if v.item == i), links(i)) for i in items]
+    shown = [(whole(v.item), v.says, whole(v.outcome.value), v.detail) for v in judged]
+    return "".join(
+        [
+            "\n## In short\n",
+            f"\n- {len(theirs)} conclusions of the article, tested over the seeds: {tally(theirs)}.",
+            f"\n- {len(judged)} statements on its figures, judged without a test: {tally(judged)}.",
+            f"\n- {len(ours)} claims of ours, on other searches and another measure: {tally(ours)}.\n",
+            MEANING,
+            table("", ("item", "verdicts on what the article says", "made in"), found),
+            claims("What the article concludes", theirs),
+            table("What its figures show", ("item", "statement", "verdict", "what that rests on"), shown),
+            claims("Claims of ours", ours),
+        ]
+    )
 
 
 def tally(verdicts: Iterable[Verdict]) -> str:
@@ -108,9 +108,13 @@ def tally(verdicts: Iterable[Verdict]) -> str:
 
 
 def claims(title: str, found: Iterable[Verdict]) -> str:
-    """Return verdicts with their tests as a table."""
+    """Return verdicts with their tests as a table; without a test there are no numbers."""
     rows = [
-        (whole(v.item), v.says, whole(v.outcome.value), number(v.p), number(v.effect, "+")) for v in found
+        (
+            *(whole(v.item), v.says, whole(v.outcome.value)),
+            *((f"{v.p:.2g}", f"{v.effect:+.2g}") if np.isfinite(v.p) else ("", "")),
+        )
+        for v in found
     ]
     return table(title, ("item", "claim", "verdict", "p", "effect"), rows)
 
@@ -131,11 +135,6 @@ def anchor(title: str) -> str:
 def whole(text: str) -> str:
     """Return a text that no line ends within."""
     return text.replace(" ", "\N{NO-BREAK SPACE}")
-
-
-def number(value: float, sign: str = "") -> str:
-    """Return a number with two digits, or nothing where there is none."""
-    return f"{value:{sign}.2g}" if np.isfinite(value) else ""
 
 
 def provenance(made: Sequence[Evaluated], about: dict[str, Any], results: Path) -> str:
@@ -160,8 +159,7 @@ def section(each: Evaluated, about: dict[str, Any], results: Path) -> str:
     study, rows = each.study, each.rows
     items, settings = ", ".join(study.items).capitalize(), f"../benchmarks/article/{each.name}.yaml"
     lines = [
-        f"\n## {study.title}\n",
-        f"\n{items} ([settings]({settings})). {study.about.strip()}\n",
+        f"\n## {study.title}\n\n{items} ([settings]({settings})). {study.about.strip()}\n",
         "".join(f"\n- {name}: {text}" for name, text in about["facts"][each.name].items() if name != "cells"),
     ]
     if rows:
@@ -178,9 +176,8 @@ def section(each: Evaluated, about: dict[str, Any], results: Path) -> str:
         units |= UNITS | {f"check {name}": "deg" for name in study.checks}
         lines += [study_table(one, rows, list(cells), units) for one in study.tables]
     for figure in study.figures:
-        if figure.item:
-            (file,) = results.glob(f"{figure.item.replace(' ', '_')}.*")
-            lines.append(f"\n![{figure.title}](reproduction/{file.name})\n")
+        (file,) = results.glob(f"{figure.item.replace(' ', '_')}.*")
+        lines.append(f"\n![{figure.title}](reproduction/{file.name})\n")
     return "".join(lines)
 
 
@@ -205,23 +202,22 @@ def spread(values: Sequence[float]) -> str:
     known = known[np.isfinite(known)]
     if not known.size:
         return ""
-    low, middle, high = (
-        f"{v:.0f}" if abs(v) >= 100 else f"{v:.3g}" for v in (known.min(), np.median(known), known.max())
-    )
+    three = (np.median(known), known.min(), known.max())
+    middle, low, high = (f"{v:.0f}" if abs(v) >= 100 else f"{v:.3g}" for v in three)
     return f"{middle} [{low}, {high}]" if known.size > 1 else middle
 
 
 def read_rows(file: Path) -> list[Row]:
     """Read the runs of a study."""
     with file.open(newline="", encoding="utf-8") as text:
-        return [row(line) for line in csv.DictReader(text)]
-
-
-def row(line: dict[str, str]) -> Row:
-    """Return a run from a line of the CSV."""
-    cell, seed, failed = line.pop("cell"), int(line.pop("seed")), line.pop("failed")
-    values = {} if failed else {name: float(v) if v else float("nan") for name, v in line.items()}
-    return Row(cell, seed, values, failed)
+        rows = [
+            (line.pop("cell"), int(line.pop("seed")), line.pop("failed"), line)
+            for line in csv.DictReader(text)
+        ]
+    numbers = [
+        {name: float(v or "nan") for name, v in line.items() if not failed} for *_, failed, line in rows
+    ]
+    return [Row(cell, seed, n, failed) for (cell, seed, failed, _), n in zip(rows, numbers, strict=True)]
 
 
 if __name__ == "__main__":

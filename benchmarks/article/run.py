@@ -1,4 +1,4 @@
-"""The article's tables and figures over many seeds: `make article`, and `make article QUICK=1`.
+"""The article's tables and figures over many seeds: `make article`, and `make article ARGS=--quick`.
 
     python benchmarks/article/run.py [--quick] [--processes N] [STUDY ...]
 
@@ -14,6 +14,7 @@ import os
 import platform
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,46 +26,32 @@ from statements import statements
 from studies import DETERMINED_AT_DEG, Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.progress import no_progress
 from hydroid.reporting.study_report import runs_csv
 from hydroid.studies.execution import processes
 
 ROOT = Path(__file__).parents[2]
 
 
-def main() -> None:
+def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
     """Run the studies, and write results and page."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("studies", nargs="*")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--processes", type=int, default=0)
-    given = parser.parse_args()
-    folder = ROOT / "runs" / ("article-quick" if given.quick else "article")
-    results = folder / "results" if given.quick else ROOT / "docs" / "reproduction"
+    folder = ROOT / "runs" / ("article-quick" if quick else "article")
+    results = folder / "results" if quick else ROOT / "docs" / "reproduction"
     results.mkdir(parents=True, exist_ok=True)
-    every = load_studies()
-    plans = [Plan(n, every[n], given.quick) for n in every if n in (given.studies or every)]
-    with processes(given.processes) as executor:
-        made = [plan.run(folder, executor, no_progress) for plan in plans]
+    plans = [Plan(n, study, quick) for n, study in load_studies().items() if n in chosen or not chosen]
+    with processes(processes_at_most) as executor:
+        made = [plan.run(folder, executor) for plan in plans]
     for runs in made:
-        write_study(runs, results)
-    if given.studies:
-        return
-    text = json.dumps(account(made, quick=given.quick), indent=1, ensure_ascii=False) + "\n"
-    (results / "about.json").write_text(text, encoding="utf-8")
-    target = results.with_suffix(".md")
-    target.write_text(page(results), encoding="utf-8")
-    print(target)
-
-
-def write_study(runs: Runs, results: Path) -> None:
-    """Write a study's runs and the figures that are the article's."""
-    if runs.rows:
-        (results / f"{runs.plan.name}_runs.csv").write_text(runs_csv(runs.rows), encoding="utf-8")
-    for figure in runs.plan.study.figures:
-        if figure.item:
+        if runs.rows:
+            (results / f"{runs.plan.name}_runs.csv").write_text(runs_csv(runs.rows), encoding="utf-8")
+        for figure in runs.plan.study.figures:
             file = results / f"{figure.item.replace(' ', '_')}.svg"
             draw(runs, figure).savefig(file, metadata={"Date": None})
+    if not chosen:
+        text = json.dumps(account(made, quick=quick), indent=1, ensure_ascii=False) + "\n"
+        (results / "about.json").write_text(text, encoding="utf-8")
+        target = results.with_suffix(".md")
+        target.write_text(page(results), encoding="utf-8")
+        print(target)
 
 
 def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
@@ -80,21 +67,19 @@ def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
     seconds = dict[str, list[float]]()
     for cell, result in distinct.values():
         seconds.setdefault(cell, []).append(result.get("seconds", 0.0))
-    code = Counter(str(result.get("code", "not recorded")) for _, result in distinct.values())
+    judged = {runs.plan.name: [asdict(verdict) for verdict in statements(runs)] for runs in studies}
+    kept = ("says", "outcome", "detail", "item")
     return {
         "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "quick": quick,
         "runs": len(distinct),
         "seconds": round(sum(float(np.median(times)) * len(times) for times in seconds.values())),
-        "code": dict(code),
+        "code": Counter(str(result.get("code", "not recorded")) for _, result in distinct.values()),
         "facts": {runs.plan.name: facts(runs) for runs in studies},
         "findings": {
-            runs.plan.name: [
-                {"says": v.says, "outcome": v.outcome.value, "detail": v.detail, "item": v.item}
-                for v in statements(runs)
-            ]
-            for runs in studies
+            name: [{key: v[key].value if key == "outcome" else v[key] for key in kept} for v in found]
+            for name, found in judged.items()
         },
     }
 
@@ -104,15 +89,15 @@ def facts(runs: Runs) -> dict[str, str]:
     plan, log = runs.plan, runs.problem.logs[0]
     found = {"base settings": plan.study.base}
     if plan.tasks:
-        total = sum(row.values.get("simulations", 0.0) for row in runs.rows)
-        seconds = sum(row.values.get("seconds", 0.0) for row in runs.rows)
+        total, seconds = (
+            sum(row.values.get(n, 0.0) for row in runs.rows) for n in ("simulations", "seconds")
+        )
         found["seeds"] = f"1 to {max(task.seed for task in plan.tasks)}"
         found["simulations"] = f"{total:,.0f} in {seconds:,.0f} s of one core"
-    found["data"] = f"{log.duration:.3g} s, " + (
-        "simulated at the truth under random commands, no noise"
-        if plan.study.simulated is not None
-        else ", ".join(Path(one.source).name for one in plan.logs)
-    )
+    data = "simulated at the truth under random commands, no noise"
+    if plan.study.simulated is None:
+        data = ", ".join(Path(one.source).name for one in plan.logs)
+    found["data"] = f"{log.duration:.3g} s, {data}"
     if (known := runs.directions) is not None:
         limit = f"to {100 * WEAK_ABOVE:g} % or better at {DETERMINED_AT_DEG:g} deg of white noise"
         found["identifiable directions"] = f"{known.rank} of {len(known.names)} ({limit})"
@@ -120,4 +105,9 @@ def facts(runs: Runs) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("studies", nargs="*")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--processes", type=int, default=0)
+    given = parser.parse_args()
+    main(given.studies, given.processes, quick=given.quick)

@@ -1,6 +1,6 @@
 """Verdicts that need no test over seeds: on statements that figures are judged by (choices.md)."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,30 +16,26 @@ FOLLOWS = 0.05
 """rms error, as part of the record's range, up to which a response follows the data"""
 PEAK = 0.1
 """part of the record's range by which a peak or trough must stand out"""
-FULL_COMMAND = 100.0
-"""largest command [%]"""
 
-Judged = tuple[Outcome, str]
+Judged = tuple[bool | Outcome, str]
 """whether a statement holds, and what that rests on"""
 
 
-def statements(runs: Runs) -> Generator[Verdict]:
+def statements(runs: Runs) -> Iterator[Verdict]:
     """Yield the verdict on the statements of each figure that has some."""
     for figure in runs.plan.study.figures:
-        judged = {says: _ranking(runs, groups) for says, groups in figure.orders.items()}
+        for says, groups in figure.orders.items():
+            effects = np.degrees(jacobian(runs.problem, runs.theta).effects).tolist()
+            by_name = dict(zip(runs.problem.parameters.names, effects, strict=True))
+            yield Verdict(says, *ranking(by_name, groups), figure.item)
         if figure.says:
-            judged[figure.says] = JUDGES[figure.kind](runs, figure)
-        for says, (outcome, detail) in judged.items():
-            yield Verdict(says, outcome, detail, figure.item)
+            holds, detail = JUDGES[figure.kind](runs, figure)
+            if isinstance(holds, bool):
+                holds = Outcome.CONFIRMED if holds else Outcome.OPEN
+            yield Verdict(figure.says, holds, detail, figure.item)
 
 
-def _ranking(runs: Runs, groups: Sequence[Sequence[str]]) -> Judged:
-    """Whether 1 % of each parameter of a group moves the angle more than 1 % of any in the next group."""
-    effects = np.degrees(jacobian(runs.problem, runs.theta).effects).tolist()
-    return ranking(dict(zip(runs.problem.parameters.names, effects, strict=True)), groups)
-
-
-def ranking(effects: Mapping[str, float], groups: Sequence[Sequence[str]]) -> Judged:
+def ranking(effects: Mapping[str, float], groups: Sequence[Sequence[str]]) -> tuple[Outcome, str]:
     """Whether each effect of a group [deg rms] is larger than each of the next one."""
     holds = all(min(effects[n] for n in a) > max(effects[n] for n in b) for a, b in pairwise(groups))
     found = sorted((name for group in groups for name in group), key=lambda name: -effects[name])
@@ -48,20 +44,25 @@ def ranking(effects: Mapping[str, float], groups: Sequence[Sequence[str]]) -> Ju
     return outcome, f"rms change of the angle in deg for 1 % of each parameter: {sizes}"
 
 
+def local_minima(error: Array) -> int:
+    """Return how many points of a grid, shape (n, m), lie below all of their up to eight neighbours."""
+    known = np.where(np.isfinite(error), error, np.inf)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(known, 1, constant_values=np.inf), (3, 3))
+    others = np.delete(around.reshape(*error.shape, 9), 4, axis=2)
+    return int(np.sum(known < others.min(axis=2)))
+
+
+def turning_points(angle: Array) -> int:
+    """Return how many peaks and troughs of a record, shape (T,), stand out by PEAK of its range."""
+    least = PEAK * np.ptp(angle)
+    return sum(len(find_peaks(sign * angle, prominence=least)[0]) for sign in (1, -1))
+
+
 def _minima(runs: Runs, figure: Figure) -> Judged:
     first, second = figure.parameters
     error = surface(runs.problem, runs.theta, (first, second), runs.plan.points(figure), None).error
     count, shape = local_minima(error), " by ".join(map(str, error.shape))
-    return _found(count > 1), f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
-
-
-def local_minima(error: Array) -> int:
-    """Return how many points of a grid, shape (n, m), lie below all of their up to eight neighbours."""
-    known = np.where(np.isfinite(error), error, np.inf)
-    padded = np.pad(known, 1, constant_values=np.inf)
-    n, m = error.shape
-    around = [padded[i : i + n, j : j + m] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
-    return int(np.sum(known < np.min(around, axis=0)))
+    return count > 1, f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
 
 
 def _following(runs: Runs, figure: Figure) -> Judged:
@@ -75,39 +76,28 @@ def _following(runs: Runs, figure: Figure) -> Judged:
     limit = FOLLOWS * float(np.ptp(runs.record[1]))
     errors = "; ".join(f"{cell} {error:.3g} deg" for cell, error in medians.items())
     allowed = f"{limit:.3g} deg, {100 * FOLLOWS:g} % of the record's range"
-    return _found(max(medians.values()) <= limit), f"median rms error: {errors}; to follow allows {allowed}"
-
-
-def turning_points(angle: Array) -> int:
-    """Return how many peaks and troughs of a record, shape (T,), stand out by PEAK of its range."""
-    least = PEAK * np.ptp(angle)
-    return sum(len(find_peaks(sign * angle, prominence=least)[0]) for sign in (1, -1))
+    return max(medians.values()) <= limit, f"median rms error: {errors}; to follow allows {allowed}"
 
 
 def _segments(runs: Runs, figure: Figure) -> Judged:
     count, turns = len(runs.problem.bounds), turning_points(runs.record[1])
     size = f"{100 * PEAK:g} % of the range"
-    return _found(count == turns), f"segments: {count}; peaks and troughs of at least {size}: {turns}"
+    return count == turns, f"segments: {count}; peaks and troughs of at least {size}: {turns}"
 
 
 def _commands(runs: Runs, figure: Figure) -> Judged:
     command = runs.problem.logs[0].command[:, runs.problem.outputs[0]]
     levels = 1 + int(np.count_nonzero(np.diff(command)))
-    inside = bool(np.abs(command).max() <= FULL_COMMAND)
-    return _found(inside), f"{levels} levels from {command.min():.0f} to {command.max():.0f} %"
+    inside = bool(np.abs(command).max() <= 100.0)
+    return inside, f"{levels} levels from {command.min():.0f} to {command.max():.0f} %"
 
 
 def _arm(runs: Runs, figure: Figure) -> Judged:
     joints = runs.problem.settings.arm.joints
     kinds = [joint.actuator.kind for joint in joints if joint.actuator is not None]
-    have = {kind: kinds.count(kind) for kind in ("linear", "rotary")}
-    count = " and ".join(f"{number} {kind}" for kind, number in have.items())
-    same = all(have[kind] == number for kind, number in figure.actuators.items())
-    return _found(same), f"{len(joints)} joints; {count} actuators"
-
-
-def _found(holds: bool) -> Outcome:
-    return Outcome.CONFIRMED if holds else Outcome.OPEN
+    count = " and ".join(f"{kinds.count(kind)} {kind}" for kind in ("linear", "rotary"))
+    same = all(kinds.count(kind) == number for kind, number in figure.actuators.items())
+    return same, f"{len(joints)} joints; {count} actuators"
 
 
 JUDGES: dict[str, Callable[[Runs, Figure], Judged]] = {

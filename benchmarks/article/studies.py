@@ -1,6 +1,5 @@
 """The article's studies: cells and seeds, the truth, what is shown, and what is claimed."""
 
-import re
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.progress import Progress
+from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 from hydroid.settings.study import Changes, StudySettings, cell_settings
@@ -59,11 +58,10 @@ class Figure(Settings):
     """A figure, and the statement `says` or the orders of effects that it is judged by."""
 
     title: str
-    kind: Literal["convergence", "spread", "responses", "commands", "segments", "segment bests",
+    kind: Literal["convergence", "responses", "commands", "segments", "segment bests",
                   "sensitivity", "surface", "arm"]  # fmt: skip
     says: str = ""
     cells: tuple[str, ...] = ()
-    column: str = "parameter error"
     parameters: tuple[str, ...] = ()
     orders: dict[str, tuple[tuple[str, ...], ...]] = Field(default_factory=dict[str, Any])
     window_s: tuple[float, float] | None = None
@@ -73,9 +71,8 @@ class Figure(Settings):
 
     @property
     def item(self) -> str:
-        """The article's item that the figure is, as its title says; empty where it is none."""
-        found = re.match(r"figure \d+(?=[:,])", self.title.lower())
-        return found[0] if found else ""
+        """The article's item that the figure is, as its title says."""
+        return self.title.lower().partition(":")[0]
 
 
 class Claim(Settings):
@@ -128,7 +125,7 @@ class Plan:
     @cached_property
     def cells(self) -> dict[str, FitSettings]:
         """Settings of a fit, by cell."""
-        return cell_settings(self.study, FOLDER / self.name, self._changes)
+        return cell_settings(self.study, FOLDER / self.name, self.study.quick if self.quick else {})
 
     @cached_property
     def logs(self) -> list[Log]:
@@ -141,31 +138,25 @@ class Plan:
     @cached_property
     def tasks(self) -> list[Task]:
         """All runs."""
-        checks = read_checks(self.study, FOLDER / self.name, read_logs, self._changes)
+        changes = self.study.quick if self.quick else {}
+        checks = read_checks(self.study, FOLDER / self.name, read_logs, changes)
         if self.quick:
             checks = {name: (log.first(QUICK_S), own) for name, (log, own) in checks.items()}
         seeds = min(self.study.seeds, QUICK_SEEDS) if self.quick else self.study.seeds
         return make_tasks(self.cells, range(1, seeds + 1), self.logs, checks)
 
-    @property
-    def _changes(self) -> Changes:
-        return self.study.quick if self.quick else {}
-
     def points(self, figure: Figure) -> int:
         """Return how many values of each parameter a surface has."""
         return QUICK_POINTS if self.quick else figure.points
 
-    def run(self, folder: Path, executor: Executor, progress: Progress) -> "Runs":
+    def run(self, folder: Path, executor: Executor) -> "Runs":
         """Perform the runs that `folder` does not have yet; return what all of them gave."""
-        problem = Problem(next(iter(self.cells.values())), self.logs)
-        truth = self.study.truth
+        problem, truth = Problem(next(iter(self.cells.values())), self.logs), self.study.truth
         directions = true_directions(problem, truth, DETERMINED_AT_DEG) if truth else None
-        results = run_all(self.tasks, folder, executor, progress)
-        rows = [
-            with_truth(measured(task, result), task, result, directions)
-            for task, result in zip(self.tasks, results, strict=True)
-        ]
-        return Runs(self, problem, directions, tuple(results), tuple(rows))
+        results = tuple(run_all(self.tasks, folder, executor, no_progress))
+        pairs = zip(self.tasks, results, strict=True)
+        rows = tuple(with_truth(measured(task, one), task, one, directions) for task, one in pairs)
+        return Runs(self, problem, directions, results, rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,17 +196,16 @@ def simulated_log(
     settings: FitSettings, data: Simulated, truth: Mapping[str, float], longest: float = np.inf
 ) -> Log:
     """Return a log simulated at the true parameters, at most `longest` seconds long."""
-    columns = [j - 1 for j in settings.outputs]
+    columns, (low, high) = [j - 1 for j in settings.outputs], data.range_deg or (-np.inf, np.inf)
 
     def inside(log: Log) -> bool:
-        if data.range_deg is None:
-            return True
         try:
             angle = np.degrees(simulate_log(settings, log, truth, "truth").angle[:, columns])
         except RunError:
             return False
-        return bool(data.range_deg[0] < angle.min() and angle.max() < data.range_deg[1])
+        return bool(low < angle.min() and angle.max() < high)
 
     pose, seconds = settings.arm.pose(data.pose), min(data.duration_s, longest)
-    commands = pseudo_random_log(pose, list(data.joints), seconds, seed=data.seed, allowed=inside)
+    allowed = inside if data.range_deg else lambda log: True
+    commands = pseudo_random_log(pose, list(data.joints), seconds, seed=data.seed, allowed=allowed)
     return simulate_log(settings, commands, truth, "truth")

@@ -47,8 +47,8 @@ def test_only_seeds_that_both_cells_have_are_compared():
     made[0] = Row("A", 1, {}, "diverged")
     made[-1] = Row("B", 8, {"error": float("nan")})
     (verdict,) = verdicts([CLAIM], made)
-    assert verdict.seeds == 6
-    assert verdict.medians == (3.5, 4.5)
+    assert verdict.detail.startswith("median error 3.5 against 4.5;")
+    assert verdict.detail.endswith("6 seeds")
 
 
 def test_holm_corrects_over_all_claims_of_a_study():

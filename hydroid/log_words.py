@@ -4,8 +4,10 @@ A statement follows the file, line and column, and ends with no full stop. `{row
 rows below the first one.
 """
 
-CELLS = "correct the cells, or log.{quantity}"
-OUTSIDE = "{0} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}{others}{rows}"
+OUTSIDE = (
+    "{quantity} of joint{s} {names} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}{rows}"
+)
+UNIT = "the file says that {names} {is} in {unit}, but log."
 RANGE = "if commands are in {range}, set log.command.scale: {scale}"
 
 LOG_WORDS: dict[str, tuple[str, str]] = {
@@ -38,12 +40,15 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "{what}{rows}",
         "time is a number in log.time.unit, or a time of day (12:30:05.25), with or without date",
     ),
-    "outside": (OUTSIDE, f"{CELLS}'s unit, scale and offset of {{0}}, or the joint's range"),
+    "outside": (
+        OUTSIDE,
+        "correct the cells, or unit, scale and offset of {column} in log.{quantity}, or the joint's range",
+    ),
     "outside in another range": (OUTSIDE, RANGE),
     "outside in another unit": (OUTSIDE, "if angles are in {other}, set log.angle.unit: {other}"),
     "outside, turned": (
         OUTSIDE,
-        "if joint {joint} counts the other way, set log.joints.{joint}.angle.scale: {scale}",
+        "if joint {0} counts the other way, set log.joints.{0}.angle.scale: {scale}",
     ),
     "jump": (
         "{0} jumps by {step:.6g} deg from one sample to the next{rows}",
@@ -59,7 +64,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "time does not increase: {time:.12g} s follows {before:.12g} s{rows}",
         "delete or sort the lines, or log the time with more digits",
     ),
-    "too short": ("lasts {duration:.6g} s ({samples}); at least {shortest:g} s is needed", "{remedy}"),
+    "too short": ("lasts {duration:.6g} s ({samples}); at least 0.5 s is needed", "{remedy}"),
     "too slow": ("has a sample every {period:.6g} s, at most {slowest:g} s can be used", "{remedy}"),
     "gap": (
         "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
@@ -74,24 +79,14 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "commands are held and angles interpolated",
     ),
     "resampled": (
-        "resampled from {step:.6g} s to {period:g} s",
-        "commands held, angles interpolated",
-    ),
-    "evened": (
-        "uneven samples brought to an even period of {period:g} s",
+        "resampled from steps of {step:.6g} s to {period:g} s",
         "commands held, angles interpolated",
     ),
     # its units
-    "unit of time": (
-        "the file says that {columns} in {unit}, but log.time.unit is {setting}",
-        "set log.time.unit: {unit}",
-    ),
-    "unit of angle": (
-        "the file says that {columns} in {unit}, but log.angle.unit is {setting}",
-        "set log.angle.unit: {unit}",
-    ),
+    "unit of time": (f"{UNIT}time.unit says otherwise", "set log.time.unit: {unit}"),
+    "unit of angle": (f"{UNIT}angle.unit says otherwise", "set log.angle.unit: {unit}"),
     "unit of command": (
-        "the file says that {columns} in {unit}, but log.command.scale is 1",
+        f"{UNIT}command.scale is 1",
         "command [%] = scale · cell + offset: for ±10 V set log.command.scale: 10",
     ),
     "raised range": ("command of joint{s} {names} rests at the middle of {range}", RANGE),
@@ -106,7 +101,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     # its motion
     "undriven": ("no joint is driven", "check log.command"),
     "angle is constant": (
-        "angle of joint{s} {names} never changes{driven}",
+        "angle of joint{s} {names} never changes",
         "check the sensor and log.angle",
     ),
     "command is constant": (
@@ -122,15 +117,15 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "the log's clocks differ: mend the log, or set log.delay_s: {delay:.2f}",
     ),
     "turned": (
-        "angle of joint{s} {names} moves against the command (for {share} of travel)",
+        "angle of joint {0} moves against the command (for {against:.0%} of {path:.3g} deg of travel)",
         "if the command is logged with the opposite sign, set log.joints.{0}.command.scale: -1",
     ),
     "no motion": (
-        "strong commands hardly move joint{s} {names}, by {most:.2g} deg at most",
+        "strong commands hardly move joint {0}, by {most:.2g} deg at most",
         "check log.joints: is this the angle of that command?",
     ),
     "at a stop": (
-        "is driven against the end of its travel: {joints}",
+        "joint {0} is driven against the end of its travel for {seconds:.3g} s",
         "this time says nothing about the valve; the joint's range in the arm's file should end there",
     ),
     "no rest": (

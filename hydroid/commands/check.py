@@ -77,7 +77,7 @@ def check(
         print(*checked.logs[0].findings, *checked.findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    from hydroid.log import check_log, driven_joints, grouped, in_one_line, motion_findings, survey
+    from hydroid.log import check_log, driven_joints, grouped, motion_findings, survey
 
     found: list[LogCheck] = []
     for path in map(Path, as_list(logs)):
@@ -91,7 +91,7 @@ def check(
     together = survey([one.log for one in found if one.log])
     every = [*(finding for one in found for finding in one.findings), *together]
     every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
-    lines = [f"{finding.level}: {in_one_line(finding, others)}" for finding, others in grouped(every)]
+    lines = [f"{level}: {line}" for level, line in grouped(every)]
     content = {"logs": [one.content for one in found], "findings": plain_findings(together)}
     usable = [one.line for one in found if one.log]
     status = 0 if len(usable) == len(found) else 2

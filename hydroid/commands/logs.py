@@ -46,7 +46,7 @@ def read_with_findings(
     logs: "LogSources", settings: FitSettings, *, repair: bool = False, commands: bool = False
 ) -> "tuple[list[Log], list[LogFinding]]":
     """Do as `read_logs`, and return the warnings and notes too; logs of `commands` need no angles."""
-    from hydroid.log import Log, grouped, in_one_line, read_log
+    from hydroid.log import Log, grouped, read_log
 
     read: list[Log] = []
     findings: list[LogFinding] = []
@@ -62,9 +62,8 @@ def read_with_findings(
         findings += more
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
-    for finding, others in grouped(findings):
-        level = logging.WARNING if finding.level == "warning" else NOTE
-        _log.log(level, "%s: %s", finding.level, in_one_line(finding, others))
+    for level, line in grouped(findings):
+        _log.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read, findings
 
 

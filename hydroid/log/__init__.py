@@ -1,11 +1,11 @@
 """File -> `Log`: read, checked, repaired on request, resampled to one period; and back."""
 
-from hydroid.log.finding import LogFinding, grouped, in_one_line
+from hydroid.log.finding import LogFinding, grouped
 from hydroid.log.guess import ColumnGuess, guess_columns
 from hydroid.log.log import Log
-from hydroid.log.motion import JointMotion, motion_of
+from hydroid.log.motion import JointMotion, driven_joints, motion_of
 from hydroid.log.read import check_log, open_table, read_log
-from hydroid.log.survey import driven_joints, motion_findings, survey
+from hydroid.log.survey import motion_findings, survey
 from hydroid.log.table import Table
 from hydroid.log.write import write_log, write_logs
 
@@ -19,7 +19,6 @@ __all__ = [
     "driven_joints",
     "grouped",
     "guess_columns",
-    "in_one_line",
     "motion_findings",
     "motion_of",
     "open_table",

@@ -1,30 +1,29 @@
 """Where the table of a CSV file begins: its separator, and which lines hold names, units and neither.
 
-Loggers write a preamble above the names, a row of units below them, or names in two rows (a group over each
-name). The data begin with the first line that has a number in the first column of numbers, and half as many
-as most lines. The row of names is sought above it; one that holds names of the settings is preferred. A line
-below the names is left out only if it holds no number: any other fault there is a fault of the data.
+Loggers write a preamble above the names, or a row of units below them. The data begin with the first line
+that has a number in the first column of numbers, and half as many as most lines. The row of names is sought
+above it; one that holds names of the settings is preferred. A line below the names is left out only if it
+holds no number: any other fault there is a fault of the data.
 """
 
 import csv
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from datetime import date
 from itertools import islice
+from typing import NamedTuple
 
 from hydroid.units import bare, unit_of
 
-SAMPLE = 400
-"""lines with content, from the first, that are searched"""
 TIME = re.compile(
-    r"(?:.*?[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
+    r"(?:(?:(\d{4})-?(\d{2})-?(\d{2})|.*?)[T ])?"
+    r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
 )
 """a time of day, with or without a date"""
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """The separator; line [1-based] and cells of the names; units by name; other lines that hold no data."""
 
     separator: str
@@ -39,73 +38,52 @@ def find_layout(lines: Sequence[str], wanted: Collection[str] = ()) -> Layout | 
     """Find the table in the lines of a file; None where no line has content.
 
     Args:
-        lines: all of them.
+        lines: all of them; the first 400 with content are searched.
         wanted: names of columns that the settings ask for.
     """
     declared = re.fullmatch(r"sep=([,;\t|]) *", lines[0])
     start = 1 if declared else 0
-    content = list(islice((i for i in range(start, len(lines)) if is_content(lines[i])), SAMPLE))
+    content = list(islice((k for k in range(start, len(lines)) if is_content(lines[k])), 400))
     if not content:
         return None
-    separator = declared[1] if declared else _separator([lines[i] for i in content])
-    rows = {i: [cell.strip() for cell in split(lines[i], separator)] for i in content}
-    numbers = {i: [c for c, cell in enumerate(row) if _counts(cell, separator)] for i, row in rows.items()}
+    separator = declared[1] if declared else _separator([lines[k] for k in content])
+    rows = {k: [cell.strip() for cell in split(lines[k], separator)] for k in content}
+    numbers = {k: [c for c, cell in enumerate(row) if _counts(cell)] for k, row in rows.items()}
     usual = _usual([*map(len, numbers.values())])
     pattern = Counter(tuple(at) for at in numbers.values() if len(at) == usual).most_common(1)[0][0]
-    enough = (i for i, at in numbers.items() if at and 2 * len(at) >= usual)
-    first = next((i for i in enough if pattern and pattern[0] in numbers[i]), len(lines))
-    above = [i for i in content if i < first]
-    texts = [i for i in above if not numbers[i] and sum(map(bool, rows[i])) >= max(usual / 2, 1)]
-    named = [i for i in texts if not _are_units(rows[i])] or texts
-    if not named:
-        return _commented(lines, first, separator, usual) or _layout(separator, content[0], rows, [], above)
-    header, rows[header] = _names(named, rows, wanted)
-    below = [i for i in texts if i > header and len(rows[i]) == len(rows[header])]
-    return _layout(separator, header, rows, below, above)
+    enough = (k for k, at in numbers.items() if at and 2 * len(at) >= usual)
+    first = next((k for k in enough if pattern and pattern[0] in numbers[k]), len(lines))
+    above = [k for k in content if k < first]
+    texts = [k for k in above if not numbers[k] and sum(map(bool, rows[k])) >= max(usual / 2, 1)]
+    named, remarks = [k for k in texts if not _are_units(rows[k])] or texts, list[str]()
 
+    def merit(k: int) -> tuple[int, bool, int, int]:
+        """Rank a row of names by its wanted ones, by whether they differ, by their number, by its place."""
+        names = [cell for cell in rows[k] if cell]
+        return len({*names} & {*wanted}), len({*names}) == len(names), len(names), k
 
-def _names(
-    named: Sequence[int], rows: dict[int, list[str]], wanted: Collection[str]
-) -> tuple[int, list[str]]:
-    """Choose the row of names: with most wanted names, then distinct, then most names, then the lowest."""
-    choices = [(i, rows[i]) for i in named]
-    for i in named:
-        if not _distinct(rows[i]) and len(rows.get(i - 1, [])) == len(rows[i]):
-            choices.append((i, _joined(rows[i - 1], rows[i])))
-
-    def merit(choice: tuple[int, list[str]]) -> tuple[int, bool, int, int]:
-        i, row = choice
-        return len({*row} & {*wanted}), _distinct(row), sum(map(bool, row)), i
-
-    return max(choices, key=merit)
-
-
-def _layout(
-    separator: str, header: int, rows: dict[int, list[str]], below: Sequence[int], above: Sequence[int]
-) -> Layout:
-    names, remarks = tuple(rows[header]), list[str]()
-    of_units = [i for i in below if _are_units(rows[i])]
-    pairs = [(name, bare(unit)) for i in of_units for name, unit in zip(names, rows[i], strict=False)]
+    if named:
+        header = max(named, key=merit)
+        if before := [k for k in above if k < header]:
+            remarks.append(f"the names are in line {header + 1}; {_lines(before, 'above')} left out")
+    else:
+        header = content[0]
+        # names in the last comment line above the data, as `numpy.savetxt` writes them
+        last = next((k for k in range(min(first, len(lines)) - 1, -1, -1) if lines[k].strip()), 0)
+        cells = [cell.strip() for cell in split(lines[last].lstrip(" \t#"), separator)]
+        if lines[last].lstrip()[:1] == "#" and len(cells) >= max(usual, 2) and not any(map(_counts, cells)):
+            header, rows[last] = last, cells
+            remarks.append(f"the names are in line {last + 1}, a comment")
+    below = [k for k in texts if k > header and len(rows[k]) == len(rows[header])]
+    of_units = [k for k in below if _are_units(rows[k])]
+    pairs = [pair for k in of_units for pair in zip(rows[header], map(bare, rows[k]), strict=True)]
     units = {name: unit for name, unit in pairs if name and unit}
-    if before := [i for i in above if i < header]:
-        remarks.append(f"the names are in line {header + 1}; {_lines(before)} above {_is(before)} left out")
     if units:
-        remarks.append(f"line {below[0] + 1} holds units ({', '.join(dict.fromkeys(units.values()))})")
-    if others := [i for i in below if i not in of_units]:
-        remarks.append(f"{_lines(others)} below the names {_is(others)} text and left out")
-    return Layout(separator, header + 1, names, units, frozenset(i + 1 for i in below), tuple(remarks))
-
-
-def _commented(lines: Sequence[str], first: int, separator: str, usual: int) -> Layout | None:
-    """Names in the last comment line above the data, as `numpy.savetxt` writes them."""
-    at = next((i for i in range(min(first, len(lines)) - 1, -1, -1) if lines[i].strip()), None)
-    if at is None or not lines[at].lstrip().startswith("#"):
-        return None
-    names = tuple(cell.strip() for cell in split(lines[at].lstrip().lstrip("#"), separator))
-    if len(names) < max(usual, 2) or any(is_number(name, separator) for name in names):
-        return None
-    remark = f"the names are in line {at + 1}, a comment"
-    return Layout(separator, at + 1, names, {}, frozenset(), (remark,))
+        remarks.append(f"line {of_units[0] + 1} holds units ({', '.join(dict.fromkeys(units.values()))})")
+    if others := [k for k in below if k not in of_units]:
+        remarks.append(f"{_lines(others, 'below the names')} text and left out")
+    skipped = frozenset(k + 1 for k in below)
+    return Layout(separator, header + 1, tuple(rows[header]), units, skipped, tuple(remarks))
 
 
 def _separator(sample: Sequence[str]) -> str:
@@ -113,7 +91,7 @@ def _separator(sample: Sequence[str]) -> str:
 
     def merit(separator: str) -> tuple[int, int, bool]:
         rows = [split(line, separator) for line in sample]
-        counts = [sum(_counts(c, separator) for c in row) * (len(row) > 1) for row in rows]
+        counts = [sum(map(_counts, row)) * (len(row) > 1) for row in rows]
         whole = [n * (n == len(row)) for n, row in zip(counts, rows, strict=True)]
         usual, mixed = _usual(whole), _usual(counts)
         return usual * whole.count(usual), mixed * counts.count(mixed), len(rows[0]) > 1
@@ -142,22 +120,31 @@ def split(line: str, separator: str) -> list[str]:
     return line.split(None if spaces else separator)
 
 
-def is_number(cell: str, separator: str = ",") -> bool:
-    """Return whether float() reads the cell, but for the digit groups of Python's own literals (1_000)."""
+def number(cell: str) -> float | None:
+    """Return what float() reads, but for the digit groups of Python's literals (1_000); None: no number."""
     try:
-        float(cell if separator == "," else cell.replace(",", "."))
+        return float(cell) if "_" not in cell else None
     except ValueError:
-        return False
-    return "_" not in cell
+        return None
 
 
-def is_clock(cell: str) -> bool:
-    """Return whether a cell holds a time of day, such as 12:30:05.25 or 2024-05-01T12:30:05."""
-    return len(cell) < 50 and TIME.fullmatch(cell.strip()) is not None
+def clock(cell: str) -> int | None:
+    """Return the time in a cell [ns], of the day or with an ISO date since year 0; None: there is none."""
+    match = TIME.fullmatch(cell) if len(cell) < 50 else None
+    if match is None:
+        return None
+    year, month, day, hour, minute, second, fraction, half = match.groups()
+    hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
+    try:
+        days = date(int(year), int(month), int(day)).toordinal() if year else 0
+    except ValueError:  # such as the 31st of February
+        return None
+    seconds = ((24 * days + hours) * 60 + int(minute)) * 60 + int(second)
+    return seconds * 10**9 + int((fraction or "0").ljust(9, "0"))
 
 
-def _counts(cell: str, separator: str) -> bool:
-    return is_number(cell, separator) or is_clock(cell)
+def _counts(cell: str) -> bool:
+    return number(cell.replace(",", ".")) is not None or clock(cell.strip()) is not None
 
 
 def _are_units(row: Sequence[str]) -> bool:
@@ -165,23 +152,7 @@ def _are_units(row: Sequence[str]) -> bool:
     return bool(there) and all(unit_of(cell) for cell in there)
 
 
-def _distinct(row: Sequence[str]) -> bool:
-    there = [cell for cell in row if cell]
-    return len(set(there)) == len(there)
-
-
-def _joined(groups: Sequence[str], row: Sequence[str]) -> list[str]:
-    """Return each name after that of its group, which stands over the first column of the group."""
-    joined, group = list[str](), ""
-    for above, name in zip(groups, row, strict=True):
-        group = above or group
-        joined.append(f"{group} {name}".strip())
-    return joined
-
-
-def _lines(at: Sequence[int]) -> str:
-    return f"line {at[0] + 1}" if len(at) == 1 else f"lines {at[0] + 1} to {at[-1] + 1}"
-
-
-def _is(at: Sequence[int]) -> str:
-    return "is" if len(at) == 1 else "are"
+def _lines(at: Sequence[int], where: str) -> str:
+    return (
+        f"line {at[0] + 1} {where} is" if len(at) == 1 else f"lines {at[0] + 1} to {at[-1] + 1} {where} are"
+    )

@@ -1,15 +1,12 @@
 """A finding of a log: what is wrong or worth knowing, and its place in the file."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hydroid.errors import LogError
 from hydroid.findings import Finding, Level
 from hydroid.words import hint, statement
-
-MAX_NAMED = 3
-"""logs by name in a line"""
 
 
 @dataclass(frozen=True)
@@ -42,45 +39,46 @@ class LogFinding(Finding):
         return str(self.error())
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where findings stand: in a file, and in its line or row [1-based] and column where these are known."""
+def found(
+    level: Level,
+    kind: str,
+    source: str,
+    subjects: Sequence[object] = (),
+    place: tuple[str, int | None, str] = ("line", None, ""),
+    **numbers: float | str,
+) -> LogFinding:
+    """Make a finding about a file.
 
-    source: str
-    line: int | None = None
-    column: str = ""
-    name: str = "line"
-
-    def finding(
-        self, level: Level, kind: str, subjects: Sequence[object] = (), **numbers: float | str
-    ) -> LogFinding:
-        """Make a finding at this place; joints among its subjects have numbers from 1."""
-        line = f", {self.name} {self.line}" if self.line else ""
-        where = self.source + line + (f", column {self.column}" if self.column else "")
-        names = tuple(map(str, subjects))
-        return LogFinding(kind, level, names, numbers, where, self.source, self.line, self.column)
-
-
-def unreadable(source: str, error: LogError) -> LogFinding:
-    """Return the error that ended the reading of a log as a finding."""
-    numbers: dict[str, float | str] = {"what": error.what, "hint": error.hint}
-    return LogFinding("unreadable", "error", (), numbers, error.where, source)
+    `place` is what its rows are called, the number of one [1-based] and a column's name. Joints among the
+    subjects have numbers from 1.
+    """
+    rows, line, column = place
+    where = source + (f", {rows} {line}" if line else "") + (f", column {column}" if column else "")
+    return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, line, column)
 
 
-def grouped(findings: Sequence[LogFinding]) -> list[tuple[LogFinding, list[str]]]:
-    """Return the first finding of each kind, in order, with the other logs that have it too."""
+def together(findings: Iterable[LogFinding]) -> list[LogFinding]:
+    """Make one finding, the first with the subjects of all, of those of a kind that have the same hint."""
+    first = dict[tuple[str, str], LogFinding]()
+    for finding in findings:
+        key = finding.kind, finding.hint
+        subjects = first[key].subjects if key in first else ()
+        first[key] = replace(
+            first.get(key, finding), subjects=tuple(dict.fromkeys(subjects + finding.subjects))
+        )
+    return [*first.values()]
+
+
+def grouped(findings: Sequence[LogFinding]) -> list[tuple[Level, str]]:
+    """Return findings as lines with their levels, one that several logs share once."""
     groups: dict[tuple[str, ...], list[LogFinding]] = {}
     for finding in findings:
         key = (finding.level, finding.kind, finding.column, str(finding.numbers.get("what", "")))
         groups.setdefault(key, []).append(finding)
-    first = [(group[0], dict.fromkeys(f.source for f in group)) for group in groups.values()]
-    return [(finding, [log for log in logs if log != finding.source]) for finding, logs in first]
-
-
-def in_one_line(finding: LogFinding, others: Sequence[str]) -> str:
-    """Return a finding and how many `others` logs have it too, as `grouped` gives them."""
-    if not others:
-        return str(finding)
-    names = ", ".join(Path(log).name for log in others[:MAX_NAMED])
-    names += ", ..." if len(others) > MAX_NAMED else ""
-    return f"{finding} (and in {len(others)} more log{'s' if len(others) > 1 else ''}: {names})"
+    lines = list[tuple[Level, str]]()
+    for first, *more in groups.values():
+        logs = [Path(log).name for log in dict.fromkeys(f.source for f in more) if log != first.source]
+        names = ", ".join(logs[:3]) + (", ..." if len(logs) > 3 else "")
+        also = f" (and in {len(logs)} more log{'s' * (len(logs) > 1)}: {names})" if logs else ""
+        lines.append((first.level, f"{first}{also}"))
+    return lines

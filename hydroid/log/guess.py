@@ -6,28 +6,21 @@ number its own name holds, or else the next in order.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.log.clues import Kind, column_unit, direction, joint_of, kind_of, likely_range, number_in
 from hydroid.log.log import Floats
-from hydroid.log.names import Kind, column_unit, direction, joint_of, kind_of, number_in
-from hydroid.log.ranges import likely_pair, likely_range
-from hydroid.log.table import Table
+from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 
 PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """sample periods that are proposed [s]"""
-JUMP = 0.2  # largest step of a smooth signal, as a part of its range
-STILL = 0.5  # part of the samples in which a command keeps its value
-RADIANS = 6.3  # largest angle in a log in rad
-STEADY = 0.5  # least ratio of the median and the mean step of a time
 
 
-@dataclass(frozen=True)
-class ColumnGuess:
+class ColumnGuess(NamedTuple):
     """What the columns of a log seem to hold.
 
     Attributes:
@@ -41,18 +34,13 @@ class ColumnGuess:
     unused: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Column:
+class _Column(NamedTuple):
     name: str
     kind: Kind
     unit: str
     values: Floats
     why: str
     clock: bool
-
-    @property
-    def steps(self) -> Floats:
-        return np.diff(self.values[np.isfinite(self.values)])
 
 
 def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
@@ -74,25 +62,24 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
     step *= UNITS[unit].factor
     said = "dates or times of day" if time.clock else unit
     reasons = [f"{time.name}: time in {said}, {time.why}, every {step:.3g} s"]
-    others = [column for column in columns if column is not time]
+    others = [column for column in columns if column[0] != time.name]
     angles, commands = (
-        _by_joint([c for c in others if c.kind == k], joints, reasons) for k in ("angle", "command")
+        _by_joint([c for c in others if c.kind == kind], joints, reasons) for kind in ("angle", "command")
     )
     unitless = [np.nanmax(np.abs(column.values)) for column, *_ in angles.values() if column.unit == ""]
-    default = "rad" if unitless and max(unitless) <= RADIANS else "deg"
-    entries = dict[int, dict[str, Any]]()
+    default = "rad" if unitless and max(unitless) <= 6.3 else "deg"
+    entries, used = dict[int, dict[str, Any]](), {time.name}
     for joint in sorted({*angles, *commands}):
-        entries[joint] = {"command": None, "angle": None}
-        name = "" if joints[joint - 1] == f"joint{joint}" else f" ({joints[joint - 1]})"
-        if joint in commands:
-            entries[joint]["command"], said = _command(commands[joint])
-            reasons.append(f"{said} of joint {joint}{name}, {commands[joint][0].why}")
-        if joint in angles:
-            (column, *_) = angles[joint]
-            angle_unit = column.unit if column.unit == "rad" else default if column.unit == "" else "deg"
-            entries[joint]["angle"] = {"column": column.name, "unit": angle_unit}
-            reasons.append(f"{column.name}: angle in {angle_unit} of joint {joint}{name}, {column.why}")
-    used = {time.name, *(c.name for group in (*angles.values(), *commands.values()) for c in group)}
+        entry = entries[joint] = {"command": None, "angle": None}
+        name = f"joint {joint}" if joints[joint - 1] == f"joint{joint}" else joints[joint - 1]
+        if pair := commands.get(joint):
+            entry["command"], said = _command(pair)
+            reasons.append(f"{said} of {name}, {pair[0].why}")
+        for column in angles.get(joint, [])[:1]:
+            angle_unit = {"rad": "rad", "": default}.get(column.unit, "deg")
+            entry["angle"] = {"column": column.name, "unit": angle_unit}
+            reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
+        used |= {column.name for column in (*commands.get(joint, ()), *angles.get(joint, ()))}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
     log |= {"period_s": min(PERIODS, key=lambda period: abs(np.log(period / step))), "joints": entries}
     return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
@@ -102,57 +89,54 @@ def _columns(table: Table) -> list[_Column]:
     """Read every column of numbers, those of the usual length."""
     names = list(dict.fromkeys(name for name in table.names if name))
     units = {name: column_unit(name, table.units.get(name, "")) for name in names}
-    kinds: dict[str, Kind] = {name: kind_of(name, units[name]) for name in names}
+    kinds = {name: kind_of(name, units[name]) for name in names}
     read, clocks = dict[str, Floats](), set[str]()
     for group in (names, [name for name in names if kinds[name] != "other"], *([name] for name in names)):
+        held = {name: "command" if kinds[name] == "command" else "angle" for name in group}
         try:
-            cells = table.read(group, {name for name in names if kinds[name] == "command"})
+            recording = table.read([Signal(name, kind) for name, kind in held.items()])
         except LogError:
             continue  # text, or different lengths or clocks
-        read |= dict(zip(group, cells.values.T, strict=True))
-        clocks |= cells.clocks
+        read |= dict(zip(group, recording.values.T, strict=True))
+        clocks |= recording.clocks
         if len(group) > 1:
             break
     lengths = [len(values) for values in read.values()]
     usual = max(set(lengths), key=lengths.count, default=0)
     columns = list[_Column]()
     for name, values in read.items():
-        if len(values) == usual and np.isfinite(values).any():
-            unit = units[name]
-            kind = kinds[name]
+        there = values[np.isfinite(values)]
+        if len(values) == usual and len(there):
+            unit, kind = units[name], kinds[name]
             why = "by its unit" if unit else "by its name"
-            if kind == "" and np.ptp(values[np.isfinite(values)]) > 0:
-                kind, why = _kind_by_motion(values), "by how its numbers change"
+            if kind == "" and np.ptp(there) > 0:
+                steps = np.abs(np.diff(there))
+                jumps = steps.max() > 0.2 * np.ptp(there) or (steps == 0).mean() > 0.5
+                kind, why = "command" if jumps else "angle", "by how its numbers change"
             columns.append(_Column(name, kind, unit.name if unit else "", values, why, name in clocks))
     return columns
 
 
-def _kind_by_motion(values: Floats) -> Kind:
-    values = values[np.isfinite(values)]
-    steps = np.abs(np.diff(values))
-    return "command" if steps.max() > JUMP * np.ptp(values) or (steps == 0).mean() > STILL else "angle"
-
-
 def _time(table: Table, columns: Sequence[_Column]) -> _Column:
     """Return the first column that is named a time and rises steadily, or else is or does one of both."""
-    rising = [
-        column
-        for column in columns
-        if len(steps := column.steps) and (steps > 0).all() and np.median(steps) > STEADY * steps.mean()
-    ]
-    named = [column for column in columns if column.kind == "time"]
-    for choice in ([column for column in rising if column in named], named, rising):
-        if choice:
-            return choice[0]
-    hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
-    raise LogError("has no column that looks like a time", where=table.source, hint=hint)
+
+    def merit(column: _Column) -> tuple[bool, bool]:
+        steps = np.diff(column.values[np.isfinite(column.values)])
+        rises = len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean()
+        return column.kind == "time", bool(rises)
+
+    best = max(columns, key=merit, default=None)
+    if best is None or not any(merit(best)):
+        hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
+        raise LogError("has no column that looks like a time", where=table.source, hint=hint)
+    return best
 
 
 def _by_joint(
     columns: Sequence[_Column], joints: Sequence[str], reasons: list[str]
 ) -> dict[int, list[_Column]]:
     """Give each column a joint: one column, or two for the directions; tell what is uncertain."""
-    groups: dict[int, list[_Column]] = {}
+    groups, pairs = dict[int, list[_Column]](), list[list[_Column]]()
     numbers = {column.name: number_in(column.name) for column in columns}
     from_zero = 0 in numbers.values()
     for column in columns:
@@ -160,13 +144,11 @@ def _by_joint(
         joint = joint_of(column.name, joints) or (None if number is None else number + from_zero)
         if joint and joint <= len(joints) and (joint not in groups or _are_pair([*groups[joint], column])):
             groups.setdefault(joint, []).append(column)
+        mate = next((pair for pair in pairs if _are_pair([*pair, column])), None)
+        pairs.append([column]) if mate is None else mate.append(column)
     if groups and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
     if columns and not groups:  # a column without a joint, beside others with one, is something else
-        pairs = list[list[_Column]]()
-        for column in columns:
-            mate = next((pair for pair in pairs if _are_pair([*pair, column])), None)
-            pairs.append([column]) if mate is None else mate.append(column)
         names = ", ".join(column.name for column in columns)
         reasons.append(f"the joints of {names} are given by their order: check them")
         groups = dict(enumerate(pairs[: len(joints)], 1))
@@ -184,10 +166,9 @@ def _are_pair(columns: Sequence[_Column]) -> bool:
 def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
     """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
-    parts = [np.nan_to_num(column.values) for column in columns]
-    likely = likely_range(*parts) if len(parts) == 1 else likely_pair(*parts)
+    likely = likely_range(*(np.nan_to_num(column.values) for column in columns))
     entry: dict[str, Any] = {"column": names[0] if len(names) == 1 else names}
-    if likely is None or columns[0].unit == "%" or likely.name == "%":
+    if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"
     entry |= {"scale": likely.scale} | ({"offset": likely.offset} if likely.offset else {})
     return entry, f"{' and '.join(names)}: command in {likely.name}"

@@ -17,27 +17,12 @@ from numpy.typing import NDArray
 from hydroid.log.log import Floats, Log
 
 LAGS = (-0.5, 1.5)  # lags that clocks and transport delays may have [s]
-LATEST = 0.8  # lag of a machine [s]
-PLAIN = (0.0, 0.1)  # lags that need no transport delay [s]
+PLAIN = 0.1  # longest lag that needs no transport delay [s]
 ACAUSAL = -0.02  # lags below this are more than noise [s]
-CLEARER = 0.5  # largest ratio of the best lag's residual to that of the best plain one
-MAX_RESIDUAL = 0.5  # above it command and motion do not belong together
-MAX_ACAUSAL_RESIDUAL = 0.25  # motion ahead of its command takes stronger evidence
-SMOOTHING = 0.05  # standard deviation of the Gaussian [s]
-SLOW_SMOOTHING = 0.25  # of that for travel and direction, which a sensor's noise must not fill [s]
-STOP_ZONE = 0.02  # part of the logged travel, at each of its ends, in which a joint may stand at a stop
-STANDING = 0.03  # part of the largest speed below which it stands there
-STOPPED = 0.2  # how long it must [s]
-FAST = 0.1  # part of the largest speed above which it moves
-TOP = 95  # percentile of the speeds that counts as what the valves let through
-STRONG = 30.0  # [%], past the dead band of a valve
-STRONG_PART = 0.3  # of a joint's largest command, whose direction counts
-RESPONSE = 0.25  # [s] of valve and oil, for the direction
+QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
+MOVING = 0.1  # part of the largest speed above which a joint moves
 LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
-STEP = 5.0  # width of a range of commands [%] in which a joint moves or does not
-FEWEST = 5  # samples in such a range
-_ROUNDING = 1e-9  # part of a sum of squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,44 +32,34 @@ class JointMotion:
     log: Log
     joint: int
 
-    @property
-    def command(self) -> Floats:
-        """The joint's command [%], shape (T,)."""
-        return self.log.command[:, self.joint - 1]
-
-    @property
-    def angle(self) -> Floats:
-        """Its angle [rad], shape (T,)."""
-        return self.log.angle[:, self.joint - 1]
-
     @cached_property
     def travel(self) -> float:
         """Range of its angle but for the noise [deg]."""
-        return float(np.rad2deg(np.ptp(smooth(self.angle, SLOW_SMOOTHING / self.log.period))))
+        return float(np.rad2deg(np.ptp(self._slow[1])))
 
     @cached_property
     def speed(self) -> float:
-        """At which it moves when it moves [rad/s]."""
-        return float(np.percentile(np.abs(self._speed), TOP))
+        """At which it moves when it moves [rad/s]: what its valves let through."""
+        return float(np.percentile(np.abs(self._quick[2]), 95))
 
     @cached_property
     def push(self) -> float:
-        """Time integral of its strong commands [% s]."""
-        size = np.abs(self.command)
-        return float(np.where(size > STRONG, size, 0.0).sum() * self.log.period)
+        """Time integral of its strong commands, past the dead band of a valve [% s]."""
+        size = np.abs(self._logged)
+        return float(np.where(size > 30, size, 0.0).sum() * self.log.period)
 
     @cached_property
     def path(self) -> float:
         """Length of its way back and forth [deg]."""
-        return float(np.rad2deg(np.abs(self._slow_speed).sum() * self.log.period))
+        return float(np.rad2deg(np.abs(self._slow[2]).sum() * self.log.period))
 
     @cached_property
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if it is too short."""
-        late = round(RESPONSE / self.log.period)
-        command = smooth(self.command, SLOW_SMOOTHING / self.log.period)[: len(self.command) - late]
-        steps = np.rad2deg(self._slow_speed[late:]) * self.log.period
-        strong = np.abs(command) > STRONG_PART * np.abs(self.command).max()
+        late = round(0.25 / self.log.period)  # of valve and oil
+        command, _, speed = self._slow
+        command, steps = command[: len(command) - late], np.rad2deg(speed[late:]) * self.log.period
+        strong = np.abs(command) > 0.3 * np.abs(self._logged).max()
         path = float(np.abs(steps[strong]).sum())
         against = float(np.abs(steps[strong & (steps * command < 0)]).sum())
         return (path, against / path) if path >= LEAST_PATH else (path, 0.0)
@@ -105,44 +80,42 @@ class JointMotion:
         """Of the motion behind its command [s]; None where the log does not tell."""
         lag, residual, sign = self._regress()
         best = int(residual.argmin())
-        allowed = MAX_RESIDUAL if lag[best] > ACAUSAL else MAX_ACAUSAL_RESIDUAL
-        half = self.log.period / 2
-        plain = (lag > PLAIN[0] - half) & (lag < PLAIN[1] + half)
+        # motion ahead of its command takes stronger evidence
+        allowed = 0.5 if lag[best] > ACAUSAL else 0.25
+        plain = np.abs(lag - PLAIN / 2) < (PLAIN + self.log.period) / 2
         rivals = residual[(sign != sign[best]) | (plain & ~plain[best])]
-        unclear = bool(rivals.size) and residual[best] >= CLEARER * rivals.min()
+        unclear = bool(rivals.size) and residual[best] >= 0.5 * rivals.min()
         return None if best in (0, len(lag) - 1) or residual[best] > allowed or unclear else float(lag[best])
 
     @property
     def shifted(self) -> bool:
         """Whether its lag is none that an actuator has by itself."""
-        return self.lag is not None and not ACAUSAL <= self.lag <= PLAIN[1] + self.log.period / 2
+        return self.lag is not None and not ACAUSAL <= self.lag <= PLAIN + self.log.period / 2
 
     def follows(self, joint: int) -> tuple[float, float]:
         """Return the largest correlation of its speed with a joint's command, and at which lag that is [s].
 
         Unlike `lag` this answers always, also in a log of one movement: good enough for a first guess.
         """
-        command, speed = self.log.command[:, joint - 1], self._speed
-        correlation = [0.0]
-        for late in range(min(round(LATEST / self.log.period), len(speed) // 2)):
-            pair = command[: len(command) - late], speed[late:]
-            scale = float(np.std(pair[0]) * np.std(pair[1]))
-            correlation.append(abs(float(np.cov(*pair, bias=True)[0, 1])) / scale if scale > 0 else 0.0)
+        command, speed = self.log.command[:, joint - 1], self._quick[2]
+        lags = range(min(round(0.8 / self.log.period), len(speed) // 2))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pairs = ((command[: len(command) - late], speed[late:]) for late in lags)
+            correlation = np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
         best = int(np.argmax(correlation))
-        return correlation[best], max(best - 1, 0) * self.log.period
+        return float(correlation[best]), best * self.log.period
 
     @cached_property
     def dead_band(self) -> float:
-        """Command up to which it stands, most of the time, about [%]."""
+        """Command that best parts the samples in which it stands from those in which it moves, about [%].
+
+        Every 5 % more must explain a thousandth of the samples, else few of them decide.
+        """
         late = round(self.follows(self.joint)[1] / self.log.period)
-        size, speed, dead = np.abs(self.command[: len(self.command) - late]), np.abs(self._speed[late:]), 0.0
-        for low in np.arange(0.0, 100.0, STEP):
-            there = speed[(size >= low) & (size < low + STEP)]
-            if len(there) >= FEWEST:
-                if np.median(there) > FAST * self.speed:
-                    break
-                dead = low + STEP
-        return float(dead)
+        size, moves = np.abs(self._logged), np.abs(self._quick[2]) > MOVING * self.speed
+        size, moves = size[: len(size) - late], moves[late:]
+        cost = [np.mean(moves == (size < 5 * k)) + 0.001 * k for k in range(20)]
+        return 5.0 * int(np.argmin(cost))
 
     @cached_property
     def stopped(self) -> float:
@@ -151,35 +124,48 @@ class JointMotion:
         By a command that is larger than most of those that move it: a joint also stands while its command is
         in the dead band.
         """
-        command, speed = np.abs(self._command), np.abs(self._speed)
-        moving = speed > FAST * speed.max()
+        command, speed = np.abs(self._quick[0]), np.abs(self._quick[2])
+        moving = speed > MOVING * speed.max()
         enough = np.median(command[moving]) if moving.any() else np.inf
         return float((self._at_stop & (command > 0.99 * enough)).sum() * self.log.period)
 
-    @cached_property
-    def _speed(self) -> Floats:
-        return smooth(self.angle, SMOOTHING / self.log.period, derivative=True) / self.log.period
+    @property
+    def _logged(self) -> Floats:
+        """The joint's command [%], shape (T,)."""
+        return self.log.command[:, self.joint - 1]
 
     @cached_property
-    def _slow_speed(self) -> Floats:
-        return smooth(self.angle, SLOW_SMOOTHING / self.log.period, derivative=True) / self.log.period
+    def _quick(self) -> tuple[Floats, Floats, Floats]:
+        return self._smoothed(QUICK)
 
     @cached_property
-    def _command(self) -> Floats:
-        return smooth(self.command, SMOOTHING / self.log.period)
+    def _slow(self) -> tuple[Floats, Floats, Floats]:
+        return self._smoothed(SLOW)
+
+    def _smoothed(self, seconds: float) -> tuple[Floats, Floats, Floats]:
+        """Return command [%], angle [rad] and speed [rad/s] behind a Gaussian."""
+        width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
+        reach = int(4 * width + 0.5)
+        at = np.arange(-reach, reach + 1)
+        kernel = np.exp(-0.5 * (at / width) ** 2)
+        kernel /= kernel.sum()
+        steps = -at / width**2 * kernel
+        pairs = ((self._logged, kernel), (angle, kernel), (angle, steps))
+        command, angle, step = (np.convolve(np.pad(x, reach, "symmetric"), k, "valid") for x, k in pairs)
+        return command, angle, step / self.log.period
 
     @cached_property
     def _at_stop(self) -> NDArray[np.bool_]:
         """Where it stands at an end of its travel while it is pushed further, shape (T,)."""
-        command, angle, speed = self._command, smooth(self.angle, SMOOTHING / self.log.period), self._speed
-        zone = STOP_ZONE * np.ptp(angle)
+        command, angle, speed = self._quick
+        zone = 0.02 * np.ptp(angle)
         push = command * np.sign(command @ speed)
         ends = ((angle > angle.max() - zone) & (push > 0)) | ((angle < angle.min() + zone) & (push < 0))
-        standing = ends & (np.abs(speed) < STANDING * np.abs(speed).max())
+        standing = ends & (np.abs(speed) < 0.03 * np.abs(speed).max())
         stopped = np.zeros_like(standing)
-        margin = round(2 * SMOOTHING / self.log.period)
+        margin = round(2 * QUICK / self.log.period)
         for begin, end in np.flatnonzero(np.diff(standing, prepend=False, append=False)).reshape(-1, 2):
-            if (end - begin) * self.log.period >= STOPPED:
+            if (end - begin) * self.log.period >= 0.2:
                 stopped[max(begin - margin, 0) : end + margin] = True
         return stopped
 
@@ -190,20 +176,23 @@ class JointMotion:
         command's effect. A log that is too short, or in which nothing changes, leaves all of it.
         """
         first, last = (round(lag / self.log.period) for lag in LAGS)
-        lag: Floats = np.arange(first, last + 1).astype(np.float64) * self.log.period
-        command, used = self._command, slice(last, len(self.angle) + first)
+        lag = np.arange(first, last + 1) * self.log.period
+        (command, angle, speed), used = self._quick, slice(last, len(self._logged) + first)
         counts = ~self._at_stop[used]
-        if counts.sum() < last or np.ptp(self.command) == 0 or not np.ptp(self.angle) > 0:
+        if (
+            counts.sum() < last
+            or np.ptp(self._logged) == 0
+            or not np.ptp(self.log.angle[:, self.joint - 1]) > 0
+        ):
             return lag, np.ones(len(lag)), np.zeros(len(lag))
-        angle = smooth(self.angle, SMOOTHING / self.log.period)[used]
-        basis = np.linalg.qr(counts[:, None] * np.stack([np.ones_like(angle), angle], axis=1))[0]
-        wanted = counts * self._speed[used]
+        basis = np.linalg.qr(counts[:, None] * np.stack([np.ones(len(counts)), angle[used]], axis=1))[0]
+        wanted = counts * speed[used]
         wanted = wanted - basis @ (basis.T @ wanted)
         power = np.correlate(command**2, counts.astype(float), "valid")
         own = power - sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
         product, total = np.correlate(command, wanted, "valid"), wanted @ wanted
-        enough = (own > _ROUNDING * power) & (total > 0)
-        explained: Floats = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
+        enough = (own > 1e-9 * power) & (total > 0)
+        explained = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
         return lag, (1 - explained)[::-1], np.sign(product)[::-1]
 
 
@@ -213,11 +202,6 @@ def motion_of(log: Log, joint: int) -> JointMotion:
     return JointMotion(log, joint)
 
 
-def smooth(signal: Floats, width: float, *, derivative: bool = False) -> Floats:
-    """Smooth a signal by a Gaussian of `width` samples, or return the derivative of that per sample."""
-    reach = int(4 * width + 0.5)
-    at = np.arange(-reach, reach + 1)
-    kernel = np.exp(-0.5 * (at / width) ** 2)
-    kernel /= kernel.sum()
-    kernel = -at / width**2 * kernel if derivative else kernel
-    return np.convolve(np.pad(signal, reach, "symmetric"), kernel, "valid").astype(np.float64)
+def driven_joints(log: Log) -> dict[int, JointMotion]:
+    """Return the motions of the joints that are driven and measured, by number."""
+    return {j: motion_of(log, j) for j in (np.flatnonzero(log.driven & log.measured) + 1).tolist()}

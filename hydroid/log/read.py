@@ -1,33 +1,26 @@
 """A log file -> `Log`: open, map, repair, check, resample."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hydroid.errors import LogError
+from hydroid.log.arrays import open_mat, open_parquet
 from hydroid.log.bag import open_bag
 from hydroid.log.checks import check_recording
-from hydroid.log.columns import (
-    Recording,
-    Signal,
-    absent_joints,
-    column_faults,
-    map_signals,
-    read_recording,
-)
+from hydroid.log.columns import map_signals, match_signals
 from hydroid.log.csv import open_csv, read_start
-from hydroid.log.finding import LogFinding, Place, unreadable
+from hydroid.log.finding import LogFinding, found
 from hydroid.log.log import Floats, Log
-from hydroid.log.mat import open_mat
-from hydroid.log.parquet import open_parquet
 from hydroid.log.repair import fill, is_on_grid, resample, sample_period, unwrap
-from hydroid.log.survey import Contradictions
-from hydroid.log.table import Table
+from hydroid.log.survey import contradictions
+from hydroid.log.table import Recording, Table
 from hydroid.settings.log import LogSettings
 
 DEFAULT = LogSettings()
-HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def open_table(path: Path, settings: LogSettings = DEFAULT, wanted: Sequence[str] = ()) -> Table:
@@ -47,30 +40,14 @@ def open_table(path: Path, settings: LogSettings = DEFAULT, wanted: Sequence[str
         return open_bag(path, settings.time.column, settings.period_s)
     if start.startswith(b"PAR1"):
         return open_parquet(path)
-    hdf5 = HDF5 in (start[:8], start[512:520])
+    hdf5 = b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520])
     if hdf5 or start.startswith(b"MATLAB 5.0 MAT-file") or path.suffix.lower() == ".mat":
         return open_mat(path, hdf5=hdf5)
     return open_csv(path, wanted)
 
 
-def read_log(
-    path: Path,
-    settings: LogSettings,
-    ranges: Floats,
-    *,
-    outputs: Sequence[int] = (),
-    angles_required: bool = True,
-    repair: bool = False,
-) -> tuple[Log, list[LogFinding]]:
-    """Read a log that is to be used.
-
-    Args:
-        path: the file.
-        settings: its columns, units and tolerances.
-        ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
-        outputs: joints (numbers, from 1) whose angles a fit compares.
-        angles_required: whether an angle column that the file lacks is an error, or the joint unmeasured.
-        repair: fill holes up to `settings.repair_s`.
+def read_log(path: Path, settings: LogSettings, ranges: Floats, **how: Any) -> tuple[Log, list[LogFinding]]:
+    """Read a log that is to be used; the arguments are those of `check_log`.
 
     Returns:
         The log at `settings.period_s`, and warnings and notes.
@@ -78,11 +55,9 @@ def read_log(
     Raises:
         LogError: the first fault that keeps the log from being used.
     """
-    log, findings = check_log(
-        path, settings, ranges, outputs=outputs, angles_required=angles_required, repair=repair
-    )
+    log, findings = check_log(path, settings, ranges, **how)
     if log is None:
-        raise next(finding for finding in findings if finding.level == "error").error()
+        raise findings[0].error()
     return log, findings
 
 
@@ -95,60 +70,91 @@ def check_log(
     angles_required: bool = True,
     repair: bool = False,
 ) -> tuple[Log | None, list[LogFinding]]:
-    """Find everything that is wrong with a log; the arguments are those of `read_log`.
+    """Find everything that is wrong with a log.
+
+    Args:
+        path: the file.
+        settings: its columns, units and tolerances.
+        ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
+        outputs: joints (numbers, from 1) whose angles a fit compares.
+        angles_required: whether an angle column that the file lacks is an error, or the joint unmeasured.
+        repair: fill holes up to `settings.repair_s`.
 
     Returns:
         The log, None if any finding is an error; and all findings, errors first.
     """
-    findings, log = list[LogFinding](), None
+    source, log, findings = str(path), None, list[LogFinding]()
     try:
         signals = map_signals(settings, ranges)
-        file = open_table(path, settings, [signal.name for signal in signals])
-        findings += _mapping_faults(str(path), settings, signals, len(ranges), outputs)
+        table = open_table(path, settings, [signal.name for signal in signals])
+        measured = {signal.joint for signal in signals if signal.kind == "angle"}
+        wrong = {j: "no such joint" for j in settings.joints if j > len(ranges)}
+        wrong |= {
+            j: "no output angle" if j <= len(ranges) else "no output joint" for j in {*outputs} - measured
+        }
+        findings += [found("error", kind, source, [j], joints=str(len(ranges))) for j, kind in wrong.items()]
         if not angles_required:
-            signals = [s for s in signals if s.kind not in ("angle", "pressure") or s.name in file.names]
-        if absent := absent_joints(file, signals, {*outputs, *settings.joints}):
-            findings.append(Place(str(path)).finding("note", "absent joints", absent))
-            signals = [signal for signal in signals if signal.joint not in absent]
-        findings += column_faults(file, signals)
-        signals = [signal for signal in signals if signal.name in file.names]
+            signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
+        signals, faults = match_signals(table, signals, {*outputs, *settings.joints})
+        findings += faults
         if signals and signals[0].kind == "time":
-            recording, notes = read_recording(file, signals)
+            recording = _in_si(table.read(signals))
+            remarks = (*table.remarks, *recording.remarks)
             recording, joined = unwrap(recording)
-            recording, repairs = fill(recording, settings.repair_s) if repair else (recording, [])
-            findings += [*joined, *notes, *repairs, *check_recording(recording, settings)]
+            findings += joined + [found("note", "layout", source, what=remark) for remark in remarks]
+            if repair:
+                recording, repairs = fill(recording, settings.repair_s)
+                findings += repairs
+            findings += check_recording(recording, settings)
             if all(finding.level != "error" for finding in findings):
                 log, more = _to_log(recording, settings, len(ranges))
-                findings += more + Contradictions(log, settings, outputs).findings({f.kind for f in findings})
+                findings += more
+                findings += contradictions(log, settings, outputs, {finding.kind for finding in findings})
     except LogError as error:
-        findings.append(unreadable(str(path), error))
+        fault = found("error", "unreadable", source, what=error.what, hint=error.hint)
+        findings.append(replace(fault, where=error.where))
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 
-def _mapping_faults(
-    source: str, settings: LogSettings, signals: Sequence[Signal], joints: int, outputs: Sequence[int]
-) -> list[LogFinding]:
-    place, measured = Place(source), {signal.joint for signal in signals if signal.kind == "angle"}
-    kinds = {j: "no such joint" for j in settings.joints if j > joints}
-    kinds |= {j: "no output joint" if j > joints else "no output angle" for j in {*outputs} - measured}
-    return [place.finding("error", kind, [joint], joints=str(joints)) for joint, kind in kinds.items()]
+def _in_si(recording: Recording) -> Recording:
+    """Scale the cells to [s], [%], [rad] and [Pa]; a number that is too large counts as none."""
+    signals = recording.signals
+    gain = np.array([1.0 if signal.name in recording.clocks else signal.gain for signal in signals])
+    with np.errstate(all="ignore"):
+        values = recording.values * gain + np.array([signal.offset for signal in signals])
+        values[~(np.abs(values) < 1e100)] = np.nan
+    return replace(recording, values=values)
 
 
 def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[LogFinding]]:
-    period, kinds = settings.period_s, {signal.kind for signal in recording.signals}
-    command = np.nan_to_num(recording.of("command", joints))
+    """Bring a recording without faults to its period; also returns what is worth knowing about that."""
+    values = {
+        kind: np.full((len(recording.time), joints, 2), np.nan) for kind in ("command", "angle", "pressure")
+    }
+    for signal, column in zip(recording.signals[1:], recording.values.T[1:], strict=True):
+        values[signal.kind][:, signal.joint - 1, signal.part] = column
+    command = np.nan_to_num(values["command"])
     command = (0.0 + command[..., 0] - command[..., 1]).clip(-100, 100)
-    measured = np.concatenate([recording.of("angle", joints), recording.of("pressure", joints)], axis=2)
-    flat = measured.reshape(len(measured), -1)
-    time, command, flat = resample(recording.time, command, flat, period, settings.delay_s)
-    measured = flat.reshape(len(time), joints, 4)
-    pressure = measured[..., 2:] if "pressure" in kinds else None
-    log = Log(recording.file.source, time, command, measured[..., 0], period, pressure)
+    measured = np.concatenate([values["angle"][..., :1], values["pressure"]], axis=2).reshape(
+        len(command), -1
+    )
+    period = settings.period_s
+    time, command, measured = resample(recording.time, command, measured, period, settings.delay_s)
+    angle, pressure = np.split(measured.reshape(len(time), joints, 3), [1], axis=2)
+    kinds = {signal.kind for signal in recording.signals}
+    log = Log(
+        recording.table.source,
+        time,
+        command,
+        angle[..., 0],
+        period,
+        pressure if "pressure" in kinds else None,
+    )
     findings = list[LogFinding]()
     if not is_on_grid(recording.time, period):
-        step = sample_period(recording.time)
-        kind = "evened" if abs(step / period - 1) < 1e-3 else "resampled"
-        findings.append(recording.finding("note", kind, step=step, period=period))
+        findings.append(
+            recording.finding("note", "resampled", step=sample_period(recording.time), period=period)
+        )
     if "command" in kinds and not log.driven.any():
         findings.append(recording.finding("warning", "undriven"))
     return log, findings

@@ -8,16 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.log.columns import Recording
 from hydroid.log.finding import LogFinding
 from hydroid.log.log import Floats
+from hydroid.log.table import Recording
 
-TURN = 2 * np.pi
-GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
-MAX_GROWTH = 2  # largest ratio of rows after and before: mostly gaps cannot be repaired
-NEAR_TURN = np.pi / 4  # largest difference of a wrap from a whole turn: the motion within one sample
-ON_GRID = 0.01  # of a period: where all samples are this near to the first one's grid, values pass unchanged
-_ROUNDING = 1e-6  # of a period
+GAP = 1.95
+"""in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2"""
 
 
 def sample_period(time: Floats) -> float:
@@ -28,16 +24,15 @@ def sample_period(time: Floats) -> float:
 
 def unwrap(recording: Recording) -> tuple[Recording, list[LogFinding]]:
     """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
-    values, notes = recording.values.copy(), list[LogFinding]()
+    values, notes, turn = recording.values.copy(), list[LogFinding](), 2 * np.pi
     for column, signal in enumerate(recording.signals):
-        if signal.kind != "angle" or np.isfinite(signal.high):
-            continue
-        rows = np.flatnonzero(~np.isnan(values[:, column]))
-        steps = np.diff(values[rows, column])
-        wraps = np.abs(np.abs(steps) - TURN) < NEAR_TURN
-        if wraps.any():
-            values[rows[1:], column] -= TURN * np.cumsum(np.sign(steps) * wraps)
-            notes.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
+        if signal.kind == "angle" and not np.isfinite(signal.high):
+            rows = np.flatnonzero(~np.isnan(values[:, column]))
+            steps = np.diff(values[rows, column])
+            wraps = np.abs(np.abs(steps) - turn) < np.pi / 4  # the motion within one sample
+            if wraps.any():
+                values[rows[1:], column] -= turn * np.cumsum(np.sign(steps) * wraps)
+                notes.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
     return replace(recording, values=values), notes
 
 
@@ -53,9 +48,19 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFindi
     period = sample_period(recording.time)
     reach = longest * (1 + 1e-9) + period
     recording, added = _insert(recording, period, reach)
-    values = recording.values.copy()
+    values, time = recording.values.copy(), recording.time
     for column, signal in enumerate(recording.signals[1:], 1):
-        _bridge(recording.time, values[:, column], reach, held=signal.kind == "command")
+        whole = ~np.isnan(values[:, column])
+        there, holes = np.flatnonzero(whole), np.flatnonzero(~whole)
+        after = np.searchsorted(there, holes)
+        inside = (after > 0) & (after < len(there))
+        holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
+        near = time[after] - time[before] <= reach
+        if len(holes):
+            known = values[there, column]
+            between = np.interp(time[holes], time[there], known)
+            filled = values[before, column] if signal.kind == "command" else between
+            values[holes[near], column] = filled[near]
     filled = np.isnan(recording.values) & ~np.isnan(values) & ~added[:, None]
     mended = recording.lines[filled.any(axis=1) | added]
     recording, lines = replace(recording, values=values), [*mended[:1], *lost[:1]]
@@ -74,7 +79,7 @@ def _insert(recording: Recording, period: float, reach: float) -> tuple[Recordin
     gaps = (steps > GAP * period) & (steps <= reach)
     copies = np.ones(len(recording.time), dtype=np.int64)
     copies[:-1][gaps] = np.rint(np.minimum(steps[gaps] / period, 1e9)).astype(np.int64)
-    if copies.sum() > MAX_GROWTH * len(copies):
+    if copies.sum() > 2 * len(copies):  # mostly gaps: no repair
         copies[:] = 1
     origin = np.repeat(np.arange(len(copies)), copies)
     nth = np.arange(len(origin)) - np.repeat(np.cumsum(copies) - copies, copies)
@@ -84,20 +89,6 @@ def _insert(recording: Recording, period: float, reach: float) -> tuple[Recordin
     longer.values[:, 0] = recording.time[origin] + nth * np.append(steps, 0.0)[origin] / copies[origin]
     longer.ragged[added] = False
     return longer, added
-
-
-def _bridge(time: Floats, values: Floats, reach: float, held: bool) -> None:
-    """Fill, in place, the holes between two samples no more than `reach` [s] apart."""
-    there = np.flatnonzero(~np.isnan(values))
-    holes = np.flatnonzero(np.isnan(values))
-    after = np.searchsorted(there, holes)
-    inside = (after > 0) & (after < len(there))
-    if not inside.any():
-        return
-    holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
-    near = time[after] - time[before] <= reach
-    filled = values[before] if held else np.interp(time[holes], time[there], values[there])
-    values[holes[near]] = filled[near]
 
 
 def resample(
@@ -122,14 +113,14 @@ def resample(
 def is_on_grid(time: Floats, period: float) -> bool:
     """Return whether the samples already stand on the grid, so that their values pass unchanged."""
     grid = _grid(time, period)
-    return len(time) == len(grid) and bool((np.abs(time - time[0] - grid) <= ON_GRID * period).all())
+    return len(time) == len(grid) and bool((np.abs(time - time[0] - grid) <= 0.01 * period).all())
 
 
 def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:
     """Return the last command at or before each time in `at` [s]; 0 before the first, shape (len(at), J)."""
-    index = np.searchsorted(time, at + _ROUNDING * period, side="right") - 1
+    index = np.searchsorted(time, at + 1e-6 * period, side="right") - 1  # but for rounding
     return np.where(index[:, None] >= 0, command[index], 0.0)
 
 
 def _grid(time: Floats, period: float) -> Floats:
-    return period * np.arange(int((time[-1] - time[0]) / period + ON_GRID) + 1, dtype=np.float64)
+    return period * np.arange(int((time[-1] - time[0]) / period + 0.01) + 1, dtype=np.float64)

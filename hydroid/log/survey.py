@@ -1,139 +1,94 @@
 """What the motion in logs says: of the settings, of the log, and of all logs together."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from hydroid.findings import Level
-from hydroid.log.finding import LogFinding, Place
+from hydroid.log.clues import likely_range
+from hydroid.log.finding import LogFinding, found, together
 from hydroid.log.log import Floats, Log
-from hydroid.log.motion import JointMotion, motion_of
-from hydroid.log.ranges import likely_range
+from hydroid.log.motion import driven_joints
 from hydroid.settings.log import Kind, LogSettings
 
-STRAIGHT_ANGLE = 3.2  # just above pi: few joints turn further, in rad
-MOVES = 3.0  # [deg]: more than noise and settling
-HARDLY = 2.0  # [deg]: a joint that is driven strongly moves further
-LEAST = 300.0  # [% s] of strong commands before their effect is judged
-SLUGGISH = 0.015  # [deg/(% s)]: 1.5 deg/s at full command; the rig's slowest joint turns 16 times as fast
-SMALL = {"±1": 1, "±10 V": 10}  # ranges that a motion must contradict: they may be small commands in %
-REST = 0.2  # [s] of rest before the first command that give a start pose
-AT_STOP = 0.5  # [s] at a stop that are worth a line
-HELD = 0.3  # [s] for which logs hold a command before it counts
-BIN = 5  # [%]
-OPEN = 20  # [%]: a wider interval without commands leaves the valve curve open
-HIGH = 80  # [%]: above the largest command, if it is lower, the curve is open too
-MAX_JOINTS = 3  # in a line
+LEAST = 300.0
+"""strong commands before their effect is judged [% s]"""
 
 
-def driven_joints(log: Log) -> dict[int, JointMotion]:
-    """Return the motions of the joints that are driven and measured, by number."""
-    return {
-        joint: motion_of(log, joint) for joint in (np.flatnonzero(log.driven & log.measured) + 1).tolist()
+def contradictions(
+    log: Log, settings: LogSettings, outputs: Collection[int], said: Collection[str]
+) -> list[LogFinding]:
+    """Return what the motion says against the settings, but for units of which the file `said` so."""
+    motions = driven_joints(log)
+
+    def about(
+        kind: str, quantity: Kind, *joints: int, level: Level = "warning", **numbers: float | str
+    ) -> LogFinding:
+        columns = settings.columns(quantity, joints[0])
+        return found(
+            level, kind, log.source, joints, ("line", None, columns.column[0] if columns else ""), **numbers
+        )
+
+    def constant() -> Iterator[LogFinding]:
+        for joint in range(1, log.joints + 1):
+            command, angle, compared = log.command[:, joint - 1], log.angle[:, joint - 1], joint in outputs
+            if (compared or command.any()) and np.ptp(angle) == 0:
+                yield about("angle is constant", "angle", joint)
+            if compared and settings.columns("command", joint) and np.ptp(command) == 0:
+                yield about("command is constant", "command", joint)
+
+    def raised() -> Iterator[LogFinding]:
+        """Commands that rest in the middle of a range."""
+        for joint in range(1, log.joints + 1):
+            columns, likely = settings.columns("command", joint), likely_range(log.command[:, joint - 1])
+            if columns and len(columns.column) == 1 and likely and likely.offset:
+                yield about("raised range", "command", joint, **likely.remedy(columns.scale, columns.offset))
+
+    def small() -> Iterator[LogFinding]:
+        """Commands in a small range, though the joints move well; else they may be small commands in %."""
+        joint = max(motions, key=lambda joint: motions[joint].travel)
+        columns, likely = settings.columns("command", joint), likely_range(log.command.ravel())
+        if columns and likely and likely.name in ("±1", "±10 V") and motions[joint].travel > 3:
+            numbers = {"largest": 100 / likely.scale, "travel": motions[joint].travel}
+            remedy = likely.remedy(columns.scale, columns.offset)
+            yield about("small range", "command", joint, **numbers, **remedy)
+
+    def radians() -> Iterator[LogFinding]:
+        """Angles that are too small for the commands, 1.5 deg/s at full command, and all below pi."""
+        judged = {joint: motion for joint, motion in motions.items() if motion.push > LEAST}
+        sluggish = all(0 < motion.path < 0.015 * motion.push for motion in judged.values())
+        if judged and sluggish and np.nanmax(np.abs(log.angle)) <= np.deg2rad(3.2):
+            yield about("sluggish", "angle", next(iter(judged)), most=3.2)
+
+    findings = [*constant()]
+    units = [*raised()] or [*small()] if motions and "unit of command" not in said else []
+    findings += units or ([] if "unit of angle" in said else [*radians()])
+    lags = {
+        joint: motion.lag for joint, motion in motions.items() if motion.lag is not None and motion.shifted
     }
-
-
-class Contradictions:
-    """What the motion in a log says against its settings."""
-
-    def __init__(self, log: Log, settings: LogSettings, outputs: Sequence[int]) -> None:
-        self.log, self.settings, self.outputs = log, settings, outputs
-        self.motions = driven_joints(log)
-
-    def findings(self, said: Collection[str] = ()) -> list[LogFinding]:
-        """Return all of them, but for units of which the file itself `said` that they are wrong."""
-        ranges = [] if "unit of command" in said else self._ranges()
-        units = ranges or ([] if "unit of angle" in said else self._radians())
-        return [*self._constant(), *units, *self._shifts(), *self._turned()]
-
-    def _place(self, kind: Kind, joint: int) -> Place:
-        columns = self.settings.columns(kind, joint)
-        return Place(self.log.source, column=columns.column[0] if columns else "")
-
-    def _constant(self) -> list[LogFinding]:
-        joints, log = range(1, self.log.joints + 1), self.log
-        findings = list[LogFinding]()
-        compared = [j for j in joints if log.measured[j - 1] and (log.driven[j - 1] or j in self.outputs)]
-        if still := [j for j in compared if np.ptp(log.angle[:, j - 1]) == 0]:
-            driven = " though it is driven" if len(still) == 1 and log.driven[still[0] - 1] else ""
-            place = self._place("angle", still[0])
-            findings.append(place.finding("warning", "angle is constant", still, driven=driven))
-        mapped = [j for j in self.outputs if j <= log.joints and self.settings.columns("command", j)]
-        if held := [j for j in mapped if np.ptp(log.command[:, j - 1]) == 0]:
-            findings.append(self._place("command", held[0]).finding("warning", "command is constant", held))
-        return findings
-
-    def _ranges(self) -> list[LogFinding]:
-        """Commands that look like another range than percent."""
-        if not self.motions:
-            return []
-        maps = {j: self.settings.columns("command", j) for j in range(1, self.log.joints + 1)}
-        signed = {j: columns for j, columns in maps.items() if columns and len(columns.column) == 1}
-        likely = {j: likely_range(self.log.command[:, j - 1]) for j in signed}
-        findings = list[LogFinding]()
-        for name in dict.fromkeys(found.name for found in likely.values() if found and found.offset):
-            joints = [j for j, found in likely.items() if found and found.name == name]
-            found, columns = likely[joints[0]], signed[joints[0]]
-            assert found is not None
-            numbers = found.remedy(columns.scale, columns.offset)
-            findings.append(
-                self._place("command", joints[0]).finding("warning", "raised range", joints, **numbers)
-            )
-        overall = likely_range(self.log.command.ravel())
-        joint, motion = max(self.motions.items(), key=lambda pair: pair[1].travel)
-        if not findings and overall and overall.name in SMALL and motion.travel > MOVES:
-            columns = maps[joint]
-            assert columns is not None
-            numbers = overall.remedy(columns.scale, columns.offset)
-            largest = {"largest": SMALL[overall.name], "travel": motion.travel}
-            place = self._place("command", joint)
-            findings.append(place.finding("warning", "small range", [joint], **largest, **numbers))
-        return findings
-
-    def _radians(self) -> list[LogFinding]:
-        judged = {j: m for j, m in self.motions.items() if m.push > LEAST}
-        largest = np.rad2deg(np.nanmax(np.abs(self.log.angle), initial=0.0))
-        sluggish = all(0 < m.path < SLUGGISH * m.push for m in judged.values())
-        if not judged or not sluggish or largest > STRAIGHT_ANGLE:
-            return []
-        joint = next(iter(judged))
-        return [self._place("angle", joint).finding("warning", "sluggish", [joint], most=STRAIGHT_ANGLE)]
-
-    def _shifts(self) -> list[LogFinding]:
-        """Commands that look early or late."""
-        lags = {j: m.lag for j, m in self.motions.items() if m.lag is not None and m.shifted}
-        findings = list[LogFinding]()
-        signs: tuple[tuple[str, Level, int], ...] = (("early", "note", 1), ("late", "warning", -1))
-        for kind, level, sign in signs:
-            if joints := [j for j, lag in lags.items() if sign * lag > 0]:
-                lag = float(np.median([lags[j] for j in joints]))
-                numbers = {"lag": abs(lag), "delay": self.settings.delay_s + lag}
-                findings.append(self._place("command", joints[0]).finding(level, kind, joints, **numbers))
-        return findings
-
-    def _turned(self) -> list[LogFinding]:
-        turned = {joint: motion.directed for joint, motion in self.motions.items() if motion.turned}
-        if not turned:
-            return []
-        share = ", ".join(f"{against:.0%} of {path:.3g} deg" for path, against in turned.values())
-        place = self._place("command", next(iter(turned)))
-        return [place.finding("warning", "turned", [*turned], share=share)]
+    for kind, level, sign in (("early", "note", 1), ("late", "warning", -1)):
+        if joints := [joint for joint, lag in lags.items() if sign * lag > 0]:
+            lag = float(np.median([lags[joint] for joint in joints]))
+            numbers = {"lag": abs(lag), "delay": settings.delay_s + lag}
+            findings.append(about(kind, "command", *joints, level=level, **numbers))
+    for joint, motion in motions.items():
+        if motion.turned:
+            path, against = motion.directed
+            findings.append(about("turned", "command", joint, path=path, against=against))
+    return together(findings)
 
 
 def motion_findings(log: Log) -> list[LogFinding]:
     """Report joints that hardly move or stand at a stop, and a log that does not begin at rest."""
-    findings, place, motions = list[LogFinding](), Place(log.source), driven_joints(log)
-    still = {j: m.travel for j, m in motions.items() if m.push > LEAST and 0 < m.travel < HARDLY}
-    if still:
-        findings.append(place.finding("warning", "no motion", [*still], most=max(still.values())))
-    stopped = [(j, m.stopped) for j, m in motions.items() if j not in still and m.stopped >= AT_STOP]
-    if stopped:
-        joints = ", ".join(f"joint {j} for {seconds:.3g} s" for j, seconds in stopped)
-        findings.append(place.finding("note", "at a stop", joints=joints))
-    if log.driven.any() and (rest := log.first_command * log.period) < REST:
-        after = f" after {rest:.2g} s" if rest else ""
-        findings.append(place.finding("note", "no rest", after=after))
+    findings, rest = list[LogFinding](), log.first_command * log.period
+    for joint, motion in driven_joints(log).items():
+        if motion.push > LEAST and 0 < motion.travel < 2:  # [deg]
+            findings.append(found("warning", "no motion", log.source, [joint], most=motion.travel))
+        elif motion.stopped >= 0.5:
+            findings.append(found("note", "at a stop", log.source, [joint], seconds=motion.stopped))
+    if log.driven.any() and rest < 0.2:
+        findings.append(found("note", "no rest", log.source, after=f" after {rest:.2g} s" if rest else ""))
     return findings
 
 
@@ -145,40 +100,30 @@ def survey(logs: Sequence[Log]) -> list[LogFinding]:
         own = [of_log[joint] for of_log in motions if joint in of_log]
         turned, straight = [m for m in own if m.turned], [m for m in own if m.straight]
         if turned and straight:
-            odd = Place(min(turned, straight, key=len)[0].log.source)
-            numbers = {"turned": str(len(turned)), "logs": str(len(turned + straight))}
-            findings.append(odd.finding("warning", "directions differ", [joint], **numbers))
-        held = _held([m.log for m in own], joint)
-        if open_ := _gaps(held):
-            gaps.append(f"joint {joint} {', '.join(open_)}")
-        for sign, word in ((1, "positive"), (-1, "negative")):
-            if not (sign * held > 0).any() and len(held):
-                missing.append(f"joint {joint} {word}")
-    place = Place(logs[0].source if len(logs) == 1 else f"{len(logs)} logs")
+            odd, every = min(turned, straight, key=len)[0].log.source, len(turned + straight)
+            numbers = {"turned": str(len(turned)), "logs": str(every)}
+            findings.append(found("warning", "directions differ", odd, [joint], **numbers))
+        held = _held([motion.log for motion in own], joint)
+        open_ = [f"between {a:.0f} and {b:.0f}" for a, b in pairwise(held) if b - a >= 20 and a * b > 0]
+        open_ += [f"above {high:.0f}" for high in held[-1:] if 0 < high < 80]
+        open_ += [f"below {low:.0f}" for low in held[:1] if -80 < low < 0]
+        gaps += [f"joint {joint} {', '.join(open_)}"] if open_ else []
+        signs = ((1, "positive"), (-1, "negative"))
+        missing += [
+            f"joint {joint} {word}" for sign, word in signs if len(held) and not (sign * held > 0).any()
+        ]
+    source = logs[0].source if len(logs) == 1 else f"{len(logs)} logs"
     if gaps:
-        more = f"; and of {len(gaps) - MAX_JOINTS} more joints" if len(gaps) > MAX_JOINTS else ""
-        findings.append(place.finding("note", "open valve curve", gaps="; ".join(gaps[:MAX_JOINTS]) + more))
+        more = f"; and of {len(gaps) - 3} more joints" if len(gaps) > 3 else ""
+        findings.append(found("note", "open valve curve", source, gaps="; ".join(gaps[:3]) + more))
     if missing:
-        findings.append(place.finding("note", "one direction", missing))
+        findings.append(found("note", "one direction", source, missing))
     return findings
 
 
 def _held(logs: Sequence[Log], joint: int) -> Floats:
-    """Return the commands that are held long enough, without 0, rounded to 5 % and ascending."""
-    seconds = dict[int, float]()
-    for log in logs:
-        levels, counts = np.unique(np.rint(log.command[:, joint - 1] / BIN), return_counts=True)
-        for level, count in zip(levels.astype(int).tolist(), counts.tolist(), strict=True):
-            seconds[level] = seconds.get(level, 0.0) + count * log.period
-    return BIN * np.array(sorted(level for level, held in seconds.items() if level and held >= HELD))
-
-
-def _gaps(held: Floats) -> list[str]:
-    """Return the intervals [%] without commands, between those of one direction and beyond the largest."""
-    pairs = pairwise(held.tolist())
-    gaps = [
-        f"between {low:.0f} and {high:.0f}" for low, high in pairs if high - low >= OPEN and low * high > 0
-    ]
-    if len(held) and 0 < held[-1] < HIGH:
-        gaps.append(f"above {held[-1]:.0f}")
-    return gaps + ([f"below {held[0]:.0f}"] if len(held) and -HIGH < held[0] < 0 else [])
+    """Return the commands [%] that are held for 0.3 s in all, without 0, rounded to 5 % and ascending."""
+    levels = [np.rint(log.command[:, joint - 1] / 5) for log in logs]
+    seconds = [np.full(len(log.time), log.period) for log in logs]
+    held, where = np.unique(np.concatenate(levels), return_inverse=True)
+    return 5 * held[(np.bincount(where, np.concatenate(seconds)) >= 0.3 * (1 - 1e-9)) & (held != 0)]

@@ -1,36 +1,40 @@
-"""What every file format is read as: a table of named columns, which yields the numbers of some of them."""
+"""What every file format is read as: a table of named columns, some of which are read into a recording."""
 
-from collections.abc import Collection, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import LogError
+from hydroid.findings import Level
+from hydroid.log.finding import LogFinding, found
 from hydroid.log.log import Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """R rows of C columns.
+@dataclass(frozen=True)
+class Signal:
+    """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa].
 
-    Attributes:
-        values: as the file holds them, shape (R, C), NaN where a cell holds no number.
-        rows: line or row of the file [1-based] of each, shape (R,).
-        ragged: rows that have more or fewer cells than the table has columns, shape (R,).
-        clocks: columns that hold dates or times of day: their values are seconds from the first.
-        remarks: what the reader did to get these numbers.
+    `name` is that in the header, `joint` a number from 1, or 0 for the time. `part` is 0, or 1 for the column
+    of a command's negative direction and of the pressure in chamber B.
     """
 
-    values: Floats
-    rows: NDArray[np.int64]
-    ragged: NDArray[np.bool_]
-    clocks: frozenset[str] = frozenset()
-    remarks: tuple[str, ...] = ()
+    name: str
+    kind: Literal["time", "command", "angle", "pressure"]
+    joint: int = 0
+    part: int = 0
+    gain: float = 1.0
+    offset: float = 0.0
+    low: float = -np.inf
+    high: float = np.inf
+
+    def __str__(self) -> str:
+        return f"{self.kind} of joint {self.joint}" if self.joint else self.kind
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,7 +45,6 @@ class Table:
         source: the file.
         layout: its format in a few words, such as "CSV separated by semicolons".
         names: of the columns, in order; "" for one without.
-        place: what its rows are called where a fault is reported: "line" or "row".
         header: line of the names [1-based]; None where the format stores them.
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
@@ -50,13 +53,12 @@ class Table:
     source: str
     layout: str
     names: tuple[str, ...]
-    place: str = "row"
     header: int | None = None
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     remarks: tuple[str, ...] = ()
 
-    def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
-        """Read columns; `held` names those that keep their value until the next sample, as commands do.
+    def read(self, signals: Sequence[Signal]) -> "Recording":
+        """Read the columns of signals, as the file holds them.
 
         Raises:
             LogError: columns that cannot be read together.
@@ -68,6 +70,59 @@ class Table:
         return ""
 
 
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The used columns of one file, R rows of C signals.
+
+    Attributes:
+        table: the file.
+        signals: of its columns.
+        values: shape (R, C), NaN where the file holds no number.
+        lines: line or row of the file [1-based] of each row, shape (R,).
+        ragged: rows that have more or fewer cells than the table has columns, shape (R,).
+        clocks: columns that hold dates or times of day: their values are seconds from the first.
+        remarks: what the reader did to get these numbers.
+    """
+
+    table: Table
+    signals: tuple[Signal, ...]
+    values: Floats
+    lines: NDArray[np.int64]
+    ragged: NDArray[np.bool_]
+    clocks: frozenset[str] = frozenset()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> Floats:
+        """Time [s], shape (R,), of a recording whose first signal it is."""
+        return self.values[:, 0]
+
+    def take(self, rows: NDArray[np.int64]) -> "Recording":
+        """Return a copy with these rows, in this order."""
+        return replace(self, values=self.values[rows], lines=self.lines[rows], ragged=self.ragged[rows])
+
+    def finding(
+        self,
+        level: Level,
+        kind: str,
+        rows: Sequence[int] | NDArray[np.int64] = (),
+        signal: Signal | None = None,
+        subject: object = None,
+        **numbers: Any,
+    ) -> LogFinding:
+        """Make a finding about a signal, or another subject, at the first of `rows`.
+
+        Its number `rows` counts the others.
+        """
+        more, word = "", "line" if self.table.header else "row"
+        if len(rows) > 1:
+            plural = "s" if len(rows) > 2 else ""
+            more = f" (and {len(rows) - 1} more row{plural}, to {word} {self.lines[rows[-1]]})"
+        place = word, int(self.lines[rows[0]]) if len(rows) else None, signal.name if signal else ""
+        subjects = [subject or signal] if signal else []
+        return found(level, kind, self.table.source, subjects, place, rows=more, **numbers)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ArrayTable(Table):
     """Columns that are in memory, shape (R,) each; text has the dtype object."""
@@ -75,20 +130,26 @@ class ArrayTable(Table):
     columns: Mapping[str, NDArray[Any]]
     clocks: frozenset[str] = frozenset()
 
-    def read(self, columns: Sequence[str], held: Collection[str] = ()) -> Cells:
+    def read(self, signals: Sequence[Signal]) -> Recording:
         """Read columns, which must be numbers of one length."""
-        rows = len(self.columns[columns[0]])
-        for name in columns:
+        first, *_ = names = [signal.name for signal in signals]
+        rows = len(self.columns[first])
+        for name in names:
             values, where = self.columns[name], f"{self.source}, column {name}"
             if values.dtype.kind not in "fiub":
                 example = str(values[0])[:30] if len(values) else ""
                 raise LogError(f"holds text, such as {example!r}", where=where, hint="store it as numbers")
             if len(values) != rows:
-                what = f"holds {len(values)} values, but column {columns[0]} holds {rows}"
+                what = f"holds {len(values)} values, but column {first} holds {rows}"
                 raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
-        values = np.stack([self.columns[name].astype(np.float64) for name in columns], axis=1)
-        clocks = self.clocks.intersection(columns)
-        return Cells(values, np.arange(1, rows + 1), np.zeros(rows, bool), clocks)
+        values = np.stack([self.columns[name].astype(np.float64) for name in names], axis=1)
+        return in_rows(self, signals, values, clocks=self.clocks.intersection(names))
+
+
+def in_rows(table: Table, signals: Sequence[Signal], values: Floats, **more: Any) -> Recording:
+    """Return the recording of a format whose rows are numbered from 1 and whole."""
+    rows = len(values)
+    return Recording(table, tuple(signals), values, np.arange(1, rows + 1), np.zeros(rows, bool), **more)
 
 
 def optional_package(package: str, extra: str, source: str) -> Any:

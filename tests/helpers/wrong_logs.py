@@ -180,7 +180,7 @@ WRONG = (
     Wrong(
         "a dead sensor",
         "warning",
-        "angle of joint 2 never changes though it is driven",
+        "angle of joint 2 never changes",
         lambda: of("q2", lambda q: np.full_like(q, q[0])),
     ),
     Wrong(
@@ -204,7 +204,7 @@ WRONG = (
     Wrong(
         "a joint that is pushed against its stop",
         "note",
-        "driven against the end of its travel: joint 2 for",
+        "joint 2 is driven against the end of its travel for",
         lambda: [boom([60, -60, 100, -100], seconds=8)],
     ),
     Wrong(

@@ -8,7 +8,6 @@ import pytest
 from log_files import cells, faults, lines, read, save
 
 from hydroid.log import open_table
-from hydroid.settings.log import LogSettings
 
 ROWS = lines(cells())
 HEAD, DATA = ROWS[0], ROWS[1:]
@@ -63,20 +62,6 @@ def test_the_table_is_found_in_any_layout(layout: str, separator: str, tmp_path:
     np.testing.assert_array_equal(log.time, reference.time)
     np.testing.assert_array_equal(log.command, reference.command)
     np.testing.assert_array_equal(log.angle, reference.angle)
-
-
-def test_names_that_repeat_follow_their_group(tmp_path: Path) -> None:
-    groups = ["", "boom", "", "arm", ""]
-    names = ["t", "command", "angle", "command", "angle"]
-    order = [0, 1, 3, 2, 4]
-    data = [[row[c] for c in order] for row in DATA]
-    path = save(tmp_path / "log.csv", [groups, names, *data])
-    mapping = {"time": {"column": "t"}, "joints": {}}
-    for joint, group in ((1, "boom"), (2, "arm")):
-        own = {"command": {"column": f"{group} command"}, "angle": {"column": f"{group} angle"}}
-        mapping["joints"][joint] = own
-    log, _ = read(path, LogSettings.model_validate(mapping))
-    np.testing.assert_array_equal(log.command, cells()[:, 1:3])
 
 
 @pytest.mark.parametrize(("line", "cell", "text"), [(1, 0, "x"), (1, 3, "?"), (2, 2, ""), (40, 1, "3 V")])

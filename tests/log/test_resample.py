@@ -59,7 +59,7 @@ def test_a_resampled_log_is_said_to_be(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", lines(cells(60, 0.02)))
     log, findings = read(path)
     assert len(log.time) == 119
-    assert [f.what for f in findings] == ["resampled from 0.02 s to 0.01 s"]
+    assert [f.what for f in findings] == ["resampled from steps of 0.02 s to 0.01 s"]
     log, findings = read(path, LogSettings(period_s=0.02))
     assert len(log.time) == 60
     assert findings == []

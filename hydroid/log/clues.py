@@ -1,0 +1,158 @@
+"""What the name, the unit and the numbers of a column say about it."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hydroid.log.log import Floats
+from hydroid.units import Unit, unit_of
+
+Kind = Literal["time", "command", "angle", "other", ""]
+
+WORDS: dict[str, Kind] = {
+    "time t timestamp stamp zeit sec seconds temps": "time",
+    "flow pump pressure press p pa pb tank supply current": "other",
+    """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out output spool
+    demand volt voltage stell drive""": "command",
+    "q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll": "angle",
+}
+"""words that tell the kind of a column"""
+DERIVED = """velocity vel speed qd dq qdot acc acceleration torque force load effort temp temperature error
+fault status count index sample date"""
+"""words of what is neither command nor angle, whatever its unit"""
+KINDS: dict[str, Kind] = {
+    "time": "time",
+    "angle": "angle",
+    "command": "command",
+    "voltage": "command",
+    "current": "command",
+}
+"""kind of a column by what its unit measures; of all other units it is "other\""""
+SAME = (
+    "arm stick dipper",
+    "swing slew azimuth house base turret",
+    "bucket tool gripper",
+    "shoulder boom",
+    "elbow stick",
+)
+"""names that machines have for the same joint"""
+OPPOSITE = (
+    "up:down raise:lower pos:neg plus:minus out:in extend:retract left:right open:close forward:backward a:b"
+)
+"""words for the positive and the negative direction"""
+RANGES = (
+    (4, 20, "4 to 20 mA"),
+    (0, 5, "0 to 5 V"),
+    (0, 10, "0 to 10 V"),
+    (0, 1, "0 to 1"),
+    (0, 100, "0 to 100"),
+    (0, 255, "0 to 255"),
+    (0, 1023, "0 to 1023"),
+    (0, 4095, "0 to 4095"),
+    (1000, 2000, "1000 to 2000 µs"),
+    (-1, 1, "±1"),
+    (-10, 10, "±10 V"),
+    (-100, 100, "%"),
+    (-1000, 1000, "±1000"),
+    (-32767, 32767, "±32767"),
+)
+"""what amplifiers and joysticks give; the middle stands for no command"""
+
+
+@dataclass(frozen=True)
+class CommandRange:
+    """A range by its name, and what brings it to percent: command [%] = scale · cell + offset."""
+
+    name: str
+    scale: float
+    offset: float = 0.0
+
+    def remedy(self, gain: float, offset: float) -> dict[str, str]:
+        """Return its name, and the settings that bring it to percent where those of the log are given."""
+        offset = self.offset + self.scale * offset
+        more = f" and log.command.offset: {offset:g}" if offset else ""
+        return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
+
+
+def likely_range(values: Floats, negative: Floats | None = None) -> CommandRange | None:
+    """Return the range that fits the cells of a command, shape (R,), or of its two directions, or None.
+
+    Converters overshoot, and joysticks do not rest exactly in the middle. A range with a positive middle must
+    be used on both sides of it, and rest there: first or most of the time, unless 0 is common.
+    """
+    if negative is not None:
+        both = np.stack([values, negative])
+        at_rest = np.mean((abs(both - 4) <= 0.48).any(axis=0))
+        if both.min() >= 3.52 and both.max() <= 20.48 and at_rest > 0.95:
+            return CommandRange("4 to 20 mA on each side", 6.25, -25.0)
+        values = values - negative
+    values = values[~np.isnan(values)]
+    if not values.any():
+        return None
+    low, high = values.min(), values.max()
+    kinds, counts = np.unique(values, return_counts=True)
+    rests = np.array([values[0], kinds[counts.argmax()]])
+    raised = 0 not in kinds[counts >= 0.05 * len(values)]
+    for start, end, name in RANGES:
+        middle, half = (start + end) / 2, (end - start) / 2
+        slack = 0.06 * half
+        used = low < middle - 0.1 * half and high > middle + 0.1 * half
+        resting = raised and used and low >= 0 and (abs(rests - middle) <= slack).any()
+        inside = low >= start - slack / (1 + (start < 0)) and high <= end + slack / (1 + (start < 0))
+        if inside and (start < 0 or resting):
+            return CommandRange(name, 100 / half, -100 * middle / half)
+    return None
+
+
+def words(name: str) -> list[str]:
+    """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve, cmd, 2, v."""
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)]
+
+
+def column_unit(name: str, given: str = "") -> Unit | None:
+    """Return the unit that the file gives, or the one in or at the end of the name; None: there is none."""
+    inside = re.search(r"[\[(<]([^\])>]*)[\])>]\s*$", name)
+    units = map(unit_of, (given, inside[1] if inside else "", re.split(r"[_ .]", name)[-1]))
+    return next((unit for unit in units if unit and unit.quantity != "ambiguous"), None)
+
+
+def kind_of(name: str, unit: Unit | None) -> Kind:
+    """Return what the unit, or else the words of a name say that a column is; "" where they say nothing."""
+    there = words(name)
+    if {*there} & {*DERIVED.split()}:
+        return "other"
+    if unit:
+        return KINDS.get(unit.quantity, "other")
+    kinds = (kind for word in reversed(there) for known, kind in WORDS.items() if word in known.split())
+    return next(kinds, "")
+
+
+def joint_of(name: str, joints: Sequence[str]) -> int | None:
+    """Return the number [from 1] of the joint that a column's name holds the name of; None: of none."""
+    there = {*words(name)} - {"joint"}
+    exact = [{*words(joint)} for joint in joints]
+    alike = [own.union(*(group.split() for group in SAME if own & {*group.split()})) for own in exact]
+    for named in (exact, alike):
+        hits = [k for k, mine in enumerate(named, 1) if mine & there]
+        if len(hits) == 1:
+            return hits[0]
+    return None
+
+
+def number_in(name: str) -> int | None:
+    """Return the last number in a column's name; None: it has none."""
+    numbers = [int(word) for word in words(name) if word.isdecimal()]
+    return numbers[-1] if numbers and numbers[-1] < 100 else None
+
+
+def direction(name: str) -> tuple[int, frozenset[str]]:
+    """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
+    there = frozenset(words(name))
+    signs = {
+        word: sign for pair in OPPOSITE.split() for sign, word in zip((1, -1), pair.split(":"), strict=True)
+    }
+    word = next((word for word in signs if word in there), "")
+    return signs.get(word, 0), there - {word}

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from hydroid.words import WORDS, filled
+
 Level = Literal["error", "warning", "note"]
 """error: the input or result cannot be used; warning: do not use it unread; note: good to know"""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that an analysis found.
+    """One thing that an analysis found; as text it is what it states, and the hint.
 
     Attributes:
         kind: key of its words in `words.WORDS`. Decisions are made on it, never on a sentence.
@@ -25,3 +27,16 @@ class Finding:
     subjects: tuple[str, ...] = ()
     numbers: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
     where: str = ""
+
+    @property
+    def what(self) -> str:
+        """What it states."""
+        return filled(WORDS[self.kind][0], self.subjects, self.numbers)
+
+    @property
+    def hint(self) -> str:
+        """What to do about it; empty where nothing is to be done."""
+        return filled(WORDS[self.kind][1], self.subjects, self.numbers)
+
+    def __str__(self) -> str:
+        return f"{self.what} {self.hint}".strip()

@@ -6,146 +6,121 @@ there are. `{is}`, `{has}`, `{s}`, `{it}`, `{them}` and `{its}` agree with the n
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
-from hydroid.findings import Finding
 from hydroid.log_words import LOG_WORDS
-
-MOST_NAMES = 4
-"""names that `{few}` gives"""
-
-
-@dataclass(frozen=True)
-class Words:
-    """What a kind of finding states, and what to do about it; a hint may be empty."""
-
-    statement: str
-    hint: str = ""
-
 
 _BRINGS = "{what} would be known to {after} % instead of {before} %."
 
-WORDS: dict[str, Words] = {
+WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     # a fit
-    "not refined": Words(
+    "not refined": (
         "The estimate comes from the search alone and need not be an optimum.",
         "Fit again without --no-refinement.",
     ),
-    "not converged": Words(
+    "not converged": (
         "The refinement '{0}' did not converge: {ending}. Do not trust the estimate or its intervals.",
         "Allow more iterations (refinement.iterations), or try another seed.",
     ),
-    "diverged": Words("The simulation of the estimate '{0}' diverged. It is not used."),
-    "at zero": Words("{names} {is} 0, the least possible value: the logs show no such effect."),
-    "at bound": Words(
+    "diverged": ("The simulation of the estimate '{0}' diverged. It is not used.", ""),
+    "at zero": ("{names} {is} 0, the least possible value: the logs show no such effect.", ""),
+    "at bound": (
         "{names} {is} at the {side} bound. The error would fall further beyond it.",
         "Widen the bound if such values are possible. Otherwise the model lacks something.",
     ),
-    "strained prior": Words(
+    "strained prior": (
         "The estimate is {score:.1f} standard deviations {side} its prior of {0}.",
         "Either the prior is wrong, or the parameter makes up for an error of the model.",
     ),
-    "logs disagree": Words(
+    "logs disagree": (
         "The model errs differently in each log, so the 95 % intervals of {few} are too narrow.",
         "Use the intervals by log.",
     ),
-    "no effect": Words(
-        "{few} {has} no effect on the compared angles.", "Hold {them} fixed, or compare another joint."
+    "no effect": (
+        "{few} {has} no effect on the compared angles.",
+        "Hold {them} fixed, or compare another joint.",
     ),
-    "not identifiable": Words(
+    "not identifiable": (
         "The logs do not determine {few}.",
         "State priors, compare more joints, or add logs in other poses.",
     ),
-    "prior only": Words("The logs add next to nothing to the prior{s} of {few}."),
-    "weakly identifiable": Words("{few} {is} known to 30 to 100 % only."),
-    "effect unknown": Words("The simulation diverges when {few} {is} changed: {its} effect is unknown."),
-    "interval rough": Words(
-        "The interval{s} of {few} {is} rough: {its} width may be off by {percent:.0f} %."
+    "prior only": ("The logs add next to nothing to the prior{s} of {few}.", ""),
+    "weakly identifiable": ("{few} {is} known to 30 to 100 % only.", ""),
+    "effect unknown": ("The simulation diverges when {few} {is} changed: {its} effect is unknown.", ""),
+    "interval rough": ("The interval{s} of {few} {is} rough: {its} width may be off by {percent:.0f} %.", ""),
+    "common scale": ("{few} can be multiplied by one factor, and the motion stays the same.", ""),
+    "combination": (
+        "{few} cannot be told apart: certain changes of them together give nearly the same motion.",
+        "",
     ),
-    "common scale": Words("{few} can be multiplied by one factor, and the motion stays the same."),
-    "combination": Words(
-        "{few} cannot be told apart: certain changes of them together give nearly the same motion."
-    ),
-    "more combinations": Words("{count} more combinations are open: see Directions."),
-    "quantities open": Words("The logs do not determine these quantities: {few}."),
+    "more combinations": ("{count} more combinations are open: see Directions.", ""),
+    "quantities open": ("The logs do not determine these quantities: {few}.", ""),
     # advice: the statement says what to do, the hint what it would bring
-    "nothing missing": Words(
-        "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error much."
+    "nothing missing": (
+        "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error much.",
+        "",
     ),
-    "terms may be missing": Words(
+    "terms may be missing": (
         "Find what the model lacks: a quick test points at {few}.",
         "`suggest` tries the most promising terms and prints the command for the best.",
     ),
-    "term missing": Words(
+    "term missing": (
         "Free {0}: the rms error is predicted to fall from {rms}° to {freed}°.",
         "Keep it if the error on an unseen log falls too.",
     ),
-    "more terms missing": Words(
+    "more terms missing": (
         "{few} would also lower the error, but may describe the same error.",
         "Free one at a time, and validate each new fit.",
     ),
-    "weigh": Words("Weigh {0} to ±{sd:.0f} %.", _BRINGS),
-    "state": Words("State {0} to ±{sd:.0f} %, from a data sheet or a measurement.", _BRINGS),
-    "measure joint": Words("Compare the angle of joint {0} too.", _BRINGS),
-    "measure pressures": Words("Log the chamber pressures and compare them.", _BRINGS),
-    "constant commands": Words("Add a log of constant commands of {0} % in both directions.", _BRINGS),
-    "payload": Words("Repeat the logs with {0} kg in the gripper.", _BRINGS),
-    "experiment": Words("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
-    "fit the hydraulics": Words(
-        "Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."
-    ),
-    "predict unseen": Words(
-        "Predict a log that this fit has not seen.", "Only such a log can test the model."
-    ),
+    "weigh": ("Weigh {0} to ±{sd:.0f} %.", _BRINGS),
+    "state": ("State {0} to ±{sd:.0f} %, from a data sheet or a measurement.", _BRINGS),
+    "measure joint": ("Compare the angle of joint {0} too.", _BRINGS),
+    "measure pressures": ("Log the chamber pressures and compare them.", _BRINGS),
+    "constant commands": ("Add a log of constant commands of {0} % in both directions.", _BRINGS),
+    "payload": ("Repeat the logs with {0} kg in the gripper.", _BRINGS),
+    "experiment": ("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
+    "fit the hydraulics": ("Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."),
+    "predict unseen": ("Predict a log that this fit has not seen.", "Only such a log can test the model."),
     # a profile
-    "better optimum": Words(
+    "better optimum": (
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
         "Fit again from there, with more iterations or another seed.",
     ),
-    "profile bounded": Words(
-        "Within the profile of {profile}, {few} reached a bound, which limits its interval."
+    "moved": ("A profile found a better optimum. It was refined, and all results are of it: {values}.", ""),
+    "profile bounded": (
+        "Within the profile of {profile}, {few} reached a bound, which limits its interval.",
+        "",
     ),
     # a residual
-    "residual depends": Words(
+    "residual depends": (
         "{0}: the measured angle is {error:.2g}° {side} than the simulated one where the {1} is {low} to "
-        "{high} {unit}."
+        "{high} {unit}.",
+        "",
     ),
-    "residual correlated": Words(
-        "{0}: the error keeps its sign for {seconds:.2g} s.", "No sensor is that slow: the model errs."
+    "residual correlated": (
+        "{0}: the error keeps its sign for {seconds:.2g} s.",
+        "No sensor is that slow: the model errs.",
     ),
-    "residual at stop": Words(
-        "{0}: the joint is at its stop for {seconds:.2g} s, with an error of {rms:.2g}°."
+    "residual at stop": (
+        "{0}: the joint is at its stop for {seconds:.2g} s, with an error of {rms:.2g}°.",
+        "",
     ),
     # a prediction
-    "error as expected": Words(
-        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°."
+    "error as expected": (
+        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°.",
+        "",
     ),
-    "error not expected": Words(
+    "error not expected": (
         "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°.",
         "The model, not the noise, limits the prediction.",
     ),
-    "error without band": Words("{0} on {1}: the error is {rms:.2g}°. The fit has no band for it."),
-    "few logs disagree": Words(
+    "error without band": ("{0} on {1}: the error is {rms:.2g}°. The fit has no band for it.", ""),
+    "few logs disagree": (
         "The logs disagree about {few} by more than the noise explains.",
         "Add logs before you use these values: so few cannot tell why.",
     ),
-} | {kind: Words(*words) for kind, words in LOG_WORDS.items()}
-
-
-def statement(finding: Finding) -> str:
-    """Return what a finding says."""
-    return _filled(WORDS[finding.kind].statement, finding)
-
-
-def hint(finding: Finding) -> str:
-    """Return what to do about a finding; empty where nothing is to be done."""
-    return _filled(WORDS[finding.kind].hint, finding)
-
-
-def sentence(finding: Finding) -> str:
-    """Return statement and hint of a finding."""
-    return f"{statement(finding)} {hint(finding)}".strip()
+}
+"""statement and hint by kind; a hint may be empty"""
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
@@ -180,13 +155,11 @@ class _Number(float):
         return super().__format__(spec) if spec else number(self)
 
 
-def _filled(words: str, finding: Finding) -> str:
-    names, one = finding.subjects, len(finding.subjects) == 1
-    grammar = {"is": "is", "has": "has", "s": "", "it": "it", "them": "it", "its": "its"}
-    if not one:
-        grammar = {"is": "are", "has": "have", "s": "s", "it": "they", "them": "them", "its": "their"}
-    numbers = {
-        key: value if isinstance(value, str) else _Number(value) for key, value in finding.numbers.items()
-    }
-    lists = {"names": listed(names), "few": listed(names, MOST_NAMES)}
-    return words.format(*names, **grammar, **lists, **numbers)
+def filled(words: str, names: Sequence[str], numbers: Mapping[str, float | str]) -> str:
+    """Return a sentence of WORDS with a finding's subjects and numbers."""
+    one, many = ("is", "has", "", "it", "it", "its"), ("are", "have", "s", "they", "them", "their")
+    grammar = dict(
+        zip(("is", "has", "s", "it", "them", "its"), one if len(names) == 1 else many, strict=True)
+    )
+    shown = {key: value if isinstance(value, str) else _Number(value) for key, value in numbers.items()}
+    return words.format(*names, **grammar, **shown, names=listed(names), few=listed(names, 4))

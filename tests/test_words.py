@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hydroid.findings import Finding
-from hydroid.words import WORDS, listed, sentence, statement
+from hydroid.words import WORDS, listed
 
 ROOT = Path(__file__).parents[1] / "hydroid"
 
@@ -24,8 +24,8 @@ def test_every_row_of_words_is_used():
 )
 def test_a_sentence_agrees_with_its_subjects(subjects: tuple[str, ...], expected: str):
     finding = Finding("at bound", "warning", subjects, {"side": "upper"})
-    assert statement(finding).startswith(expected)
-    assert sentence(finding).endswith("Otherwise the model lacks something.")
+    assert finding.what.startswith(expected)
+    assert str(finding).endswith("Otherwise the model lacks something.")
 
 
 def test_a_long_list_ends_with_how_many_more():

@@ -14,6 +14,7 @@ from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, rows, written
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
+from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
@@ -100,7 +101,6 @@ def analyse(
     from hydroid.posterior import sweep as sweeps
     from hydroid.reporting.analysis_report import analysis_page
     from hydroid.reporting.uncertainty_report import uncertainty_page
-    from hydroid.words import sentence
 
     grid = points, None if around is None else around / 100
     with Progress() as progress:
@@ -119,8 +119,8 @@ def analyse(
     content = {"at": study.source, "rank": study.identifiability.rank}
     content |= {name: known[name] for name in ("findings", "estimate")}
     content |= {name: rows(table, *keys[name]) for name, table in tables.items()}
-    notes = [f"- {sentence(finding)}" for finding in study.summary.findings]
-    lines = [study.table, *tables.values(), *filter(None, [study.moved]), *notes, *written(page, out)]
+    notes = [f"- {finding}" for finding in study.summary.findings]
+    lines = [study.table, *tables.values(), *notes, *written(page, out)]
     return Result(lines, content, study, page)
 
 
@@ -151,8 +151,8 @@ def _uncertainty(
     unit = refine(problem, better, refinement).point
     theta = problem.parameters.from_unit(unit)
     values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
-    moved = f"A profile found a better optimum. It was refined, and all results are of it: {values}."
-    return replace(at(theta, f"a better optimum than that of {source}"), moved=moved)
+    moved = Finding("moved", "warning", (), {"values": values})
+    return replace(at(theta, f"a better optimum than that of {source}"), moved=(moved,))
 
 
 def _pair(given: str | Sequence[str]) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import Source
-    from hydroid.run.collection import Collection
+    from hydroid.run.collection import Runs
 
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 """keys of the table of several runs"""
@@ -44,7 +44,7 @@ def report(
     out: Annotated[
         "Source", typer.Option(metavar="DIR", help="Folder for the page of several."), Path
     ] = "runs/report",
-) -> "Result[Collection | None]":
+) -> "Result[Runs | None]":
     """Draw the report of a finished run anew, or several side by side on one page.
 
     Nothing is simulated, and no log is needed: a run stores all that its report shows. With one folder, its
@@ -65,13 +65,13 @@ def report(
 
         file = str(draw(as_list(runs), out, without or (), figures=figures))
         return Result([file], {"out": file}, None)
-    from hydroid.reporting.spread import final_spread, spread_page
+    from hydroid.reporting.spread import spread_page
     from hydroid.run.collection import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
     page, best = spread_page(collected), collected.best
     table, line = (
-        final_spread(page),
+        page.tables["spread"],
         f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)",
     )
     content = {

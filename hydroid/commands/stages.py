@@ -244,8 +244,8 @@ def _several(results: list[FitResult], out: "Source | None") -> FitRuns:
     content = {"out": out and str(out), "runs": [result.plain() for result in results]}
     if out is None:
         return FitRuns(results[0].lines, content, tuple(results))
-    from hydroid.reporting.spread import final_spread, spread_page
+    from hydroid.reporting.spread import spread_page
     from hydroid.run.collection import read_runs
 
     page = spread_page(read_runs([str(result.folder) for result in results], Path(out)))
-    return FitRuns([final_spread(page), *written(page, out)], content, tuple(results))
+    return FitRuns([page.tables["spread"], *written(page, out)], content, tuple(results))

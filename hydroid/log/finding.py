@@ -6,7 +6,6 @@ from pathlib import Path
 
 from hydroid.errors import LogError
 from hydroid.findings import Finding, Level
-from hydroid.words import hint, statement
 
 
 @dataclass(frozen=True)
@@ -20,16 +19,6 @@ class LogFinding(Finding):
     source: str = ""
     line: int | None = None
     column: str = ""
-
-    @property
-    def what(self) -> str:
-        """What is wrong or worth knowing."""
-        return statement(self)
-
-    @property
-    def hint(self) -> str:
-        """What to do about it."""
-        return hint(self)
 
     def error(self) -> LogError:
         """Return the finding as the error that ends a command."""

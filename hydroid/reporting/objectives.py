@@ -6,37 +6,30 @@ import numpy as np
 
 from hydroid.parameters import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite, joined, value_axis
-from hydroid.reporting.phrases import in_reader_units, norm_label
+from hydroid.reporting.labels import in_reader_units, norm_label
 from hydroid.settings.problem import ObjectiveSettings
-
-_MOST_LINES = 100
-"""candidates of the Pareto set that are drawn, those with the lowest errors"""
 
 
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:
     """Draw the best objective so far and the population's median against evaluations."""
-    evaluations = history[:, 1]
-    best, median = (finite(in_reader_units(objective, history[:, c])) for c in (4, 5))
+    tried, (best, median) = history[:, 1], finite(in_reader_units(objective, history[:, 4:6].T))
     marks = (
-        Mark("line", evaluations, median, color="grey", label="median of the population", look="dashed"),
-        Mark("line", evaluations, best, color="blue", label="best so far", width=2),
-        Mark("points", evaluations, best, color="blue", width=5),
+        Mark("line", tried, median, color="grey", label="median of the population", look="dashed"),
+        Mark("line", tried, best, color="blue", label="best so far", width=2),
+        Mark("points", tried, best, color="blue", width=5),
     )
     limits, log = value_axis(np.concatenate([best, median]))
-    title = "Objective against the number of candidates evaluated"
-    panel = Panel(
-        "candidates evaluated", norm_label(objective), marks, title, 260, y_limits=limits, log_y=log
-    )
-    return Chart((panel,))
+    title, label = "Objective against the number of candidates evaluated", norm_label(objective)
+    return Chart((Panel("candidates evaluated", label, marks, title, 260, y_limits=limits, log_y=log),))
 
 
 def pareto(objectives: Array, estimates: Mapping[str, Array], objective: ObjectiveSettings) -> Chart:
     """Draw each candidate of the Pareto set, and the estimates, as a line over the segments' objectives.
 
-    `objectives`, shape (n, S + 1), end with that over the whole record.
+    `objectives`, shape (n, S + 1), end with that over the whole record; the 100 lowest there are drawn.
     """
     front = finite(in_reader_units(objective, objectives[:, :-1]))
-    front = front[np.argsort(objectives[:, -1], kind="stable")[:_MOST_LINES]]
+    front = front[np.argsort(objectives[:, -1], kind="stable")[:100]]
     at = np.arange(1.0, front.shape[1] + 1)
     # one line with gaps: a line each would be a legend entry and a glyph each
     lines = joined(np.column_stack([at, one]) for one in front)
@@ -48,6 +41,5 @@ def pareto(objectives: Array, estimates: Mapping[str, Array], objective: Objecti
         marks.append(Mark("points", at, one, color=color, width=6))
     limits, log = value_axis(np.concatenate([mark.y for mark in marks]))
     title, ends = "Error in each segment, one line per candidate", (0.7, len(at) + 0.3)
-    return Chart(
-        (Panel("segment", norm_label(objective), tuple(marks), title, 300, ends, limits, log_y=log),)
-    )
+    label = norm_label(objective)
+    return Chart((Panel("segment", label, tuple(marks), title, 300, ends, limits, log_y=log),))

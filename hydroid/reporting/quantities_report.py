@@ -1,8 +1,6 @@
 """What the logs determine, in the words of an engineer: table, figure and lines of a fit's quantities."""
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,18 +11,12 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Plot, Section
-from hydroid.reporting.table import Cell, Table
+from hydroid.reporting.table import Table
 from hydroid.settings.fit import FitSettings
 from hydroid.words import number
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as fixed"""
-_BEST = 6
-"""quantities that a terminal prints at most"""
-_SHOWN_WITHIN = 1.0
-"""relative half interval up to which a quantity stands in the table"""
-_HELD = 0.2
-"""how long a command is held at least to be marked in the figure [s]"""
 _CAPTION = (
     "Speed against command in the middle of the logged travel, and at 50 % command over the travel, with "
     "95 % intervals. Grey: commands that the logs do not reach. Ticks: commands that they hold."
@@ -36,76 +28,72 @@ def quantity_section(settings: FitSettings, summary: FitSummary, logs: Sequence[
     if not summary.quantities:
         return ()
     names = settings.arm.joint_names
-    text = "Each property follows from several parameters, and can be known well although none of them is."
-    speeds = any(name.endswith("_speed") for name in summary.curves)
-    plots = (Plot("speed", _CAPTION, partial(draw_speeds, summary.curves, logs, names)),) if speeds else ()
-    return (
-        Section("What is known", text, tables={"quantities": quantity_table(summary, names)}, plots=plots),
-    )
+    speeds = {name: curve for name, curve in summary.curves.items() if "_speed" in name}
+    plots = (Plot("speed", _CAPTION, partial(draw_speeds, speeds, logs, names)),) if speeds else ()
+    return (Section("What is known", tables={"quantities": quantity_table(summary, names)}, plots=plots),)
 
 
 def quantity_table(summary: FitSummary, joints: Sequence[str]) -> Table:
     """Return the quantities that are determined, each with its 95 % interval; `joints` are all names."""
-    rows: list[tuple[Cell, ...]] = []
-    for one in summary.quantities.values():
-        if one.within <= _SHOWN_WITHIN:
-            joint = None if one.joint is None else joints[one.joint - 1]
-            rows.append((joint, one.label, one.unit, one.value, *one.interval, 100 * one.within))
-    note = (
-        "from, to: 95 % interval, to first order, right only if the model is right. Speeds: in the middle of "
-        "the logged travel. docs/quantities.md defines each."
+    rows = tuple(
+        (
+            *(None if one.joint is None else joints[one.joint - 1], one.label, one.unit),
+            *(one.value, *one.interval, 100 * one.within),
+        )
+        for one in summary.quantities.values()
+        if one.within <= 1.0
     )
+    note = "from, to: 95 % interval, right only if the model is. docs/quantities.md defines each."
     header = ("joint", "quantity", "unit", "value", "from", "to", "± [%]")
-    return Table("Quantities", header, tuple(rows), note, ("± [%]",))
+    return Table("Quantities", header, rows, note, ("± [%]",))
 
 
-def best_known(quantities: Mapping[str, QuantityEstimate]) -> list[str]:
-    """Return a line for each of the best-known quantities, the best first, under a heading; or nothing."""
-    best = sorted((q for q in quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within)[:_BEST]
+def best_known(quantities: Mapping[str, QuantityEstimate]) -> Iterator[str]:
+    """Yield a line for each of the best-known quantities, the best first, under a heading; or nothing."""
+    best = sorted((q for q in quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within)[:6]
     several = len({q.joint for q in quantities.values()}) > 1
-    lines = [
-        f"  {f'joint {q.joint}: ' if several else ''}{q.label}: {number(q.value)} {q.unit}".rstrip()
-        + f" ({' to '.join(number(end) for end in q.interval if end is not None)})"
-        for q in best
-    ]
-    return ["Best determined, with 95 % intervals:", *lines] if lines else []
+    for i, q in enumerate(best):
+        if i == 0:
+            yield "Best determined, with 95 % intervals:"
+        ends = " to ".join(number(end) for end in q.interval if end is not None)
+        of = f"joint {q.joint}: " if several else ""
+        yield f"  {of}{q.label}: {f'{number(q.value)} {q.unit}'.rstrip()} ({ends})"
 
 
 def curves_csv(curves: Mapping[str, CurveEstimate]) -> str:
     """Return all curves as CSV, one point per row; an end without limit is empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("curve", "joint", "quantity", "unit", "along", "at", "value", "from", "to"))
-    for name, curve in curves.items():
-        for at, value, ends in zip(curve.at, curve.value, curve.interval, strict=True):
-            writer.writerow((name, curve.joint, curve.label, curve.unit, curve.along, at, value, *ends))
-    return text.getvalue()
+    header = ("curve", "joint", "quantity", "unit", "along", "at", "value", "from", "to")
+    rows = tuple(
+        (name, curve.joint, curve.label, curve.unit, curve.along, at, value, *ends)
+        for name, curve in curves.items()
+        for at, value, ends in zip(curve.at, curve.value, curve.interval, strict=True)
+    )
+    return Table("", header, rows).csv()
 
 
 def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
     """Draw each joint's speed against command with its band and, in stage 2, at 50 % over its travel."""
-    columns = 2 if any("_over_poses" in name for name in curves) else 1
-    panels: list[Panel] = []
+    panels, over_poses = list[Panel](), any("_over_poses" in name for name in curves)
     for curve in (c for name, c in curves.items() if name.endswith("_speed")):
-        commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
-        marks = _logged(commands, logs[0].period)
+        marks = _logged(np.concatenate([log.command[:, curve.joint - 1] for log in logs]), logs[0].period)
         at = np.array(curve.at)
-        for side, color in ((at > 0, "blue"), (at < 0, "orange")):
-            marks += _curve(curve, side, color)
+        marks += [*_curve(curve, at > 0, "blue"), *_curve(curve, at < 0, "orange")]
         title = f"{joints[curve.joint - 1]}: speed in mid travel"
         panels.append(Panel("command [%]", "speed [deg/s]", tuple(marks), title, 250, (-105.0, 105.0)))
-        poses = [c for n, c in curves.items() if n.startswith(f"joint{curve.joint}_speed_50_over_poses")]
-        marks = []
-        for one, color in zip(poses, ("blue", "orange"), strict=False):
-            marks += _curve(one, np.ones(len(one.at), bool), color, one.label.rpartition(", ")[2])
-        if columns > 1:
+        if over_poses:
+            poses = [c for n, c in curves.items() if n.startswith(f"joint{curve.joint}_speed_50_over_poses")]
+            marks = [
+                mark
+                for one, color in zip(poses, ("blue", "orange"), strict=False)
+                for mark in _curve(one, np.ones(len(one.at), bool), color, one.label.rpartition(", ")[2])
+            ]
             panels.append(Panel("angle [deg]", "speed [deg/s]", tuple(marks), "Speed at 50 % command", 250))
-    return Chart(tuple(panels), columns=columns)
+    return Chart(tuple(panels), columns=2 if over_poses else 1)
 
 
 def _curve(curve: CurveEstimate, chosen: NDArray[np.bool_], color: Color, label: str = "") -> list[Mark]:
     at, value = np.array(curve.at)[chosen], np.array(curve.value)[chosen]
-    ends = np.array([[np.nan if e is None else e for e in pair] for pair in curve.interval])[chosen]
+    ends = np.array(curve.interval, dtype=float)[chosen]
     return [
         Mark("band", at, ends[:, 0], ends[:, 1], color=color, alpha=0.25),
         Mark("line", at, value, color=color, label=label),
@@ -114,11 +102,11 @@ def _curve(curve: CurveEstimate, chosen: NDArray[np.bool_], color: Color, label:
 
 
 def _logged(commands: Array, period: float) -> list[Mark]:
-    """Shade what lies beyond the logs' commands, and tick those that are held."""
+    """Shade what lies beyond the logs' commands, and tick those that are held for 0.2 s."""
     levels, counts = np.unique(commands[commands != 0], return_counts=True)
     if not levels.size:
         return []
     low, high = min(levels[0], 0.0), max(levels[-1], 0.0)
     beyond = Mark("spans", np.array([-105.0, high]), end=np.array([low, 105.0]), color="pale", alpha=0.4)
-    held = levels[counts * period >= _HELD]
+    held = levels[counts * period >= 0.2]
     return [beyond, Mark("points", held, np.zeros(len(held)), color="grey", width=9, look="dash")]

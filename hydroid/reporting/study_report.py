@@ -5,21 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.reporting.page import Page, Section
-from hydroid.reporting.table import Cell, Table
+from hydroid.reporting.table import Table
 from hydroid.studies.study import Row, StudyRuns
-
-UNITS = {"largest error": "deg", "mean absolute error": "deg", "rms error": "deg", "seconds": "s"}
 
 
 def study_page(name: str, runs: StudyRuns) -> Page:
     """Return the page of a study, by its file's name; its CSV holds every run with every measure."""
     failed = tuple((row.cell, row.seed, row.failed) for row in runs.rows if row.failed)
     sections = [Section("Errors by cell", runs.study.about, tables={"cells": cell_table(runs)})]
-    warnings: tuple[str, ...] = ()
     if failed:
-        warnings = (f"{len(failed)} of {len(runs.rows)} runs failed; they are listed below.",)
-        table = Table("Failed runs", ("cell", "seed", "why"), failed)
+        table = Table("", ("cell", "seed", "why"), failed)
         sections.append(Section("Runs that failed", tables={"failed": table}))
+    warnings = (f"{len(failed)} of {len(runs.rows)} runs failed; they are listed below.",) if failed else ()
     lead = f"{len(runs.cells)} cells over {runs.study.seeds} seeds."
     data = {f"{name}_runs.csv": runs_csv(runs.rows)}
     return Page(name, runs.study.title, lead, tuple(sections), warnings, data=data)
@@ -27,22 +24,19 @@ def study_page(name: str, runs: StudyRuns) -> Page:
 
 def cell_table(runs: StudyRuns) -> Table:
     """Return the median of each measure over the seeds of each cell, with the lowest and the highest."""
-    measures = ("rms error", "mean absolute error", *(f"check {c}" for c in runs.study.checks), "simulations")
-    rows: list[tuple[Cell, ...]] = []
+    errors = ("rms error", "mean absolute error", *(f"check {name}" for name in runs.study.checks))
+    header = ("cell", "runs", *(f"{n} [deg]" if n in errors[:2] else n for n in errors), "simulations")
+    rows: list[tuple[str | int, ...]] = []
     for cell in runs.cells:
-        good = [row for row in runs.rows if row.cell == cell and not row.failed]
-        values = [np.array([row.values[name] for row in good]) for name in measures]
-        rows.append((cell, len(good), *map(spread, values)))
-    header = ("cell", "runs", *(f"{m} [{UNITS[m]}]" if m in UNITS else m for m in measures))
+        good = [row.values for row in runs.rows if row.cell == cell and not row.failed]
+        values = ([one[name] for one in good] for name in (*errors, "simulations"))
+        rows.append((cell, len(good), *map(_median, values)))
     return Table("Median over the seeds [lowest, highest]", header, tuple(rows))
 
 
-def spread(values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> str:
-    """Return median, lowest and highest of the finite values, shape (n,); empty where there are none."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return ""
-    return f"{np.median(finite):.3g} [{finite.min():.3g}, {finite.max():.3g}]"
+def _median(values: Sequence[float]) -> str:
+    finite = [value for value in values if np.isfinite(value)]
+    return f"{np.median(finite):.3g} [{min(finite):.3g}, {max(finite):.3g}]" if finite else ""
 
 
 def runs_csv(rows: Sequence[Row]) -> str:

@@ -1,6 +1,6 @@
 """Suggestions: what the model lacks, what the residual shows, what actions would bring."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from hydroid.advice.missing import LEVEL, MIN_GAIN
@@ -10,7 +10,6 @@ from hydroid.reporting.page import Page, Section, Step, Verdict
 from hydroid.reporting.residual_chart import residual_tabs
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.fit import FitSettings
-from hydroid.words import hint, sentence, statement
 
 _VERDICTS = {
     "free": "free it",
@@ -18,8 +17,6 @@ _VERDICTS = {
     "leave": "leave it: no gain",
     "invisible": "the logs cannot tell it from the free parameters",
 }
-MOST_STEPS = 3
-"""steps that a page names first"""
 
 Content = Mapping[str, Any]
 
@@ -29,86 +26,97 @@ def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], 
 
     `logs` are their names, and `source` names the estimate.
     """
-    findings = [*missing_findings(advice.content), *action_findings(advice.content, settings)]
-    lead = statement(findings[0])
-    idle = "nothing missing", "more terms missing"
-    steps = tuple(step(finding) for finding in findings if finding.kind not in idle)
-    first = (Section("Do next", steps=steps[:MOST_STEPS]),) if steps else ()
-    verdict = Verdict(lead, f"At {source}, where the error is {advice.content['rms_deg']:.2g}° rms.")
+    missing = next(missing_findings(advice.content))
+    lead = f"At {source} the rms error is {advice.content['rms_deg']:.2g}°."
+    if missing.kind == "nothing missing":
+        lead, found = f"{lead} {missing}", []
+    else:
+        found = [missing]
+    steps = first_steps([*found, *action_findings(advice.content, settings)])
     sections = suggestion_sections(settings, advice, logs)
-    title = f"What to change next, at {source}"
-    return Page("suggestions", title, lead, (*first, *sections), verdict=verdict)
+    sections = (Section("Do next", steps=steps), *sections) if steps else sections
+    return Page("suggestions", "What to change next", lead, sections, verdict=Verdict(lead))
 
 
-def step(finding: Finding) -> Step:
-    """Return a finding as something to do."""
-    return Step(statement(finding), hint(finding), str(finding.numbers.get("command", "")))
+def first_steps(findings: Iterable[Finding]) -> tuple[Step, ...]:
+    """Return the first three findings as things to do."""
+    steps = (Step(f.what, f.hint, str(f.numbers.get("command", ""))) for f in findings)
+    return tuple(steps)[:3]
 
 
 def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[str]) -> tuple[Section, ...]:
     """Return the three sections; `logs` are their names."""
-    content, checks = advice.content, advice.residuals
-    places = [f"{settings.arm.joint_names[c.joint - 1]} in {logs[c.log]}" for c in checks]
-    more = [sentence(f) for f in missing_findings(content) if f.kind == "more terms missing"]
-    table = missing_table(content)
-    actions = {"next_actions": action_table(content)} if content["actions"] else {}
-    text = "" if actions else "No action of those tested would help much."
-    tests = {"missing_terms": table} if table.rows else {}
-    nothing = "" if tests else "Every quantity that could be tested is free already."
+    content, checks, joints = advice.content, advice.residuals, settings.arm.joint_names
+    places = [f"{joints[check.joint - 1]} in {logs[check.log]}" for check in checks]
+    lacks = {"missing_terms": missing_table(content)} if content["missing"] else {}
+    brings = {"next_actions": action_table(content)} if content["actions"] else {}
     return (
-        Section("What the model lacks", nothing, points=tuple(more), tables=tests),
+        Section(
+            "What the model lacks",
+            "" if lacks else "Every quantity that could be tested is free already.",
+            tuple(str(f) for f in missing_findings(content) if f.kind == "more terms missing"),
+            tables=lacks,
+        ),
         Section(
             "What the residual shows",
-            points=tuple(sentence(f) for f in residual_findings(checks, places)),
+            points=tuple(str(finding) for finding in residual_findings(checks, places)),
             tabs=residual_tabs(checks, places),
-            more={"residuals": residual_table(content, settings, logs)},
+            more={"residuals": residual_table(content, joints, logs)},
         ),
-        Section("What each action would bring", text, tables=actions),
+        Section(
+            "What each action would bring",
+            "" if brings else "No action of those tested would help much.",
+            tables=brings,
+        ),
     )
 
 
 def missing_table(content: Content) -> Table:
     """Return one row per tested quantity."""
-    rows: list[tuple[Cell, ...]] = []
-    for test in content["missing"]:
+
+    def row(test: Content) -> dict[str, Cell]:
         seen = test["verdict"] != "invisible"
         tried = seen and test["freed"] != test["held"]
-        rows.append(
-            (
-                test["name"],
-                test["unit"],
-                "no limit" if test["held"] is None else test["held"],
-                *((test["freed"], test["rms_deg"]) if tried else (None, None)),
-                test["score"] if seen else None,
-                _VERDICTS[test["verdict"]],
-            )
-        )
-    header = ("quantity", "unit", "held at", "freed", "rms [deg]", "score", "verdict")
+        return {
+            "quantity": test["name"],
+            "unit": test["unit"],
+            "held at": "no limit" if test["held"] is None else test["held"],
+            "freed": test["freed"] if tried else None,
+            "rms [deg]": test["rms_deg"] if tried else None,
+            "score": test["score"] if seen else None,
+            "verdict": _VERDICTS[test["verdict"]],
+        }
+
     note = (
         f"rms without any of them: {content['rms_deg']:.4g} deg. score: how clearly the residual shows the "
         f"effect, in standard deviations. 'free it': significant among all tests ({100 * LEVEL:.0f} %), and "
         f"the simulated error falls by {100 * MIN_GAIN:.0f} % at least."
     )
-    return Table("Quantities that the fit holds", header, tuple(rows), note, ("unit", "score"))
+    return Table.of("Quantities that the fit holds", map(row, content["missing"]), note, ("unit", "score"))
 
 
-def residual_table(content: Content, settings: FitSettings, logs: Sequence[str]) -> Table:
-    """Return one row per compared angle."""
-    keys = "rms_deg", "correlation_s", "at_stop_s"
-    rows: list[tuple[Cell, ...]] = []
-    for residual in content["residuals"]:
-        place = logs[int(residual["log"])], settings.arm.joint_names[int(residual["joint"]) - 1]
-        rows.append((*place, *(residual[key] for key in keys)))
+def residual_table(content: Content, joints: Sequence[str], logs: Sequence[str]) -> Table:
+    """Return one row per compared angle; `joints` and `logs` are all names."""
+    rows = tuple(
+        (logs[one["log"]], joints[one["joint"] - 1], one["rms_deg"], one["correlation_s"], one["at_stop_s"])
+        for one in content["residuals"]
+    )
     header = ("log", "joint", "rms [deg]", "correlation time [s]", "at a stop [s]")
-    return Table("Residuals", header, tuple(rows))
+    return Table("Residuals", header, rows)
 
 
 def action_table(content: Content) -> Table:
     """Return one row per action."""
-    keys = ("action", "of", "parameter", "before_percent", "after_percent")
-    keys += ("quantity", "quantity_before_percent", "quantity_after_percent")
-    header = ("action", "of", "improves most", "from ± [%]", "to ± [%]")
-    header += ("quantity", "quantity from ± [%]", "quantity to ± [%]")
-    rows = tuple(tuple(action[key] for key in keys) for action in content["actions"])
-    note = "Predicted relative standard deviations, with ±100 % on each parameter before any log."
-    return Table("Predicted effect of each action", header, rows, note)
+    columns = {
+        "action": "action",
+        "of": "of",
+        "improves most": "parameter",
+        "from ± [%]": "before_percent",
+        "to ± [%]": "after_percent",
+        "quantity": "quantity",
+        "quantity from ± [%]": "quantity_before_percent",
+        "quantity to ± [%]": "quantity_after_percent",
+    }
+    rows = ({name: action[key] for name, key in columns.items()} for action in content["actions"])
+    note = "Relative standard deviations, with ±100 % on each parameter before any log."
+    return Table.of("Predicted effect of each action", rows, note)

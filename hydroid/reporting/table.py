@@ -4,7 +4,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -44,6 +44,16 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
     optional: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls, title: str, rows: Iterable[Mapping[str, Cell]], note: str = "", optional: tuple[str, ...] = ()
+    ) -> "Table":
+        """Return a table of rows by column name, of which there is at least one."""
+        first, *others = rows
+        return cls(
+            title, tuple(first), tuple(tuple(row.values()) for row in (first, *others)), note, optional
+        )
 
     def csv(self) -> str:
         """Return header and rows with every bit of the numbers, without title and note."""

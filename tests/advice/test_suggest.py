@@ -216,7 +216,7 @@ def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncert
     assert kinds <= set(ActionKind)
     advised = advice(problem, result)
     page = suggestion_page(problem.settings, advised, ["a.csv"], "here")
-    assert page.lead.startswith("Free delay: the rms error is predicted to fall")
+    assert page.sections[0].steps[0].what.startswith("Free delay: the rms error is predicted to fall")
     write_page(page, tmp_path)
     assert "parameters.delay={quantity: delay" in (tmp_path / "suggestions.html").read_text(encoding="utf-8")
     content = advised.content

@@ -18,7 +18,6 @@ from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.reporting import drawing
-from hydroid.reporting.spread import final_spread
 
 SMALL = {
     "search.algorithm": "ga",
@@ -72,7 +71,7 @@ def collected(caplog: pytest.LogCaptureFixture, *names: object) -> tuple[list[in
 
 def test_collected_runs_have_the_medians_of_their_estimates(fitted, runs, tmp_path: Path):
     study = hydroid.report([str(path) for path in runs], merge=True, out=tmp_path / "out")
-    table = final_spread(study.page)
+    table = study.page.tables["spread"]
     theta = np.array([result.fit.best.theta for result in fitted[1]])
     medians = [row[table.header.index("median")] for row in table.rows[:-1]]
     np.testing.assert_allclose(medians, np.median(theta, axis=0), rtol=1e-12)

@@ -14,7 +14,6 @@ from hydroid.reporting.parameters_report import parameter_table
 from hydroid.reporting.predictions import error_table
 from hydroid.reporting.spread import spread_table
 from hydroid.reporting.table import Table
-from hydroid.run.collection import RunEstimate
 
 
 def column(table: Table, name: str) -> list:
@@ -94,15 +93,12 @@ def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
     assert all(name.isprintable() and len(name) <= 50 for name in names)
 
 
-def test_the_spread_over_runs_is_median_quartiles_and_flags_whatever_the_order():
+def test_the_spread_over_runs_is_median_quartiles_and_flags():
     problem = make_problem(fixed={"D": 80.0})
-    unit = np.array([[1.0, 0.3, 0.0], [1.0, 0.3, 0.4], [1.0, 0.5, 0.4]])
-    theta = problem.parameters.from_unit(unit)
-    runs = [RunEstimate(seed, t, 0.01 * seed) for seed, t in enumerate(theta)]
-    table = spread_table(problem.parameters, runs, ["M1"], "refined")
-    assert column(table, "median")[:4] == pytest.approx(np.median(theta, axis=0))
+    theta = problem.parameters.from_unit(np.array([[1.0, 0.3, 0.0], [1.0, 0.3, 0.4], [1.0, 0.5, 0.4]]))
+    table = spread_table(problem.parameters, theta, np.array([0.0, 1.0, 2.0]), ["M1"])
+    assert column(table, "median") == pytest.approx([*np.median(theta, axis=0), 1.0])
     assert column(table, "lowest")[:4] == list(theta.min(axis=0))
-    assert column(table, "highest")[-1] == pytest.approx(np.degrees(0.02))
+    assert column(table, "highest")[-1] == 2.0
     bounds = ["at upper bound in 3 of 3 runs", "fixed", "no effect", "at lower bound in 1 of 3 runs", ""]
     assert column(table, "flag") == bounds
-    assert spread_table(problem.parameters, runs[::-1], ["M1"], "refined").rows == table.rows

@@ -107,8 +107,8 @@ def test_the_page_shows_a_hostile_name_as_text(written):
 
 def test_the_page_goes_from_the_verdict_to_how_to_reproduce_it(written):
     text = read(written[0] / "report.html").text
-    order = ("reproduces the fitted log", "Converged", "Do next", "Prediction", "What is known", "Parameters")
-    order = (*order, "What is not known", "Directions", "Noise", "How the search", "Pareto set", "Reproduce")
+    order = ("reproduces 1 fitted log", "Converged", "Do next", "Prediction", "What is known", "Parameters")
+    order = (*order, "What is not known", "Directions", "Noise", "How the search", "Reproduce")
     places = [text.index(words) for words in order[:-1]] + [text.rindex(order[-1])]
     assert places == sorted(places)
 
@@ -135,7 +135,7 @@ def test_an_unseen_log_comes_first_and_in_the_verdict():
     page = fit_page(record)
     (section,) = [s for s in page.sections if s.title == "Prediction"]
     assert [tab.name for tab in section.tabs] == ["b.csv", "a.csv"]
-    assert "predicts an unseen log with an error of 0.57°" in page.lead
+    assert "predicts 1 unseen log with an error of 0.57°" in page.lead
     assert not any("has not seen" in step.what for step in page.sections[0].steps)
 
 

@@ -9,7 +9,6 @@ from hydroid.advice.missing import TermTest, Verdict
 from hydroid.advice.proposals import action_findings, freeing_command, setting_line
 from hydroid.advice.terms import Term
 from hydroid.settings.load import parse_override
-from hydroid.words import hint
 
 
 @pytest.mark.parametrize(
@@ -19,7 +18,7 @@ def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str
     action = {"action": "state", "of": "D", "parameter": "C", "before_percent": 15.0, "after_percent": after}
     action |= {"quantity": None, "quantity_before_percent": None, "quantity_after_percent": None}
     found = action_findings({"actions": [action]}, make_problem().settings)
-    assert " ".join(hint(finding) for finding in found) == expected
+    assert " ".join(finding.hint for finding in found) == expected
 
 
 def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1():

@@ -120,7 +120,7 @@ def analyse(
     content |= {name: known[name] for name in ("findings", "estimate")}
     content |= {name: rows(table, *keys[name]) for name, table in tables.items()}
     notes = [f"- {finding}" for finding in study.summary.findings]
-    lines = [study.table, *tables.values(), *notes, *written(page, out)]
+    lines = [page.tables["parameters"], *tables.values(), *notes, *written(page, out)]
     return Result(lines, content, study, page)
 
 

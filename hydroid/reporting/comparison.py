@@ -2,20 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import inf
 
 import numpy as np
 
-from hydroid.findings import Finding
 from hydroid.fitting.validation import Prediction
 from hydroid.identified_model import IdentifiedModel
-from hydroid.reporting.page import Bar, Page, Section, short_name
-from hydroid.reporting.parameters_report import parameter_bar
+from hydroid.reporting.page import Page, Section, short_name
+from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.predictions import motion, prediction_section, response_data
-from hydroid.reporting.table import Table
+from hydroid.reporting.table import Cell, Table
+from hydroid.reporting.uncertainty_report import warnings
 from hydroid.reporting.verdict import by_fit, verdict
 from hydroid.run.record import Record
 from hydroid.settings.arm import Arm
+from hydroid.settings.fit import FitSettings
 
 
 def validation_page(
@@ -25,19 +25,26 @@ def validation_page(
 
     `folds` are models that were refined without one log each.
     """
-    parts = (Section("Without one log", tables={"folds": _fold_table(folds)}),) if folds else ()
-    warnings = tuple(str(f) for f in (p.finding for p in predictions) if f.level == "warning")
-    return _page("validation", "Validation", predictions, arm, warnings, *parts)
+    parts: list[Section] = []
+    if folds:
+        table = side_by_side({fold.source: (fold.settings, fold.values) for fold in folds})
+        parts.append(Section("Without one log", tables={"folds": table}))
+    findings = [p.finding for p in predictions]
+    beware = tuple(str(finding) for finding in findings if finding.level == "warning")
+    return _page("validation", "Validation", predictions, arm, parts, beware)
 
 
 def comparison_page(records: Mapping[str, Record]) -> Page:
     """Return the page of several runs side by side, by name: responses to the same logs, and parameters."""
     named = [replace(p, fit=name) for name, record in records.items() for p in record.predictions]
-    text = "Each parameter with its 95 % interval, fit by fit, between the widest bounds of all."
-    findings: list[tuple[str, Finding]] = [(n, f) for n, r in records.items() for f in r.summary.findings]
-    warnings = tuple(f"{name}: {finding}" for name, finding in findings if finding.level != "note")
-    arm, bars = next(iter(records.values())).settings.arm, Section("Parameters", text, bars=_bars(records))
-    return _page("comparison", f"{len(records)} fits side by side", named, arm, warnings, bars)
+    arm = next(iter(records.values())).settings.arm
+    table = side_by_side({name: (r.settings, r.summary.values) for name, r in records.items()})
+    parts = [Section("Parameters", tables={"parameters": table})]
+    for name, record in records.items():
+        section = parameter_section(record.settings, record.summary)
+        parts.append(replace(section, title=f"Parameters of {name}", more={}, folded=True))
+    beware = tuple(f"{name}: {text}" for name, r in records.items() for text in warnings(r.summary))
+    return _page("comparison", f"{len(records)} fits side by side", named, arm, parts, beware)
 
 
 def _page(
@@ -45,41 +52,30 @@ def _page(
     title: str,
     predictions: Sequence[Prediction],
     arm: Arm,
-    warnings: tuple[str, ...],
-    *parts: Section,
+    parts: Sequence[Section],
+    beware: tuple[str, ...],
 ) -> Page:
     fits = by_fit(predictions)
     ordered, judged = [p for own in fits.values() for p in own], verdict(fits)
-    sections = (prediction_section(ordered, arm), *parts, *motion(ordered, arm))
+    sections = (prediction_section(ordered, arm), *motion(ordered, arm), *parts)
     data = response_data(ordered, arm)
-    return Page(name, title, judged.prediction, sections, warnings, data=data, verdict=judged)
+    return Page(name, title, judged.prediction, sections, beware, data=data, verdict=judged)
 
 
-def _bars(records: Mapping[str, Record]) -> tuple[Bar, ...]:
-    """One bar per parameter and run, over the widest bounds of all."""
-    bars: list[Bar] = []
-    sets = {name: record.settings.parameter_set().parameters for name, record in records.items()}
-    for parameter in dict.fromkeys(p.name for own in sets.values() for p in own if p.fixed is None):
-        having = {name: p for name, own in sets.items() for p in own if p.name == parameter}
-        lower, upper = min(p.lower for p in having.values()), max(p.upper for p in having.values())
-        for i, (name, p) in enumerate(having.items()):
-            wide = replace(p, lower=lower, upper=upper, log=p.log and lower > 0)
-            bar = parameter_bar(records[name].settings, wide, records[name].summary.estimate[parameter])
-            symbol, label = (parameter, f"{bar.name}: {name}") if i == 0 else ("", name)
-            bars.append(replace(bar, symbol=symbol, name=label))
-    return tuple(bars)
-
-
-def _fold_table(folds: Sequence[IdentifiedModel]) -> Table:
-    """Return the parameters of models that were refined without one log each."""
-    parameters = folds[0].settings.parameter_set().parameters
-    names = [short_name(fold.source) for fold in folds]
-    rows = [
-        {"name": p.name, "unit": p.unit}
-        | dict(zip(names, values.tolist(), strict=True))
-        | {"spread [%]": 100 * float(values.std(ddof=1)) / abs(mean) if (mean := values.mean()) else inf}
-        for p, values in zip(parameters, np.transpose([fold.theta for fold in folds]), strict=True)
+def side_by_side(models: Mapping[str, tuple[FitSettings, Mapping[str, float]]]) -> Table:
+    """Return the free parameters of models by name, one column each, and how far apart their values are."""
+    units = {
+        n: p.unit
+        for settings, _ in models.values()
+        for n, p in settings.parameters.items()
         if p.fixed is None
-    ]
-    note = "Each column: refined without one log. spread: their standard deviation relative to their mean."
-    return Table.of("Parameters without one log", rows, note, ("spread [%]",))
+    }
+
+    def row(name: str, unit: str) -> dict[str, Cell]:
+        cells = {short_name(model): values.get(name) for model, (_, values) in models.items()}
+        known = np.array([value for value in cells.values() if value is not None])
+        spread = 100 * float(known.std(ddof=1) / known.mean()) if len(known) > 1 and known.any() else None
+        return {"name": name, "unit": unit, **cells, "spread [%]": spread}
+
+    note = "spread: standard deviation of the values relative to their mean."
+    return Table.of("Parameters side by side", (row(*one) for one in units.items()), note, ("spread [%]",))

@@ -44,11 +44,10 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
     )
     moving = "Commands and the motion that the present estimate predicts."
     motion = Plot("motion", moving, partial(motion_chart, design.predicted, arm.joint_names, limits), True)
-    precision = Plot("precision", "The same as a chart.", partial(precision_chart, design))
     sections = (
         Section("Do next", steps=steps),
         Section("Motion", plots=(motion,)),
-        Section("Precision", tables={"design": design_table(settings, design, theta)}, plots=(precision,)),
+        Section("Precision", tables={"design": design_table(settings, design, theta)}),
     )
     return Page("design", "The next experiment", lead, sections, verdict=Verdict(lead, tried, lights))
 
@@ -80,7 +79,8 @@ def design_table(settings: DesignSettings, design: Design, theta: Mapping[str, f
         f"{len(design.random)} experiments of the same length and limits. "
         f"The weakest combination: {parts}. {_SAFETY}"
     )
-    rows = map(row, design.names, np.column_stack(_deviations(design)))
+    deviations = np.column_stack([design.known.deviations, design.random_deviations, design.after.deviations])
+    rows = map(row, design.names, deviations)
     title = "Predicted relative standard deviations"
     return Table.of(title, rows, note, ("random / designed", "estimate"))
 
@@ -103,25 +103,3 @@ def motion_chart(log: Log, names: tuple[str, ...], limits: Array) -> Chart:
         command = Mark("step", log.time, log.command[:, joint], color="grey", label="command")
         panels.append(Panel("time [s]", "command [%]", (command,), height=120, y_limits=(-108.0, 108.0)))
     return Chart(tuple(panels), linked=True)
-
-
-def precision_chart(design: Design) -> Chart:
-    """Draw standard deviations before, after a random (the median) and after the designed experiment."""
-    before, random, designed = (100 * values for values in _deviations(design))
-    at, limit = np.arange(len(design.names), dtype=float), np.array([100 * WEAK_ABOVE])
-    after, identifiable = "after the designed experiment", f"{100 * WEAK_ABOVE:.0f} %: identifiable below"
-    marks = (
-        Mark("bars", designed, at, random, color="pale", width=4),
-        Mark("points", before, at, color="grey", label="before", width=12, look="dash"),
-        Mark("points", random, at, label="after a random experiment (median)", width=9),
-        Mark("points", designed, at, color="orange", label=after, width=9, look="diamond"),
-        Mark("rule", limit, color="ink", label=identifiable, width=1, look="dashed"),
-    )
-    title, across = "Predicted precision of each parameter", "predicted relative standard deviation [%]"
-    height = 90 + 26 * len(at)
-    return Chart((Panel(across, "", marks, title, height, log_x=True, names=design.names),))
-
-
-def _deviations(design: Design) -> tuple[Array, Array, Array]:
-    """Return standard deviations before, after a random and after the designed experiment, each (F,)."""
-    return design.known.deviations, design.random_deviations, design.after.deviations

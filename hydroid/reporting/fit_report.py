@@ -25,7 +25,7 @@ from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.predictions import motion, prediction_section, response_data
 from hydroid.reporting.quantities_report import BEST_WITHIN, best_known, curves_csv, quantity_section
 from hydroid.reporting.suggestion_report import first_steps, suggestion_sections
-from hydroid.reporting.table import Table, numbers_csv
+from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.uncertainty_report import determined_sections, unknown_section, warnings
 from hydroid.reporting.verdict import verdict
 from hydroid.run.record import Record
@@ -45,7 +45,7 @@ def fit_page(record: Record) -> Page:
         Section("Do next", steps=_steps(record)),
         prediction_section(predictions, settings.arm),
         *quantity_section(settings, summary, [p.log for p in result.fitted]),
-        parameter_section(settings, summary, {}),
+        parameter_section(settings, summary),
         unknown_section(summary),
         *_actuators(record),
         *motion(predictions, settings.arm),
@@ -133,8 +133,8 @@ def _search(record: Record) -> Section:
         (one.name, f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}")
         for one in result.refinements
     ]
-    shown = dict.fromkeys((record.summary.final, record.summary.searched, *result.segments))
-    segments = {name: result.segments[name] for name in shown if name in result.segments}
+    first = record.summary.final, record.summary.searched
+    segments = dict(sorted(result.segments.items(), key=lambda one: (one[0] != first[0], one[0] != first[1])))
     plots = (
         Plot("learning", "Best candidate so far.", partial(learning, result.history, objective)),
         Plot(
@@ -164,14 +164,13 @@ def _facts(record: Record, logs: list[str]) -> Iterator[tuple[str, str]]:
 
 def _data(record: Record) -> dict[str, str]:
     """Return the history and the Pareto set with every bit, in the search's units: rad unless relative."""
-    result, counts = record.result, len(HISTORY) - 2
-    rows = tuple((*map(int, row[:counts]), *map(float, row[counts:])) for row in result.history)
+    result = record.result
     theta, objectives = result.front
     unit = "" if record.settings.objective.relative else "_rad"
     segments = (f"segment_{s}{unit}" for s in range(1, objectives.shape[1]))
     header = (*record.settings.parameter_set().names, *segments, f"overall{unit}")
     return {
-        "history.csv": Table("", HISTORY, rows).csv(),
+        "history.csv": numbers_csv(HISTORY, result.history),
         "pareto.csv": numbers_csv(header, np.column_stack([theta, objectives])),
         "tables/curves.csv": curves_csv(record.summary.curves),
         **response_data(record.predictions, record.settings.arm),

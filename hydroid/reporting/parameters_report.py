@@ -19,7 +19,9 @@ _STATES = {Flag.WEAK: "weak", Flag.UNIDENTIFIABLE: "unknown", Flag.NO_EFFECT: "u
 Intervals = Mapping[str, tuple[float, float]]
 
 
-def parameter_section(settings: FitSettings, summary: FitSummary, profiles: Intervals) -> Section:
+def parameter_section(
+    settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None
+) -> Section:
     """Return the section with all parameters; `profiles` are further intervals by parameter."""
     text = (
         "Bar: from the lower to the upper bound. Orange: the estimate with its 95 % interval, right only if "
@@ -48,8 +50,8 @@ def parameter_bar(
     if estimate.flag == Flag.FIXED or not low < high:
         return Bar(parameter.name, name, value, state="fixed")
 
-    def places(*values: float) -> tuple[float, ...]:
-        return tuple(float(parameter.position(np.clip(value, low, high))) for value in values)
+    def place(value: float) -> float:
+        return float(parameter.position(np.clip(value, low, high)))
 
     ends = [end for end in estimate.interval if end is not None]
     whole, prior = len(ends) == 2, parameter.prior
@@ -61,10 +63,10 @@ def parameter_bar(
         (plain(float(f"{low:.3g}")), plain(float(f"{high:.3g}"))),
         status(estimate),
         _STATES.get(Flag(estimate.flag or Flag.IDENTIFIABLE), "known"),
-        *places(estimate.value),
-        places(*ends) if whole else None,
-        None if prior is None else places(prior.value(-NORMAL), prior.value(NORMAL)),
-        places(*dots),
+        place(estimate.value),
+        (place(ends[0]), place(ends[1])) if whole else None,
+        None if prior is None else (place(prior.value(-NORMAL)), place(prior.value(NORMAL))),
+        tuple(map(place, dots)),
     )
 
 

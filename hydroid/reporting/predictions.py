@@ -1,6 +1,6 @@
 """Predictions against time: what logs commanded and measured at each joint, and what models simulate."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import degrees
@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.files import file_name
-from hydroid.fitting.validation import Prediction, pooled_indices
+from hydroid.fitting.validation import Prediction
 from hydroid.parameters import Array
-from hydroid.posterior.band import Band
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import Movement, motion_section
 from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name, unique
@@ -104,49 +103,31 @@ def motion(predictions: Sequence[Prediction], arm: Arm) -> tuple[Section, ...]:
 
 
 def error_table(predictions: Sequence[Prediction], arm: Arm) -> Table:
-    """Return the error of each fit on each log and joint, with what the fitted logs lead to expect.
-
-    Of one fit, errors over all of its own logs stand below, by estimate.
-    """
+    """Return the error of each fit on each log and joint, with what the fitted logs lead to expect."""
     names = _names(predictions)
 
-    def rows() -> Iterator[Mapping[str, Cell]]:
-        for one in predictions:
-            for joint in one.joints:
-                place = (
-                    short_name(one.fit),
-                    names[one.log.source],
-                    _KINDS[one.unseen],
-                    arm.joint_names[joint - 1],
-                )
-                yield _row(place, [one.pair(joint)], one.bands.get(joint))
-        fitted = [p for p in predictions if p.unseen is False]
-        if len({p.fit for p in fitted}) == 1 and len(fitted[0].simulated) > 1:
-            for estimate in fitted[0].simulated:
-                pairs = [p.pair(joint, estimate) for p in fitted for joint in p.joints]
-                yield _row((estimate, "all fitted", "", "all"), pairs)
+    def row(one: Prediction, joint: int) -> dict[str, Cell]:
+        errors, band = one.indices[joint], one.bands.get(joint)
+        return {
+            "fit": short_name(one.fit),
+            "log": names[one.log.source],
+            "": _KINDS[one.unseen],
+            "joint": arm.joint_names[joint - 1],
+            "mean absolute [deg]": degrees(errors.mean_absolute),
+            "rms [deg]": degrees(errors.rms),
+            "largest [deg]": degrees(errors.largest),
+            "fit [%]": errors.fit,
+            "expected [deg]": degrees(band.expected) if band else None,
+            "inside band [%]": 100 * band.inside if band else None,
+        }
 
     note = (
         "fit: 100 % for a perfect response, 0 % for the mean of the measured angle. expected: rms error that "
         "noise, parameters and left-out logs lead to expect."
     )
     optional = "mean absolute [deg]", "largest [deg]", "inside band [%]", "expected [deg]"
-    return Table.of("Errors", rows(), note, optional)
-
-
-def _row(
-    place: tuple[str, ...], pairs: Sequence[tuple[Array, Array]], band: Band | None = None
-) -> dict[str, Cell]:
-    errors = pooled_indices(pairs)
-    return {
-        **dict(zip(("fit", "log", "", "joint"), place, strict=True)),
-        "mean absolute [deg]": degrees(errors.mean_absolute),
-        "rms [deg]": degrees(errors.rms),
-        "largest [deg]": degrees(errors.largest),
-        "fit [%]": errors.fit,
-        "expected [deg]": degrees(band.expected) if band else None,
-        "inside band [%]": 100 * band.inside if band else None,
-    }
+    rows = (row(one, joint) for one in predictions for joint in one.joints)
+    return Table.of("Errors", rows, note, optional)
 
 
 def response_data(predictions: Sequence[Prediction], arm: Arm) -> dict[str, str]:

@@ -22,7 +22,7 @@ Content = Mapping[str, Any]
 
 
 def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], source: str) -> Page:
-    """Return the page of all suggestions; its tables are `missing_terms`, `next_actions` and `residuals`.
+    """Return the page of all suggestions; its tables are `missing_terms` and `next_actions`.
 
     `logs` are their names, and `source` names the estimate.
     """
@@ -61,7 +61,6 @@ def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[st
             "What the residual shows",
             points=tuple(str(finding) for finding in residual_findings(checks, places)),
             tabs=residual_tabs(checks, places),
-            more={"residuals": residual_table(content, joints, logs)},
         ),
         Section(
             "What each action would bring",
@@ -93,16 +92,6 @@ def missing_table(content: Content) -> Table:
         f"the simulated error falls by {100 * MIN_GAIN:.0f} % at least."
     )
     return Table.of("Quantities that the fit holds", map(row, content["missing"]), note, ("unit", "score"))
-
-
-def residual_table(content: Content, joints: Sequence[str], logs: Sequence[str]) -> Table:
-    """Return one row per compared angle; `joints` and `logs` are all names."""
-    rows = tuple(
-        (logs[one["log"]], joints[one["joint"] - 1], one["rms_deg"], one["correlation_s"], one["at_stop_s"])
-        for one in content["residuals"]
-    )
-    header = ("log", "joint", "rms [deg]", "correlation time [s]", "at a stop [s]")
-    return Table("Residuals", header, rows)
 
 
 def action_table(content: Content) -> Table:

@@ -16,7 +16,7 @@ from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Page, Plot, Section, Verdict, log_names
-from hydroid.reporting.parameters_report import parameter_section, parameter_table
+from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.table import Table
 from hydroid.run.record import ChannelNoise, channel_noise
 
@@ -57,11 +57,6 @@ class UncertaintyStudy:
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Of the profiled parameters."""
         return {profile.name: profile.interval for profile in self.profiles}
-
-    @property
-    def table(self) -> Table:
-        """Every parameter with its intervals by each method."""
-        return parameter_table(self.problem.settings, self.summary, self.intervals)
 
 
 def _profile_findings(profiles: Sequence[Profile]) -> Iterator[Finding]:

@@ -12,7 +12,6 @@ from hydroid.fitting.validation import fitted, pooled_indices
 from hydroid.reporting.page import log_names
 from hydroid.reporting.parameters_report import parameter_table
 from hydroid.reporting.predictions import error_table
-from hydroid.reporting.spread import spread_table
 from hydroid.reporting.table import Table
 
 
@@ -61,12 +60,11 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
 def test_errors_are_those_of_the_responses():
     problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
     fit = make_fit(problem)
-    table = error_table(fitted(problem, fit), problem.settings.arm)
-    assert column(table, "joint")[:4] == ["shoulder", "elbow", "shoulder", "elbow"]
-    everything = [row for row in table.rows if row[1] == "all fitted"]
-    assert [row[0] for row in everything] == [fit.final, *(n for n in fit.estimates if n != fit.final)]
-    for row in everything:
-        assert row[5] == pytest.approx(np.degrees(fit.estimates[row[0]].rms))
+    predictions = fitted(problem, fit)
+    table = error_table(predictions, problem.settings.arm)
+    assert column(table, "joint") == ["shoulder", "elbow", "shoulder", "elbow"]
+    rms = [np.degrees(one.indices[joint].rms) for one in predictions for joint in (2, 3)]
+    assert column(table, "rms [deg]") == pytest.approx(rms)
 
 
 def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
@@ -91,14 +89,3 @@ def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
     names = log_names([replace(log, source=source) for source in sources])
     assert len(set(names)) == len(sources)
     assert all(name.isprintable() and len(name) <= 50 for name in names)
-
-
-def test_the_spread_over_runs_is_median_quartiles_and_flags():
-    problem = make_problem(fixed={"D": 80.0})
-    theta = problem.parameters.from_unit(np.array([[1.0, 0.3, 0.0], [1.0, 0.3, 0.4], [1.0, 0.5, 0.4]]))
-    table = spread_table(problem.parameters, theta, np.array([0.0, 1.0, 2.0]), ["M1"])
-    assert column(table, "median") == pytest.approx([*np.median(theta, axis=0), 1.0])
-    assert column(table, "lowest")[:4] == list(theta.min(axis=0))
-    assert column(table, "highest")[-1] == 2.0
-    bounds = ["at upper bound in 3 of 3 runs", "fixed", "no effect", "at lower bound in 1 of 3 runs", ""]
-    assert column(table, "flag") == bounds

@@ -65,7 +65,7 @@ def report(
 
         file = str(draw(as_list(runs), out, without or (), figures=figures))
         return Result([file], {"out": file}, None)
-    from hydroid.reporting.spread import spread_page
+    from hydroid.reporting.comparison import spread_page
     from hydroid.run.collection import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))

@@ -244,7 +244,7 @@ def _several(results: list[FitResult], out: "Source | None") -> FitRuns:
     content = {"out": out and str(out), "runs": [result.plain() for result in results]}
     if out is None:
         return FitRuns(results[0].lines, content, tuple(results))
-    from hydroid.reporting.spread import spread_page
+    from hydroid.reporting.comparison import spread_page
     from hydroid.run.collection import read_runs
 
     page = spread_page(read_runs([str(result.folder) for result in results], Path(out)))

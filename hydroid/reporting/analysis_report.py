@@ -15,7 +15,7 @@ from hydroid.posterior.jacobian import NO_EFFECT_BELOW
 from hydroid.posterior.sweep import WIDE, Surface, Sweep
 from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import Chart, Color, Mark, Panel, finite, joined
-from hydroid.reporting.labels import in_reader_units, norm_label
+from hydroid.reporting.objectives import in_reader_units, norm_label
 from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
 from hydroid.reporting.table import Cell, Table, numbers_csv
 from hydroid.settings.problem import ObjectiveSettings

@@ -6,8 +6,18 @@ import numpy as np
 
 from hydroid.parameters import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite, joined, value_axis
-from hydroid.reporting.labels import in_reader_units, norm_label
 from hydroid.settings.problem import ObjectiveSettings
+
+
+def norm_label(objective: ObjectiveSettings) -> str:
+    """Name the objective, with its unit."""
+    label = {1: "mean absolute error", 2: "rms error", "inf": "largest error"}[objective.norm]
+    return f"relative {label} [-]" if objective.relative else f"{label} [deg]"
+
+
+def in_reader_units(objective: ObjectiveSettings, values: Array) -> Array:
+    """Return objectives in deg, or as they are where relative."""
+    return values if objective.relative else np.degrees(values)
 
 
 def learning(history: Array, objective: ObjectiveSettings) -> Chart:

@@ -8,7 +8,7 @@ from hydroid.estimate import FitSummary, ParameterEstimate
 from hydroid.parameters import Parameter
 from hydroid.posterior.flags import Flag, Source
 from hydroid.posterior.posterior import NORMAL
-from hydroid.reporting.labels import plain_name
+from hydroid.quantity_table import CHOICES
 from hydroid.reporting.page import Bar, Section
 from hydroid.reporting.table import Cell, Given, Table
 from hydroid.settings.fit import FitSettings
@@ -24,8 +24,8 @@ def parameter_section(
 ) -> Section:
     """Return the section with all parameters; `profiles` are further intervals by parameter."""
     text = (
-        "Bar: from the lower to the upper bound. Orange: the estimate with its 95 % interval, right only if "
-        "the model is. Grey: its prior. Blue: other estimates of the search."
+        "Bar: from bound to bound. Orange: the estimate and its 95 % interval, right only if the model is. "
+        "Grey: its prior. Blue: other estimates."
     )
     free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
     if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:
@@ -46,7 +46,7 @@ def parameter_bar(
 ) -> Bar:
     """Return the bar of one parameter between its bounds, with dots at other values."""
     low, high = parameter.lower, parameter.upper
-    name, value = plain_name(settings, parameter.name), f"{number(estimate.value)} {parameter.unit}".rstrip()
+    name, value = _plain_name(settings, parameter.name), f"{number(estimate.value)} {parameter.unit}".rstrip()
     if estimate.flag == Flag.FIXED or not low < high:
         return Bar(parameter.name, name, value, state="fixed")
 
@@ -68,6 +68,16 @@ def parameter_bar(
         None if prior is None else (place(prior.value(-NORMAL)), place(prior.value(NORMAL))),
         tuple(map(place, dots)),
     )
+
+
+def _plain_name(settings: FitSettings, parameter: str) -> str:
+    """Say in plain words what a parameter is, and where it acts if several joints are compared."""
+    own = settings.parameters[parameter]
+    plain = CHOICES[own.quantity].plain
+    if own.link is not None:
+        return f"{plain} of {own.link}"
+    joints = [] if len(settings.outputs) == 1 else own.joints or []
+    return f"{plain}, {settings.arm.joint_names[joints[0] - 1]}" if len(joints) == 1 else plain
 
 
 def status(estimate: ParameterEstimate) -> str:
@@ -109,8 +119,8 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
         }
 
     note = (
-        "from, to: 95 % interval; empty: no limit, at a bound or held. data: share of the information that "
-        "the logs gave. effect: rms change of the angles per 1 % of the parameter."
+        "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. effect: rms "
+        "change of the angles per 1 % of the parameter."
         f"{' by log: interval from the differences between logs.' if several else ''}"
     )
     by_log = ("by log from", "by log to") if several else ()

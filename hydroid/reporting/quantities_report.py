@@ -18,8 +18,8 @@ from hydroid.words import number
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as fixed"""
 _CAPTION = (
-    "Speed against command in the middle of the logged travel, and at 50 % command over the travel, with "
-    "95 % intervals. Grey: commands that the logs do not reach. Ticks: commands that they hold."
+    "Speed against command in the middle of the logged travel, and at 50 % over the travel. Grey: commands "
+    "beyond the logs. Ticks: those that they hold."
 )
 
 

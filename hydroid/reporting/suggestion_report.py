@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from hydroid.advice.missing import LEVEL, MIN_GAIN
 from hydroid.advice.proposals import Advice, action_findings, missing_findings, residual_findings
 from hydroid.findings import Finding
 from hydroid.reporting.page import Page, Section, Step, Verdict
@@ -86,11 +85,8 @@ def missing_table(content: Content) -> Table:
             "verdict": _VERDICTS[test["verdict"]],
         }
 
-    note = (
-        f"rms without any of them: {content['rms_deg']:.4g} deg. score: how clearly the residual shows the "
-        f"effect, in standard deviations. 'free it': significant among all tests ({100 * LEVEL:.0f} %), and "
-        f"the simulated error falls by {100 * MIN_GAIN:.0f} % at least."
-    )
+    rms = f"rms without any of them: {content['rms_deg']:.4g} deg."
+    note = f"{rms} score: the effect in the residual, in standard deviations."
     return Table.of("Quantities that the fit holds", map(row, content["missing"]), note, ("unit", "score"))
 
 

@@ -9,7 +9,7 @@ from hydroid.fitting.validation import Prediction
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
 from hydroid.reporting.page import Page, Section, Verdict, short_name
-from hydroid.reporting.parameters_report import parameter_bar, parameter_section, status
+from hydroid.reporting.parameters_report import parameter_section, status
 from hydroid.reporting.predictions import motion, prediction_section, response_data
 from hydroid.reporting.table import Cell, Table
 from hydroid.reporting.uncertainty_report import warnings
@@ -85,17 +85,13 @@ def side_by_side(models: Mapping[str, tuple[FitSettings, Mapping[str, float]]]) 
 
 def spread_page(runs: Runs) -> Page:
     """Return the page of several runs that differ in their seeds only; its tables are `spread` and `runs`."""
-    best = runs.best
-    near, count = sum(run.rms_deg <= 1.05 * best.rms_deg for run in runs.runs), len(runs.runs)
-    bars = tuple(
-        parameter_bar(runs.settings, p, best.summary.estimate[p.name], values.tolist())
-        for p, values in zip(runs.parameters.parameters, runs.theta.T, strict=True)
-    )
+    best, count, mapping = runs.best, len(runs.runs), runs.parameters.mapping
+    near = sum(run.rms_deg <= 1.05 * best.rms_deg for run in runs.runs)
     lead = f"The smallest error is {best.rms_deg:.4g}° rms, of seed {best.seed}."
-    agree = f"{near} of {count} runs end within 5 % of it."
-    text = "Bar: from the lower to the upper bound. Orange line: the best run. Blue dots: all runs."
+    agree = f"{near} of {count} runs end within 5 % of it. The bars are of its estimate."
+    bars = parameter_section(runs.settings, best.summary, others=[mapping(theta) for theta in runs.theta])
     sections = (
-        Section("Where the estimates lie", text, bars=bars, more={"spread": spread_table(runs)}),
+        replace(bars, more={"spread": spread_table(runs)}),
         Section("Run by run", tables={"runs": runs_table(runs)}),
     )
     return Page("runs", f"{count} runs with different seeds", lead, sections, verdict=Verdict(lead, agree))

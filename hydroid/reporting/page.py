@@ -51,7 +51,7 @@ class Bar:
         value, interval: in words, with the unit.
         ends: the bounds in words; empty where there are none.
         note: what is to be known about it.
-        state: `known`, `weak`, `unknown` or `fixed`.
+        state: `known`, `weak` or `unknown`.
         at: position of the value.
         band: ends of its 95 % interval.
         prior: ends of the interval that its prior gives.

@@ -20,9 +20,15 @@ Intervals = Mapping[str, tuple[float, float]]
 
 
 def parameter_section(
-    settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None
+    settings: FitSettings,
+    summary: FitSummary,
+    profiles: Intervals | None = None,
+    others: Sequence[Mapping[str, float]] = (),
 ) -> Section:
-    """Return the section with all parameters; `profiles` are further intervals by parameter."""
+    """Return the section with all parameters that the fit estimates as bars, and with all in its table.
+
+    `profiles` are further intervals by parameter, `others` further estimates; without these the fit's own.
+    """
     text = (
         "Bar: from bound to bound. Orange: the estimate and its 95 % interval, right only if the model is. "
         "Grey: its prior. Blue: other estimates."
@@ -31,40 +37,37 @@ def parameter_section(
     if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:
         supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
         text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar. {text}"
-    others = [e.values for n, e in summary.estimates.items() if n != summary.final and e.rms_deg is not None]
+    estimates = summary.estimates.items()
+    dots = others or [e.values for n, e in estimates if n != summary.final and e.rms_deg is not None]
     bars = tuple(
-        parameter_bar(settings, p, summary.estimate[p.name], [values[p.name] for values in others])
+        _bar(settings, p, summary.estimate[p.name], [values[p.name] for values in dots])
         for p in settings.parameter_set().parameters
+        if p.lower < p.upper and summary.estimate[p.name].flag != Flag.FIXED
     )
-    return Section(
-        "Parameters", text, bars=bars, more={"parameters": parameter_table(settings, summary, profiles)}
-    )
+    tables = {"parameters": parameter_table(settings, summary, profiles)}
+    return Section("Parameters", text, bars=bars, more=tables)
 
 
-def parameter_bar(
-    settings: FitSettings, parameter: Parameter, estimate: ParameterEstimate, dots: Sequence[float] = ()
+def _bar(
+    settings: FitSettings, parameter: Parameter, estimate: ParameterEstimate, dots: Sequence[float]
 ) -> Bar:
-    """Return the bar of one parameter between its bounds, with dots at other values."""
-    low, high = parameter.lower, parameter.upper
-    name, value = _plain_name(settings, parameter.name), f"{number(estimate.value)} {parameter.unit}".rstrip()
-    if estimate.flag == Flag.FIXED or not low < high:
-        return Bar(parameter.name, name, value, state="fixed")
+    low, high, prior = parameter.lower, parameter.upper, parameter.prior
 
     def place(value: float) -> float:
         return float(parameter.position(np.clip(value, low, high)))
 
     ends = [end for end in estimate.interval if end is not None]
-    whole, prior = len(ends) == 2, parameter.prior
+    known = len(ends) == 2
     return Bar(
         parameter.name,
-        name,
-        value,
-        " to ".join(map(number, ends)) if whole else "",
+        _plain_name(settings, parameter.name),
+        f"{number(estimate.value)} {parameter.unit}".rstrip(),
+        " to ".join(map(number, ends)) if known else "",
         (plain(float(f"{low:.3g}")), plain(float(f"{high:.3g}"))),
         status(estimate),
         _STATES.get(Flag(estimate.flag or Flag.IDENTIFIABLE), "known"),
         place(estimate.value),
-        (place(ends[0]), place(ends[1])) if whole else None,
+        (place(ends[0]), place(ends[1])) if known else None,
         None if prior is None else (place(prior.value(-NORMAL)), place(prior.value(NORMAL))),
         tuple(map(place, dots)),
     )

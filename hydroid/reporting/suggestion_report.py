@@ -103,5 +103,4 @@ def action_table(content: Content) -> Table:
         "quantity to ± [%]": "quantity_after_percent",
     }
     rows = ({name: action[key] for name, key in columns.items()} for action in content["actions"])
-    note = "Relative standard deviations, with ±100 % on each parameter before any log."
-    return Table.of("Predicted effect of each action", rows, note)
+    return Table.of("Predicted effect of each action on standard deviations", rows)

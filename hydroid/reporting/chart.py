@@ -4,10 +4,10 @@ Colours are named after Okabe and Ito's, which colour-blind readers tell apart; 
 own shade of them.
 """
 
-import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -17,9 +17,7 @@ Color = str
 """ink, grey, pale or one of SERIES"""
 SERIES: tuple[Color, ...] = ("orange", "blue", "green", "pink", "yellow", "sky")
 """colours of several models, the first of the most important"""
-_NONE = np.empty(0)
-_DIGITS = 5
-"""significant digits that the page gets"""
+_none = partial(np.empty, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +39,9 @@ class Mark:
     """
 
     kind: Literal["line", "step", "points", "band", "bars", "spans", "rule", "area", "text"]
-    x: Array = field(default_factory=lambda: _NONE)
-    y: Array = field(default_factory=lambda: _NONE)
-    end: Array = field(default_factory=lambda: _NONE)
+    x: Array = field(default_factory=_none)
+    y: Array = field(default_factory=_none)
+    end: Array = field(default_factory=_none)
     color: Color = "blue"
     label: str = ""
     width: float = 1.6
@@ -60,12 +58,12 @@ class Mark:
         size = -(-len(self.y) // bins)
         if self.kind not in ("line", "step", "band") or size <= 2 or not np.all(np.diff(self.x) > 0):
             return self
-        last = len(self.y) - 1
-        keep = [np.array([0, last])]
-        for values in (self.y, -self.y, *((self.end, -self.end) if len(self.end) else ())):
-            parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
-            lowest = np.argmin(np.where(np.isfinite(parts), parts, np.inf), axis=1)
-            keep.append(lowest + size * np.arange(len(parts)))
+        last, keep = len(self.y) - 1, [np.array([0, len(self.y) - 1])]
+        for values in (self.y, -self.y, self.end, -self.end):
+            if len(values):
+                parts = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+                lowest = np.where(np.isfinite(parts), parts, np.inf).argmin(axis=1)
+                keep.append(lowest + size * np.arange(len(parts)))
         at = np.unique(np.minimum(np.concatenate(keep), last))
         return replace(self, x=self.x[at], y=self.y[at], end=self.end[at] if len(self.end) else self.end)
 
@@ -120,16 +118,21 @@ class Chart:
         labels = [{m.label for m in p.marks if m.label} for p in self.panels]
         return not self.linked and any(a - b and b - a for a in labels for b in labels)
 
-    def plain(self) -> dict[str, Any]:
-        """Return the chart as JSON has it."""
-        return _plain(self, self.bins) | {"apart": self.apart}
+    def thinned(self) -> "Chart":
+        """Return the chart with what is drawn of its curves."""
+        panels = (replace(p, marks=tuple(m.thinned(self.bins) for m in p.marks)) for p in self.panels)
+        return replace(self, panels=tuple(panels))
+
+
+ZERO = Mark("rule", y=np.zeros(1), color="grey", width=1)
 
 
 def joined(curves: Iterable[Array]) -> tuple[Array, Array]:
     """Return x and y of several curves, each of shape (n, 2), as one with a gap between them."""
     gap = np.full((1, 2), np.nan)
-    parts = [part for curve in curves for part in (gap, curve)][1:]
-    return tuple(np.concatenate(parts).T) if parts else (_NONE, _NONE)
+    parts = [part for curve in curves for part in (gap, curve)]
+    x, y = np.concatenate([np.empty((0, 2)), *parts[1:]]).T
+    return x, y
 
 
 def finite(values: Array) -> Array:
@@ -144,17 +147,3 @@ def value_axis(values: Array) -> tuple[tuple[float, float] | None, bool]:
         return None, bool(known.size)
     top = 1.05 * float(known.max()) if known.max() > 0 else 1.0
     return (min(0.0, 1.05 * float(known.min())), top), False
-
-
-def _plain(one: Any, bins: int) -> Any:
-    match one:
-        case Mark():
-            one = one.thinned(bins)
-        case np.ndarray():
-            return [float(f"{v:.{_DIGITS}g}") if math.isfinite(v) else None for v in one.tolist()]
-        case tuple():
-            return [_plain(part, bins) for part in one]
-        case _:
-            if not isinstance(one, Chart | Panel):
-                return one
-    return {part.name: _plain(getattr(one, part.name), bins) for part in fields(one)}

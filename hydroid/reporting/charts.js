@@ -209,10 +209,10 @@
   }
 
   const idle = () => new Promise((done) => setTimeout(done, 0));
-  let charts = [];
+  let drawings = {};
   async function drawVisible(again = false) {
-    for (const host of document.querySelectorAll(".chart[data-chart]"))
-      if (host.offsetParent !== null && (again || !drawn.has(host))) { await draw(host, charts[host.dataset.chart]); await idle(); }
+    for (const host of document.querySelectorAll(".chart"))
+      if (host.offsetParent !== null && (again || !drawn.has(host))) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
   }
 
   function tabs(list) {
@@ -240,10 +240,9 @@
 
   async function start() {
     document.querySelectorAll("[role=tablist]").forEach(tabs);
-    const content = JSON.parse(await unpack("content"));
-    for (const host of document.querySelectorAll("[data-moving]")) moveArm(host, content.moving[host.dataset.moving]);
-    charts = content.charts;
-    if (charts.length) {
+    drawings = JSON.parse(await unpack("content"));
+    for (const host of document.querySelectorAll(".moving")) moveArm(host, drawings[host.dataset.drawing]);
+    if (document.querySelector(".chart")) {
       const library = await unpack("library");
       const script = document.createElement("script");
       script.textContent = library;

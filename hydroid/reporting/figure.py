@@ -5,7 +5,7 @@ The panel of a film is such a chart too.
 
 import io
 import warnings
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from itertools import zip_longest
 from typing import Any
@@ -17,12 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.table import plain
+from hydroid.words import plain
 
-WIDTH, COLUMN = 6.4, 3.6
-"""of a figure with one column, and of one of several columns [in]"""
-PIXELS = 80
-"""of a panel's height in an inch"""
 SHADES = {
     "ink": "#222222",
     "grey": "#8C8C8C",
@@ -34,8 +30,13 @@ SHADES = {
     "yellow": "#E69F00",
     "sky": "#56B4E9",
 }
-_DASHES: dict[str, Any] = {"": "-", "solid": "-", "dashed": (0, (5, 3)), "dotted": ":"}
-_MARKERS = {"": "o", "circle": "o", "diamond": "D", "square": "s", "dash": "|"}
+_LOOKS: dict[str, Any] = {
+    "dashed": (0, (5, 3)),
+    "dotted": ":",
+    "diamond": "D",
+    "square": "s",
+    "dash": "|",
+}
 _STYLE: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same glyphs on every machine
     "axes.titlesize": 10.0,
@@ -79,17 +80,17 @@ def rendered(chart: Chart, title: str = "") -> tuple[bytes, bytes]:
 def figure(chart: Chart, title: str = "") -> Figure:
     """Draw a chart without what is off; within `style`."""
     rows = -(-len(chart.panels) // chart.columns)
-    heights = [p.height / PIXELS for p in chart.panels[:: chart.columns]]
-    width = WIDTH if chart.columns == 1 else COLUMN * chart.columns
+    heights = [p.height / 80 for p in chart.panels[:: chart.columns]]  # [in], of 80 px
+    width = 6.4 if chart.columns == 1 else 3.6 * chart.columns
     drawing = Figure((width, sum(heights) + 0.6 * rows + 0.5), layout="constrained")
     drawing.suptitle(title, x=0.02, ha="left", fontsize=11, fontweight="bold")
     shared = "col" if chart.linked else "none"
     axes = drawing.subplots(rows, chart.columns, squeeze=False, sharex=shared, height_ratios=heights).ravel()
-    for one, panel in zip_longest(axes, chart.panels):
+    for one, panel in zip_longest(axes, chart.thinned().panels):
         if panel is None:
             one.set_axis_off()
         else:
-            _panel(one, panel, chart.bins)
+            _panel(one, panel)
             if chart.apart and one.get_legend_handles_labels()[0]:
                 one.legend(fontsize=8, frameon=True, framealpha=0.8, edgecolor="none")
     labels = {h.get_label(): h for one in axes for h in one.get_legend_handles_labels()[0]}
@@ -99,14 +100,14 @@ def figure(chart: Chart, title: str = "") -> Figure:
     return drawing
 
 
-def _panel(axes: Axes, panel: Panel, bins: int) -> None:
+def _panel(axes: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         if not mark.off:
-            _draw(axes, mark.thinned(bins))
+            _draw(axes, mark)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
-    for log, axis in ((panel.log_x, axes.xaxis), (panel.log_y, axes.yaxis)):
+    for name, log, axis in (("x", panel.log_x, axes.xaxis), ("y", panel.log_y, axes.yaxis)):
         if log:
-            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+            axes.set(**{f"{name}scale": "log"})
             axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_minor_locator(NullLocator())
             axis.set_major_formatter(FuncFormatter(lambda value, _: plain(float(f"{value:.4g}"))))
@@ -124,37 +125,32 @@ def _panel(axes: Axes, panel: Panel, bins: int) -> None:
 def _draw(axes: Axes, mark: Mark) -> None:
     x, y, end = mark.x, mark.y, mark.end
     look: dict[str, Any] = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
-    line: dict[str, Any] = look | {"lw": mark.width}
-    if mark.kind in ("line", "step", "rule"):
-        line["linestyle"] = _DASHES[mark.look]
+    line = look | {"lw": mark.width, "linestyle": _LOOKS.get(mark.look, "-")}
     match mark.kind:
         case "line":
             axes.plot(x, y, **line)
         case "step":
             axes.step(x, y, where="post", **line)
         case "points":
-            axes.plot(x, y, _MARKERS[mark.look], ms=mark.width, zorder=3, **look)
+            axes.plot(x, y, _LOOKS.get(mark.look, "o"), ms=mark.width, zorder=3, **look)
         case "band":
             axes.fill_between(x, y, end, lw=0, **look)
         case "bars":
             axes.hlines(y, x, end, **line)
         case "spans":
-            _each(axes.axvspan, [*zip(x, end, strict=True)], look | {"lw": 0, "zorder": 0})
+            ends = np.column_stack([x, end, np.full(len(x), np.nan)]).ravel()
+            axes.fill_between(ends, 0, 1, transform=axes.get_xaxis_transform(), lw=0, zorder=0, **look)
         case "rule":
-            _each(axes.axhline if len(y) else axes.axvline, [(v,) for v in (y if len(y) else x)], line)
+            at, ends = np.repeat(np.append(y, x), 3), np.tile([0, 1, np.nan], len(x) + len(y))
+            if len(y):
+                axes.plot(ends, at, transform=axes.get_yaxis_transform(), **line)
+            else:
+                axes.plot(at, ends, transform=axes.get_xaxis_transform(), **line)
         case "area":
-            corners = np.column_stack([x, y])
-            parts = np.split(corners, np.flatnonzero(np.isnan(x)))
-            _each(axes.fill, [tuple(part[~np.isnan(part[:, 0])].T) for part in parts], look)
+            axes.fill(x, y, **look)
         case "text":
             for text, *at in zip(mark.texts, x, y, strict=True):
                 drawn = axes.annotate(
                     text, (at[0], at[1]), (3, 3), textcoords="offset points", rotation=30, fontsize=7
                 )
                 drawn.set_in_layout(False)
-
-
-def _each(draw: Any, places: Sequence[tuple[Any, ...]], look: dict[str, Any]) -> None:
-    """Draw at several places, of which one is in the legend."""
-    for i, place in enumerate(places):
-        draw(*place, **look | {"label": look["label"] if i == 0 else None})

@@ -6,7 +6,7 @@ function moveArm(host, arm) {
   const slider = host.querySelector("input"), words = host.querySelector("output");
   picture.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const polygons = ["measured", "simulated"].flatMap((name) => arm.shapes.map((shape) => {
-    const poses = arm.poses[name][shape.part];
+    const poses = arm.poses[name][shape.body];
     if (name === "measured" && poses.length === 1) return null; // what stands still is drawn once
     const polygon = document.createElementNS("http://www.w3.org/2000/svg", "polygon");
     polygon.setAttribute("class", poses.length === 1 ? "still" : name);
@@ -42,7 +42,7 @@ function moveArm(host, arm) {
       polygon.setAttribute("points", outline(places).map((p) => p.map((v) => v.toFixed(1)).join()).join(" "));
     }
     slider.value = time;
-    const errors = arm.errors.map(([name, e]) => `${name} ${between(e[k], e[k + 1]).toFixed(2).replace("-", "−")}°`);
+    const errors = Object.entries(arm.errors).map(([name, e]) => `${name} ${between(e[k], e[k + 1]).toFixed(2).replace("-", "−")}°`);
     words.textContent = `${time.toFixed(1)} s. Measured minus simulated: ${errors.join(", ")}`;
   }
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from hydroid.log import Log
 from hydroid.reporting.table import Table
@@ -12,24 +12,16 @@ from hydroid.reporting.table import Table
 _LONGEST_NAME = 40
 
 
-class Drawing(Protocol):
-    """A `Chart` or a `MovingArm`."""
-
-    def plain(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
-        ...
-
-
 @dataclass(frozen=True)
 class Plot:
-    """A figure: the name of its files, what it shows in words, and the function that draws it.
+    """A figure: its name on the page, what it shows in words, and the function that makes it.
 
-    The page draws it, a chart with buttons to zoom it if `zoom`; `write_figures` makes files of charts.
+    That returns a `Chart`, which the page shows with buttons to zoom it if `zoom`, or a `MovingArm`.
     """
 
     name: str
     caption: str
-    draw: Callable[[], Drawing]
+    draw: Callable[[], Any]
     zoom: bool = False
 
 

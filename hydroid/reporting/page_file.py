@@ -6,23 +6,18 @@ The page is one HTML file: it carries its charts as data, with the script of Bok
 import base64
 import gzip
 import json
-from collections.abc import Mapping
-from dataclasses import asdict
+import math
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hydroid.files import write_atomic
 from hydroid.reporting.chart import Chart
-from hydroid.reporting.page import Page, Plot, Section
-from hydroid.reporting.table import Table, shown
-
-_TEMPLATE, _OWN = "template.html.j2", ("page.css", "moving_arm.js", "charts.js")
-_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
+from hydroid.reporting.page import Page
 
 
 def write_page(page: Page, out: Path) -> list[Path]:
@@ -35,7 +30,7 @@ def write_page(page: Page, out: Path) -> list[Path]:
     for name, table in page.tables.items():
         written = {"csv": table.csv(), "md": table.markdown(), "tex": table.latex()}
         content |= {f"tables/{name}.{ending}": text for ending, text in written.items()}
-    content |= {**page.data, f"{page.name}.html": content_html(page_content(page))}
+    content |= {**page.data, f"{page.name}.html": _html(page)}
     for name, text in content.items():
         write_atomic(out / name, text)
     return [out / name for name in content]
@@ -58,71 +53,36 @@ def write_figures(page: Page, out: Path) -> list[Path]:
     return written
 
 
-def page_content(page: Page) -> dict[str, Any]:
-    """Return all that a page shows as mappings, lists, text and numbers."""
-    charts, moving = list[Any](), list[Any]()
-
-    def plot(one: Plot) -> dict[str, Any]:
-        drawing = one.draw()
-        kind, drawn = ("chart", charts) if isinstance(drawing, Chart) else ("moving", moving)
-        drawn.append(drawing.plain())
-        return {"name": one.name, "caption": one.caption, "zoom": one.zoom, kind: len(drawn) - 1}
-
-    def section(one: Section) -> dict[str, Any]:
-        return {
-            "title": one.title,
-            "text": one.text,
-            "points": list(one.points),
-            "facts": [list(fact) for fact in one.facts],
-            "tables": [_table(table) for table in one.tables.values()],
-            "more": [_table(table) for table in one.more.values()],
-            "plots": [plot(p) for p in one.plots],
-            "tabs": [{"name": t.name, "note": t.note, "plots": [plot(p) for p in t.plots]} for t in one.tabs],
-            "bars": [asdict(bar) for bar in one.bars],
-            "steps": [asdict(step) for step in one.steps],
-            "folded": one.folded,
-            "link": one.link,
-        }
-
-    sections = [section(one) for one in page.sections]
-    return {
-        "name": page.name,
-        "title": page.title,
-        "lead": page.lead,
-        "verdict": None if page.verdict is None else asdict(page.verdict),
-        "warnings": list(page.warnings),
-        "sections": sections,
-        "charts": charts,
-        "moving": moving,
-        "versions": dict(page.versions),
-    }
+def plain(drawn: Any) -> Any:
+    """Return what JSON has of a drawing or a part of it: numbers have five digits; null is not finite."""
+    match drawn:
+        case Chart():
+            return vars(drawn.thinned()) | {"apart": drawn.apart}
+        case np.ndarray() if drawn.ndim == 1:
+            return [float(f"{v:.5g}") if math.isfinite(v) else None for v in drawn.tolist()]
+        case np.ndarray():
+            return list(drawn)
+        case _:
+            return vars(drawn)
 
 
-def _table(table: Table) -> dict[str, Any]:
-    rows = [[shown(cell) for cell in row] for row in table.rows]
-    parts = {"title": table.title, "header": list(table.header), "note": table.note}
-    return parts | {"numeric": list(table.numeric), "rows": rows}
-
-
-def content_html(content: Mapping[str, Any]) -> str:
-    """Return the page of a content as HTML."""
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    own = files("hydroid.reporting")
-    given = {name.replace(".", "_"): Markup(own.joinpath(name).read_text(encoding="utf-8")) for name in _OWN}
-    template = environment.from_string(own.joinpath(_TEMPLATE).read_text(encoding="utf-8"))
-    packed = _packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")))
-    return template.render(
-        page=content, content=packed, library=_library() if content["charts"] else "", **given
-    )
+def _html(page: Page) -> str:
+    loader = PackageLoader("hydroid", "reporting")
+    how = {"undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(loader=loader, autoescape=True, **how)
+    drawings = {plot.name: plot.draw() for plot in page.plots}
+    charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
+    content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))
+    template = environment.get_template("template.html.j2")
+    return template.render(page=page, charts=charts, content=content, library=_library() if charts else "")
 
 
 @cache
 def _library() -> str:
     """Bokeh's scripts, from the installed package."""
     folder = files("bokeh").joinpath("server", "static", "js")
-    return _packed(";\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in _SCRIPTS))
+    scripts = (folder.joinpath(name).read_text("utf-8") for name in ("bokeh.min.js", "bokeh-api.min.js"))
+    return _packed(";\n".join(scripts))
 
 
 def _packed(text: str) -> str:

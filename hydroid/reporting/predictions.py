@@ -12,7 +12,7 @@ from hydroid.files import file_name
 from hydroid.fitting.validation import Prediction
 from hydroid.parameters import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
-from hydroid.reporting.moving_arm import Movement, motion_section
+from hydroid.reporting.moving_arm import motion_section
 from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name, unique
 from hydroid.reporting.table import Cell, Table, numbers_csv
 from hydroid.settings.arm import Arm
@@ -99,7 +99,7 @@ def motion(predictions: Sequence[Prediction], arm: Arm) -> tuple[Section, ...]:
     names, first = _names(predictions), dict[str, Prediction]()
     for one in sorted(predictions, key=lambda p: p.unseen is not True):
         first.setdefault(names[one.log.source], one)
-    return motion_section(arm, [Movement.of(n, p.log, p.joints, p.response) for n, p in first.items()])
+    return motion_section(arm, first)
 
 
 def error_table(predictions: Sequence[Prediction], arm: Arm) -> Table:

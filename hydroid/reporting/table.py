@@ -58,28 +58,21 @@ class Table:
     def csv(self) -> str:
         """Return header and rows with every bit of the numbers, without title and note."""
         buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(self.header)
-        # a Given is a float: its repr would be its class's
-        writer.writerows(
-            [repr(float(cell)) if isinstance(cell, float) else cell for cell in row] for row in self.rows
-        )
+        csv.writer(buffer, lineterminator="\n").writerows([self.header, *self.rows])
         return buffer.getvalue()
 
     def markdown(self) -> str:
         """Return title, pipe table and note; numbers are right-aligned."""
-        lines = [map(_markdown, self.header), ("---:" if right else "---" for right in self.numeric)]
-        lines += [[_markdown(shown(cell)) for cell in row] for row in self.rows]
-        body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
         note = f"\n\n{_markdown(self.note)}" if self.note else ""
+        rules = ["---:" if right else "---" for right in self.numeric]
+        lines = [map(_markdown, self.header), rules, *(map(_markdown, row) for row in self.shown)]
+        body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
         return f"**{_markdown(self.title)}**\n\n{body}{note}\n"
 
     def latex(self) -> str:
         """Return a `table` environment that needs no package."""
         columns = "".join("r" if right else "l" for right in self.numeric)
-        head, *rows = (
-            " & ".join(_latex(shown(cell)) for cell in row) + r" \\" for row in (self.header, *self.rows)
-        )
+        head, *rows = (" & ".join(map(_latex, row)) + r" \\" for row in (self.header, *self.shown))
         lines = [
             *(r"\begin{table}", r"\centering", rf"\caption{{{_latex(self.title)}}}"),
             *(rf"\begin{{tabular}}{{{columns}}}", r"\hline", head, r"\hline", *rows, r"\hline"),
@@ -97,89 +90,74 @@ class Table:
         """
         from rich.console import Console
 
-        console = Console()
+        console, endless = Console(), Console(width=_UNLIMITED)
         limited = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
         width = console.width if limited else _UNLIMITED
-        left_out = 0
-        while left_out < len(self.optional) and self._least_width(left_out) > width:
-            left_out += 1
+        table = self._rich(())
+        size = table.__rich_measure__(endless, endless.options)
+        for left_out in range(len(self.optional) + 1):
+            if size.maximum > width:
+                table = self._rich(self.optional[:left_out], tight=True)
+                size = table.__rich_measure__(endless, endless.options)
+            if size.minimum <= width:
+                break
         # width and height, or rich may take 80 columns for granted
-        console = Console(width=max(width, self._least_width(left_out)), height=1)
-        console.print(self._rich(left_out, console.width))
+        Console(width=max(width, size.minimum), height=1).print(table)
 
     def records(self) -> list[dict[str, str | int | float | None]]:
         """Return rows by column name for JSON, which has no NaN or infinity: these become None."""
-        return [
-            {
-                name: None if isinstance(c, float) and not math.isfinite(c) else c
-                for name, c in zip(self.header, row, strict=True)
-            }
-            for row in self.rows
-        ]
+        cells = ([None if isinstance(c, float) and not math.isfinite(c) else c for c in r] for r in self.rows)
+        return [dict(zip(self.header, row, strict=True)) for row in cells]
+
+    @property
+    def shown(self) -> list[list[str]]:
+        """The text of each cell for a reader."""
+        return [[shown(cell) for cell in row] for row in self.rows]
 
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Columns that hold numbers only."""
-        columns = zip(*self.rows, strict=True) if self.rows else ((None,) for _ in self.header)
-        return tuple(
-            any(isinstance(c, int | float) for c in column) and not any(isinstance(c, str) for c in column)
-            for column in columns
-        )
+        columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
+        kinds = ({type(cell) for cell in column if cell is not None} for column in columns)
+        return tuple(bool(kind) and str not in kind for kind in kinds)
 
-    def _rich(self, left_out: int, width: int) -> "rich.table.Table":
-        """Return the table for a terminal without the first columns of `optional`."""
+    def _rich(self, left_out: Sequence[str], *, tight: bool = False) -> "rich.table.Table":
+        """Return the table for a terminal; headers of numbers are broken into words where it is tight."""
         from rich import box
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        missing = self.optional[:left_out]
-        note = f"{self.note} Left out for width: {', '.join(missing)}." if missing else self.note
+        note = f"{self.note} Left out for width: {', '.join(left_out)}." if left_out else self.note
         # Text, not str: rich would read [deg] as markup
         table = RichTable(title=Text(self.title), caption=Text(note) if note else None, box=box.SIMPLE_HEAD)
         table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
         table.title_justify = table.caption_justify = "left"
-        kept = [i for i, name in enumerate(self.header) if name not in missing]
-        tight = sum(self._width(i, wrap=False) for i in kept) + 2 * len(kept) > width
+        kept = [i for i, name in enumerate(self.header) if name not in left_out]
         for i in kept:
             name, right = self.header[i], self.numeric[i]
-            header = Text(name.replace(" ", "\n") if right and tight else name)
-            # rich wraps words where room is short, but never numbers
-            least = max(
-                self._width(i, wrap=True), 0 if right else min(self._width(i, wrap=False), _TEXT_WIDTH)
-            )
+            widest = max(map(len, (name, *(row[i] for row in self.shown))))
             table.add_column(
-                header, justify="right" if right else "left", no_wrap=right, min_width=least, overflow="fold"
+                Text(name.replace(" ", "\n") if right and tight else name),
+                justify="right" if right else "left",
+                no_wrap=right,  # rich wraps words where room is short, but never numbers
+                min_width=None if right else min(widest, _TEXT_WIDTH),
+                overflow="fold",
             )
-        for row in self.rows:
-            table.add_row(*(Text(shown(row[i])) for i in kept))
+        for row in self.shown:
+            table.add_row(*(Text(row[i]) for i in kept))
         return table
-
-    def _least_width(self, left_out: int) -> int:
-        """Return the width at which words and numbers are whole and text does not stand word by word."""
-        kept = [i for i, name in enumerate(self.header) if name not in self.optional[:left_out]]
-        room = (0 if self.numeric[i] else min(self._width(i, wrap=False), _TEXT_WIDTH) for i in kept)
-        return sum(max(self._width(i, wrap=True), r) + 2 for i, r in zip(kept, room, strict=True))
-
-    def _width(self, i: int, *, wrap: bool) -> int:
-        """Return the width of a column, with text and header on one line or wrapped at words."""
-        words = (self.header[i], *(shown(row[i]) for row in self.rows if not self.numeric[i]))
-        numbers = (shown(row[i]) for row in self.rows if self.numeric[i])
-        texts = [word for text in words for word in text.split()] if wrap else words
-        return max(map(len, (*texts, *numbers)), default=0)
 
 
 def numbers_csv(header: Sequence[str], rows: Array) -> str:
     """Return an array of shape (n, m) as CSV with every bit of the numbers."""
-    return Table("", tuple(header), tuple(tuple(map(float, row)) for row in rows)).csv()
+    return Table("", tuple(header), tuple(map(tuple, rows.tolist()))).csv()
 
 
 def shown(cell: Cell) -> str:
     """Return the text of a cell for a reader."""
-    if cell is None:
-        return ""
-    if isinstance(cell, Given):
-        return plain(cell)
-    return number(cell) if isinstance(cell, float) else str(cell)
+    if isinstance(cell, float):
+        return plain(cell) if isinstance(cell, Given) else number(cell)
+    return "" if cell is None else str(cell)
 
 
 _MARKDOWN = {ord(c): f"\\{c}" for c in r"\`*_<>|&$~"} | {ord(c): " " for c in "\r\n"}

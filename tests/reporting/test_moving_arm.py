@@ -8,8 +8,10 @@ import pytest
 from report_fits import make_problem
 
 from hydroid.arm.model import load_model
-from hydroid.reporting.moving_arm import MOST, Movement, MovingArm, motion_section, moving_arm, side_view
-from hydroid.reporting.outlines import shapes
+from hydroid.fitting.validation import Prediction
+from hydroid.log import Log
+from hydroid.reporting.moving_arm import MOST, VIEW, MovingArm, motion_section, moving_arm
+from hydroid.reporting.outlines import placed, shapes, sight
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 ARM = PROBLEM.settings.arm
@@ -22,16 +24,19 @@ def model() -> mujoco.MjModel:
     return load_model(ARM).compile()
 
 
+def predicted(response: np.ndarray, joints: tuple[int, ...] = (2, 3), log: Log = LOG) -> Prediction:
+    return Prediction("fit", log, joints, {"refined": response})
+
+
 def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:
-    movement = Movement.of("a.csv", LOG, (2, 3), LOG.angle[:, [1, 2]] - error)
-    return moving_arm(model, ARM.joint_names, movement, most)
+    return moving_arm(model, ARM.joint_names, predicted(LOG.angle[:, [1, 2]] - error), most)
 
 
 def test_a_part_for_each_joint_that_moves_and_one_that_stands(model):
     arm = moved(model)
     assert len(arm.poses["measured"]) == 3
     assert [len(part) for part in arm.poses["measured"]] == [1, len(arm.time), len(arm.time)]
-    assert {part for part, _ in arm.shapes} == {0, 1, 2}
+    assert {shape.body for shape in arm.shapes} == {0, 1, 2}
 
 
 def test_the_same_angles_are_the_same_picture(model):
@@ -54,7 +59,7 @@ def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
         own = (data.xpos[tip] - data.xpos[root]) @ data.xmat[root].reshape(3, 3)
         drawn.append(poses[moment, :, :3] @ own + poses[moment, :, 3])
     scale = np.linalg.norm(poses[0, 0, :3])
-    right, up, _ = scale * side_view() @ (world[1] - world[0])
+    right, up, _ = scale * sight(*VIEW) @ (world[1] - world[0])
     assert drawn[1] - drawn[0] == pytest.approx([right, -up], abs=1e-6 * scale)
     assert np.linalg.norm(drawn[1] - drawn[0]) > 10
 
@@ -62,20 +67,17 @@ def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
 def test_the_arm_stays_in_its_picture(model):
     arm = moved(model)
     for name, poses in arm.poses.items():
-        for part, corners in arm.shapes:
-            turned = poses[part].reshape(-1, 2, 4)
-            at = turned[..., :3] @ corners.T + turned[..., 3:]
+        for shape in arm.shapes:
+            at = placed(shape.corners, poses[shape.body].reshape(-1, 2, 4))
             assert at.min() >= 0, name
-            assert at[:, 0].max() <= arm.size[0]
-            assert at[:, 1].max() <= arm.size[1]
+            assert (at <= arm.size).all()
 
 
 def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     arm = moved(model, most=20)
     assert len(arm.time) == 20
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
-    worst = arm.plain()["start"]
-    assert abs(arm.errors["shoulder"][worst]) == np.abs(arm.errors["shoulder"]).max()
+    assert abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()
 
 
 def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
@@ -85,14 +87,14 @@ def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
     bare = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boom}</worldbody></mujoco>")
     lengths = [np.linalg.norm(np.diff(line, axis=0)) for line in [shape.corners for shape in shapes(bare)]]
     assert lengths == pytest.approx([2.0, 0.5])
-    movement = Movement.of("a.csv", LOG, (1, 2), LOG.angle[:, :2])
-    two = replace(movement, measured=LOG.angle[:, 1:3], simulated=LOG.angle[:, 1:3])
-    assert [len(points) for _, points in moving_arm(bare, ["boom", "stick"], two).shapes] == [2, 2]
+    two = replace(LOG, angle=LOG.angle[:, 1:3], command=LOG.command[:, 1:3])
+    moving = moving_arm(bare, ["boom", "stick"], predicted(two.angle, (1, 2), two))
+    assert [len(shape.corners) for shape in moving.shapes] == [2, 2]
 
 
 def test_a_log_that_diverged_is_not_shown():
-    good = Movement.of("a.csv", LOG, (2, 3), LOG.angle[:, [1, 2]])
-    lost = replace(good, log="b.csv", simulated=good.simulated * np.nan)
-    (section,) = motion_section(ARM, [good, lost])
+    good = predicted(LOG.angle[:, [1, 2]])
+    lost = predicted(good.response * np.nan)
+    (section,) = motion_section(ARM, {"a.csv": good, "b.csv": lost})
     assert [tab.name for tab in section.tabs] == ["a.csv"]
-    assert motion_section(ARM, [lost]) == ()
+    assert motion_section(ARM, {"b.csv": lost}) == ()

@@ -18,6 +18,7 @@ from hydroid.reporting.analysis_report import landscape
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, rendered, style
 from hydroid.reporting.objectives import learning, pareto
+from hydroid.reporting.page_file import plain
 from hydroid.reporting.predictions import JointResponse, draw, joint_responses
 from hydroid.reporting.uncertainty_report import UncertaintyStudy, draw_profiles
 from hydroid.settings.problem import ObjectiveSettings
@@ -52,7 +53,7 @@ def draw_all(problem, fit) -> list[Chart]:
 
 
 def check(chart: Chart) -> None:
-    json.dumps(chart.plain(), allow_nan=False)
+    json.dumps(chart, default=plain, allow_nan=False)
     drawn = figure(chart)
     drawn.draw_without_rendering()
     for axes in drawn.axes:

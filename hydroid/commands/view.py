@@ -1,7 +1,6 @@
 """`hydroid view`: the arm in motion, in a window or a film; its collisions; the curves of its actuators."""
 
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -171,17 +170,10 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | 
 
 def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Result[None]:
     require_hydraulics(model)
-    from hydroid.posterior.posterior import stored_posterior
-    from hydroid.problem.bindings import Bindings
-    from hydroid.reporting.actuator_report import KnownActuator, actuator_page, joint_actuator, joint_records
+    from hydroid.reporting.actuator_report import actuator_page, joint_actuator
     from hydroid.reporting.page_file import write_figures, write_page
 
-    bindings, arm = Bindings(model.settings), model.settings.arm
-    actuator = joint_actuator(arm, bindings.candidates(model.theta[None]), joint, model.source)
-    if (posterior := stored_posterior(model)) is not None:
-        known = KnownActuator(posterior, lambda theta: joint_records(arm, bindings.candidates(theta), joint))
-        actuator = replace(actuator, known=known)
-    page = actuator_page(actuator)
+    page = actuator_page(joint_actuator(model, joint))
     files = [str(file) for file in (*write_figures(page, out / "figures"), *write_page(page, out))]
     return Result(files[-1:], {"files": files}, None, page)
 

@@ -10,11 +10,11 @@ import numpy as np
 from contourpy import contour_generator
 
 from hydroid.files import file_name
-from hydroid.parameters import Array, Parameter
+from hydroid.parameters import Array
 from hydroid.posterior.jacobian import NO_EFFECT_BELOW
 from hydroid.posterior.sweep import WIDE, Surface, Sweep
 from hydroid.problem.problem import Problem
-from hydroid.reporting.chart import Chart, Color, Mark, Panel, finite, joined
+from hydroid.reporting.chart import ZERO, Chart, Mark, Panel, finite, joined
 from hydroid.reporting.objectives import in_reader_units, norm_label
 from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
 from hydroid.reporting.table import Cell, Table, numbers_csv
@@ -32,6 +32,7 @@ _BINS = 150
 _FAMILY = 7
 """values of a parameter within its bounds that are drawn"""
 _LEVELS = 12
+_HELD = "All other parameters are held at the estimate."
 _CAPTION = (
     "Left: change per 1 % of the parameter. Right: the output for values of it over its bounds, the others "
     "held. Parameters without effect on the output are not drawn, of many those with the largest effect are."
@@ -70,63 +71,44 @@ def _sensitivity_section(problem: Problem, theta: Array, sweep: Sweep, data: dic
     free = [problem.parameters.parameters[i] for i in sweep.free]
     residual = problem.residuals(theta[None])[0]
     rows, tabs = list[tuple[Cell, ...]](), list[Tab]()
-    for channel, slopes, responses in zip(problem.channels, sweep.slopes, sweep.responses, strict=True):
+    for channel, change, sweeps in zip(problem.channels, sweep.slopes, sweep.responses, strict=True):
         what, symbol, unit, factor = _QUANTITIES[channel.quantity]
         log, short, time = logs[channel.log], f"{symbol}{channel.joint}", problem.logs[channel.log].time
         output = factor * (channel.measured - residual[channel.rows] / channel.weight)
-        rms = factor * np.sqrt(np.mean(slopes**2, axis=1))
+        slopes, responses = factor * change, factor * sweeps
+        rms = np.sqrt(np.mean(slopes**2, axis=1))
         shown = np.argsort(-np.nan_to_num(rms), kind="stable")[:_MOST]
-        shown = shown[~(rms[shown] <= NO_EFFECT_BELOW * np.nanmax(rms, initial=0.0))]
-        panels = [
-            panel
-            for i in shown
-            for panel in (
-                _slope(free[i], time, factor * slopes[i], f"{number(float(rms[i]))} {unit} rms per 1 %"),
-                _family(free[i], (time, output, factor * responses[i]), sweep.values[i], unit),
-            )
-        ]
-        name, title = (
-            file_name(f"sensitivity_{Path(log).stem}_{short}", taken),
-            f"{what} of joint {channel.joint}",
-        )
-        chart = partial(Chart, tuple(panels), 2, bins=_BINS)
+        panels: list[Panel] = []
+        for i in shown[~(rms[shown] <= NO_EFFECT_BELOW * np.nanmax(rms, initial=0.0))]:
+            line = Mark("line", time, finite(slopes[i]), color="orange")
+            title = f"{free[i].name}: {number(rms[i])} {unit} rms per 1 %"
+            family = _family(time, output, responses[i])
+            between = " to ".join(number(v) for v in sweep.values[i][[0, -1]])
+            lost = int(np.sum(~np.isfinite(responses[i]).all(axis=1)))
+            values = f"{between} {free[i].unit}".strip() + (f", {lost} infeasible" if lost else "")
+            panels.append(Panel("time [s]", "change", (ZERO, line), title, 150))
+            panels.append(Panel("time [s]", f"[{unit}]", family, values, 150))
+        name = file_name(f"sensitivity_{Path(log).stem}_{short}", taken)
+        title, chart = f"{what} of joint {channel.joint}", partial(Chart, tuple(panels), 2, bins=_BINS)
         plots = (Plot(name, f"{title} in {log}. {_CAPTION}", chart),) if panels else ()
         tabs.append(Tab(f"{title}, {log}", plots, "" if panels else "No parameter changes it."))
         header = ("time_s", f"{short}_{unit}", *(f"{p.name}_{unit}_per_pct" for p in free))
-        data[f"{name}.csv"] = numbers_csv(header, np.column_stack([time, output, factor * slopes.T]))
+        data[f"{name}.csv"] = numbers_csv(header, np.column_stack([time, output, slopes.T]))
         rows += [(log, f"{short} [{unit}]", p.name, float(r)) for p, r in zip(free, rms, strict=True)]
     note = "rms change of the output for 1 % of the parameter, all others held; –: the simulation diverges."
     table = Table("Sensitivity", ("log", "output", "parameter", "rms per 1 %"), tuple(rows), note)
     return Section("Effect of each parameter", tabs=tuple(tabs), more={"sensitivity": table})
 
 
-def _slope(parameter: Parameter, time: Array, slope: Array, size: str) -> Panel:
-    marks = (
-        Mark("rule", y=np.zeros(1), color="grey", width=1),
-        Mark("line", time, finite(slope), color="orange"),
-    )
-    return Panel("time [s]", "change", marks, f"{parameter.name}: {size}", 150)
-
-
-def _family(parameter: Parameter, curves: tuple[Array, Array, Array], values: Array, unit: str) -> Panel:
-    """Draw time, output, shapes (T,), and the responses at some values of a parameter, shape (N, T)."""
-    time, output, responses = curves
+def _family(time: Array, output: Array, responses: Array) -> tuple[Mark, ...]:
+    """Draw an output, shape (T,), and its responses to some of the values of a parameter, shape (N, T)."""
     reach = max(float(np.ptp(output)), 1e-3)  # a response farther off has run away
     near = np.where(np.abs(responses - output.mean()) < 2 * reach, finite(responses), np.nan)
-    chosen = np.linspace(0, len(values) - 1, _FAMILY).round().astype(int)
-    look: dict[int, tuple[Color, str]] = {
-        0: ("blue", "lower bound"),
-        len(values) - 1: ("pink", "upper bound"),
-    }
-    marks: list[Mark] = []
-    for i in sorted(chosen.tolist(), key=lambda i: i in look):
-        color, label = look.get(i, ("grey", "between"))
-        marks.append(Mark("line", time, near[i], color=color, label=label, width=1))
-    marks.append(Mark("line", time, output, color="ink", label="at the estimate", look="dashed"))
-    lost = int(np.sum(~np.isfinite(responses).all(axis=1)))
-    title = f"{number(float(values[0]))} to {number(float(values[-1]))} {parameter.unit}".strip()
-    title += f", {lost} of {len(values)} infeasible" if lost else ""
-    return Panel("time [s]", f"[{unit}]", tuple(marks), title, 150)
+    *between, last = np.linspace(0, len(near) - 1, _FAMILY).round().astype(int).tolist()
+    looks = [(i, "grey", "between") for i in between[1:]]
+    looks += [(0, "blue", "lower bound"), (last, "pink", "upper bound")]
+    marks = [Mark("line", time, near[i], color=color, label=label, width=1) for i, color, label in looks]
+    return (*marks, Mark("line", time, output, color="ink", label="at the estimate", look="dashed"))
 
 
 def _surface_section(
@@ -135,21 +117,18 @@ def _surface_section(
     """Return the error over pairs of parameters; its numbers are added to `data` as CSV."""
     rows, plots = list[tuple[Cell, ...]](), list[Plot]()
     for surface in surfaces:
-        first, second = (parameter.name for parameter in surface.parameters)
-        name, caption = f"surface_{first}_{second}", "All other parameters are held at the estimate."
-        plots.append(
-            Plot(name, f"Error over {first} and {second}. {caption}", partial(landscape, surface, objective))
-        )
-        a, b = (grid.ravel() for grid in np.meshgrid(*surface.values, indexing="ij"))
-        error = in_reader_units(objective, surface.error.ravel())
-        header = (first, second, "error" if objective.relative else "error_deg")
-        data[f"{name}.csv"] = numbers_csv(header, np.column_stack([a, b, error]))
+        names = [parameter.name for parameter in surface.parameters]
+        name, caption = f"surface_{'_'.join(names)}", f"Error over {' and '.join(names)}. {_HELD}"
+        plots.append(Plot(name, caption, partial(landscape, surface, objective)))
+        columns = *np.meshgrid(*surface.values, indexing="ij"), in_reader_units(objective, surface.error)
+        header = (*names, "error" if objective.relative else "error_deg")
+        data[f"{name}.csv"] = numbers_csv(header, np.column_stack([*map(np.ravel, columns)]))
         *lowest, least = surface.lowest
         least, at = in_reader_units(objective, np.array([least, surface.estimate_error])).tolist()
-        rows.append((f"{first}, {second}", *lowest, least, *surface.estimate, at))
-    columns = ("first", "second", norm_label(objective))
-    header = (f"{column}, {which}" for which in ("lowest", "estimate") for column in columns)
-    note = "All other parameters are held at the estimate, which is a grid point where the grid reaches it."
+        rows.append((", ".join(names), *lowest, least, *surface.estimate, at))
+    values = ("first", "second", norm_label(objective))
+    header = (f"{value}, {which}" for which in ("lowest", "estimate") for value in values)
+    note = f"{_HELD[:-1]}, which is a grid point where the grid reaches it."
     table = Table("Error over two parameters", ("parameters", *header), tuple(rows), note)
     return Section("Error over two parameters", tables={"surface": table}, plots=tuple(plots))
 
@@ -163,29 +142,25 @@ def landscape(surface: Surface, objective: ObjectiveSettings) -> Chart:
     known, marks = error[np.isfinite(error)], list[Mark]()
     if known.size and known.max() > known.min():
         # a point that reproduces its data exactly would stretch equal ratios to nothing
-        low, high = max(float(known.min()), 1e-3 * float(known.max())), float(known.max())
+        low, high = max(known.min(), 1e-3 * known.max()), known.max()
         levels = (np.geomspace if high > 5 * low else np.linspace)(low, high, _LEVELS + 2)[1:-1]
         lines: Any = contour_generator(*surface.values, np.ma.masked_invalid(error.T))
-        for level, alpha in zip(levels.tolist(), np.linspace(1, 0.3, _LEVELS).tolist(), strict=True):
+        for level, alpha in zip(levels, np.linspace(1, 0.3, _LEVELS), strict=True):
             label = f"{number(level)}{unit}"
-            marks.append(Mark("line", *joined(lines.lines(level)), color="blue", label=label, alpha=alpha))
-    lost = np.argwhere(~np.isfinite(error))
-    if len(lost):
-        (a, b), (i, j) = surface.values, lost.T
-        label = f"infeasible ({len(lost)} points)"
+            marks.append(Mark("line", *joined(lines.lines(level)), label=label, alpha=float(alpha)))
+    (a, b), (i, j) = surface.values, np.nonzero(~np.isfinite(error))
+    if len(i):
+        label = f"infeasible ({len(i)} points)"
         marks.append(Mark("points", a[i], b[j], color="pale", label=label, look="square", width=7))
-    for (x, y, value), color, look, size, label in (
-        (surface.lowest, "ink", "circle", 11, "lowest point drawn"),
-        # where both are one point, the estimate lies on the other
-        ((*surface.estimate, surface.estimate_error), "orange", "diamond", 8, "estimate"),
+    # where both are one point, the estimate lies on the other
+    for *at, value, label, look in (
+        (*surface.lowest, "lowest point drawn", {"color": "ink", "width": 11}),
+        (*surface.estimate, surface.estimate_error, "estimate", {"look": "diamond", "width": 8}),
     ):
         text = f"{label} ({number(float(in_reader_units(objective, np.array(value))))}{unit})"
-        marks.append(
-            Mark("points", np.array([x]), np.array([y]), color=color, label=text, look=look, width=size)
-        )
+        marks.append(Mark("points", *np.array(at)[:, None], label=text, **{"color": "orange"} | look))
     x, y = (f"{p.name} [{p.unit}]" if p.unit else p.name for p in surface.parameters)
     ends = [(float(values[0]), float(values[-1])) for values in surface.values]
     log_x, log_y = (low > 0 and high > WIDE * low for low, high in ends)
     title = f"Lines of equal {norm_label(objective)}"
-    panel = Panel(x, y, tuple(marks), title, 420, ends[0], ends[1], log_x, log_y)
-    return Chart((panel,))
+    return Chart((Panel(x, y, tuple(marks), title, 420, ends[0], ends[1], log_x, log_y),))

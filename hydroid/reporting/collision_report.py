@@ -1,12 +1,13 @@
 """The report of a trajectory: which bodies meet, and how near they come over time."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
 import numpy as np
 
-from hydroid.arm.collision import Clearance
-from hydroid.reporting.chart import SERIES, Chart, Mark, Panel
+from hydroid.arm.collision import Clearance, Meeting
+from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel
 from hydroid.reporting.page import Page, Plot, Section
 from hydroid.reporting.table import Cell, Table
 
@@ -41,9 +42,11 @@ def verdict(clearance: Clearance) -> str:
 
 def collision_table(clearance: Clearance) -> Table:
     """Return the pairs of bodies that met."""
+    pairs: dict[tuple[str, str], list[Meeting]] = {}
+    for meeting in clearance.meetings:
+        pairs.setdefault((meeting.first, meeting.second), []).append(meeting)
     rows: list[tuple[Cell, ...]] = []
-    for pair in dict.fromkeys((meeting.first, meeting.second) for meeting in clearance.meetings):
-        times = [meeting for meeting in clearance.meetings if (meeting.first, meeting.second) == pair]
+    for pair, times in pairs.items():
         worst = max(times, key=lambda meeting: meeting.depth)
         rows.append((*pair, len(times), times[0].begins, times[0].ends, 1e3 * worst.depth, worst.deepest))
     header = ("first", "second", "times", "first from [s]", "to [s]", "depth [mm]", "at [s]")
@@ -53,29 +56,26 @@ def collision_table(clearance: Clearance) -> Table:
 
 def nearest_table(clearance: Clearance) -> Table:
     """Return the pairs of bodies that were the nearest at any time, the nearest of all first."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: dict[tuple[str, str], tuple[Cell, ...]] = {}
     for k in np.argsort(clearance.distance, kind="stable").tolist():
         pair = clearance.nearest[k]
-        if pair not in [row[:2] for row in rows]:
+        if pair not in rows:
             share = 100 * clearance.nearest.count(pair) / len(clearance.time)
-            rows.append((*pair, 1e3 * float(clearance.distance[k]), float(clearance.time[k]), share))
+            rows[pair] = (*pair, 1e3 * float(clearance.distance[k]), float(clearance.time[k]), share)
     excluded = ", ".join("–".join(pair) for pair in clearance.excluded)
     note = f"{clearance.checked} pairs of bodies were checked. The model excludes: {excluded or 'none'}."
     header = ("first", "second", "smallest distance [mm]", "at [s]", "share of the time [%]")
-    return Table("Nearest bodies", header, tuple(rows), note)
+    return Table("Nearest bodies", header, tuple(rows.values()), note)
 
 
 def clearance_chart(clearance: Clearance) -> Chart:
     """Draw the smallest distance over time, coloured by the bodies that it lies between."""
-    distance, marks = 1e3 * clearance.distance, [Mark("rule", y=np.zeros(1), color="ink", width=1)]
-    pairs = [(str(row[0]), str(row[1])) for row in nearest_table(clearance).rows]
-    for i, pair in enumerate(pairs):
-        named = i < len(SERIES)
-        own = np.array([other == pair for other in clearance.nearest])
-        own[:-1] |= own[1:]  # up to where the next pair begins
-        label, color = (" – ".join(pair), SERIES[i]) if named else ("others", "grey")
-        marks.append(
-            Mark("line", clearance.time, np.where(own, distance, np.nan), color=color, label=label, width=2)
-        )
+    marks = [replace(ZERO, color="ink")]
+    for i, (first, second, *_) in enumerate(nearest_table(clearance).rows):
+        between = np.array([pair == (first, second) for pair in clearance.nearest])
+        between[:-1] |= between[1:]  # up to where the next pair begins
+        distance = np.where(between, 1e3 * clearance.distance, np.nan)
+        label, color = (f"{first} – {second}", SERIES[i]) if i < len(SERIES) else ("others", "grey")
+        marks.append(Mark("line", clearance.time, distance, color=color, label=label, width=2))
     title = "Distance of the nearest bodies; below 0 they are inside each other"
     return Chart((Panel("time [s]", "smallest distance [mm]", tuple(marks), title, 280),))

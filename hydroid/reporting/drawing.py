@@ -1,6 +1,7 @@
 """Reports of finished runs, drawn from what the runs store; nothing is simulated, and no log is needed."""
 
 from collections.abc import Collection, Sequence
+from os.path import commonpath
 from pathlib import Path
 
 from hydroid.reporting.comparison import comparison_page
@@ -27,17 +28,11 @@ def draw(
     if len(runs) == 1:
         folder, page = Path(runs[0]), fit_page(records[0])
     else:
-        folder, page = Path(out), comparison_page(dict(zip(_names(runs), records, strict=True)))
+        paths = [Path(run).resolve() for run in runs]
+        parent = commonpath([path.parent for path in paths])
+        names = (str(path.relative_to(parent)) for path in paths)
+        folder, page = Path(out), comparison_page(dict(zip(names, records, strict=True)))
     write_page(page, folder)
     if figures:
         write_figures(page, folder / "figures")
     return folder / f"{page.name}.html"
-
-
-def _names(runs: Sequence[str | Path]) -> list[str]:
-    """Short names of folders, all different: their own, or with those above them."""
-    parts = [Path(run).resolve().parts for run in runs]
-    depth = 1
-    while len({part[-depth:] for part in parts}) < len(parts) and depth < max(map(len, parts)):
-        depth += 1
-    return ["/".join(part[-depth:]) for part in parts]

@@ -125,7 +125,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
 def _draw(axes: Axes, mark: Mark) -> None:
     x, y, end = mark.x, mark.y, mark.end
     look: dict[str, Any] = {"color": SHADES[mark.color], "alpha": mark.alpha, "label": mark.label or None}
-    line = look | {"lw": mark.width, "linestyle": _LOOKS.get(mark.look, "-")}
+    line: dict[str, Any] = look | {"lw": mark.width, "linestyle": _LOOKS.get(mark.look, "-")}
     match mark.kind:
         case "line":
             axes.plot(x, y, **line)
@@ -147,7 +147,8 @@ def _draw(axes: Axes, mark: Mark) -> None:
             else:
                 axes.plot(at, ends, transform=axes.get_xaxis_transform(), **line)
         case "area":
-            axes.fill(x, y, **look)
+            parts = np.split(np.array([x, y]), np.flatnonzero(np.isnan(x)), axis=1)
+            axes.fill(*(one for part in parts for one in part[:, ~np.isnan(part[0])]), **look)
         case "text":
             for text, *at in zip(mark.texts, x, y, strict=True):
                 drawn = axes.annotate(

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -14,11 +15,8 @@ from hydroid.estimate import FitSummary
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.identified_model import IdentifiedModel
-from hydroid.parameters import Array
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.posterior.posterior import stored_posterior
-from hydroid.problem.bindings import Bindings
-from hydroid.reporting.actuator_report import KnownActuator, actuator_plot, joint_actuator, joint_records
+from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
 from hydroid.reporting.page import Light, Page, Plot, Section, Step, Tab, log_names
 from hydroid.reporting.parameters_report import parameter_section
@@ -29,7 +27,6 @@ from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.uncertainty_report import determined_sections, unknown_section, warnings
 from hydroid.reporting.verdict import verdict
 from hydroid.run.record import Record
-from hydroid.settings.arm import Arm
 from hydroid.words import number
 
 
@@ -100,25 +97,14 @@ def _actuators(record: Record) -> Iterator[Section]:
     settings, summary = record.settings, record.summary
     if settings.stage != "hyd":
         return
-    bindings, arm = Bindings(settings), settings.arm
     theta = settings.parameter_set().vector(summary.values, record.folder)
-    known = stored_posterior(IdentifiedModel(settings, theta, record.folder, summary))
-    tabs: list[Tab] = []
+    model, tabs = IdentifiedModel(settings, theta, record.folder, summary), list[Tab]()
     for joint in settings.outputs:
-        try:
-            actuator = joint_actuator(arm, bindings.candidates(theta[None]), joint, "the estimate")
-        except SettingsError:
-            continue  # no force-stroke curve runs through its two points: it diverged
-        if known is not None:
-            actuator = replace(actuator, known=KnownActuator(known, partial(_records, bindings, arm, joint)))
-        plot = replace(actuator_plot(actuator), name=f"actuator_joint_{joint}")
-        tabs.append(Tab(actuator.title, (plot,)))
+        with suppress(SettingsError):  # no force-stroke curve runs through its two points: it diverged
+            actuator = joint_actuator(model, joint)
+            tabs.append(Tab(actuator.title, (actuator_plot(actuator, f"actuator_joint_{joint}"),)))
     if tabs:
         yield Section("The actuator", tabs=tuple(tabs))
-
-
-def _records(bindings: Bindings, arm: Arm, joint: int, values: Array) -> object:
-    return joint_records(arm, bindings.candidates(values), joint)
 
 
 def _search(record: Record) -> Section:

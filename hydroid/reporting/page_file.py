@@ -68,8 +68,9 @@ def plain(drawn: Any) -> Any:
 
 def _html(page: Page) -> str:
     loader = PackageLoader("hydroid", "reporting")
-    how = {"undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
-    environment = Environment(loader=loader, autoescape=True, **how)
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     drawings = {plot.name: plot.draw() for plot in page.plots}
     charts = {name for name, drawing in drawings.items() if isinstance(drawing, Chart)}
     content = _packed(json.dumps(drawings, default=plain, ensure_ascii=False, separators=(",", ":")))

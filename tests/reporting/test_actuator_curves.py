@@ -6,33 +6,21 @@ import numpy as np
 import pytest
 
 from hydroid.errors import SettingsError
-from hydroid.identified_model import load_identified
-from hydroid.problem.bindings import Bindings
-from hydroid.reporting.actuator_report import (
-    JointActuator,
-    actuator_page,
-    draw,
-    joint_actuator,
-)
+from hydroid.identified_model import IdentifiedModel, load_identified
+from hydroid.reporting.actuator_report import JointActuator, actuator_page, draw, joint_actuator
 from hydroid.reporting.chart import Panel
 from hydroid.reporting.page_file import write_page
-from hydroid.settings.arm import Arm
-from hydroid.simulation import Candidates
+
+SETTINGS = {"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "parameters.I_max.fixed": 1.2}
+
+
+def nominal(settings: dict[str, float]) -> IdentifiedModel:
+    return load_identified(None, "fit-hyd", settings, nominal=True)
 
 
 @pytest.fixture(scope="module")
-def candidate() -> Candidates:
-    return nominal({"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "parameters.I_max.fixed": 1.2})
-
-
-def nominal(settings: dict[str, float]) -> Candidates:
-    found = load_identified(None, "fit-hyd", settings, nominal=True)
-    return Bindings(found.settings).candidates(found.theta[None])
-
-
-@pytest.fixture(scope="module")
-def actuator(arm: Arm, candidate: Candidates) -> JointActuator:
-    return joint_actuator(arm, candidate, 2, "test")
+def actuator() -> JointActuator:
+    return joint_actuator(nominal(SETTINGS), 2)
 
 
 PANELS = ("calibration", "current", "force", "spool", "opening", "flow", "pressure_flow", "torque")
@@ -54,10 +42,9 @@ def test_the_force_curve_at_rated_current_runs_through_its_points(actuator: Join
 
 
 def test_a_plunger_rests_where_the_spring_meets_the_coil(actuator: JointActuator):
-    rests = [m for m in panel(actuator, "force").marks if m.kind == "points" and not m.label]
-    assert len(rests) == 4  # I_min, between, rated, I_max
-    for rest, current in zip(rests, ("0.3 A", "0.75 A", "0.9 A", "1.2 A"), strict=True):
-        at, force = float(rest.x[0]), float(rest.y[0])
+    (rests,) = [m for m in panel(actuator, "force").marks if m.kind == "points" and not m.label]
+    currents = "0.3 A", "0.75 A", "0.9 A", "1.2 A"  # I_min, between, rated, I_max
+    for at, force, current in zip(rests.x, rests.y, currents, strict=True):
         assert np.interp(at, *curve(actuator, "force", current)) == pytest.approx(force, rel=2e-3)
         assert np.interp(at, *curve(actuator, "force", "spring")) == pytest.approx(force, rel=1e-9)
 
@@ -83,18 +70,18 @@ def test_flow_grows_with_the_root_of_the_drop_up_to_the_pumps_limit(actuator: Jo
 
 def test_the_torque_is_largest_where_the_moment_arm_is(actuator: JointActuator):
     angle, torque = curve(actuator, "torque", "A at supply")
-    arm = actuator.linkage.moment_arm(np.radians(angle))
+    arm = actuator.joint.actuator.moment_arm(np.radians(angle))
     assert torque == pytest.approx(arm * (1000e-6 * 150e5 - 750e-6 * 5e5))
 
 
-def test_a_rotary_joint_is_drawn_too(arm: Arm, candidate: Candidates, tmp_path: Path):
-    page = actuator_page(joint_actuator(arm, candidate, 4, "test"))
+def test_a_rotary_joint_is_drawn_too(tmp_path: Path):
+    page = actuator_page(joint_actuator(nominal(SETTINGS), 4))
     written = write_page(page, tmp_path)
     assert {path.name for path in written} == {"actuator.html"}
 
 
-def test_a_set_without_a_force_stroke_curve_is_refused_in_words(arm: Arm):
+def test_a_set_without_a_force_stroke_curve_is_refused_in_words():
     infeasible = nominal({"parameters.F1.fixed": 500})
     with pytest.raises(SettingsError, match=r"joint 2: no .* curve runs through 500 N at 0\.8 mm"):
-        joint_actuator(arm, infeasible, 2, "test")
-    joint_actuator(arm, infeasible, 1, "test")  # the others have one
+        joint_actuator(infeasible, 2)
+    joint_actuator(infeasible, 1)  # the others have one

@@ -28,15 +28,12 @@ def cmaes(settings: CmaesSettings, parameters: int, start: Float | None = None) 
 
 class _Cmaes:
     def __init__(self, cma: Any, settings: CmaesSettings, mean: Float, rng: Generator) -> None:
-        def normal(*shape: int) -> Float:
-            return rng.standard_normal(shape)
-
         options = {
             "bounds": [0.0, 1.0],
             "popsize": settings.population,
             "maxiter": np.inf,  # generations are counted outside
             "seed": np.nan,  # leave numpy's global generator alone
-            "randn": normal,
+            "randn": lambda *shape: rng.standard_normal(shape),
             "verbose": -10,  # below -9, no file of signals is looked for in the working folder either
             "verb_log": 0,
             # a generation that diverged throughout is flat, and no sign of having converged
@@ -44,13 +41,11 @@ class _Cmaes:
             "tolfun": 0.0,
         }
         self._strategy = cma.CMAEvolutionStrategy(mean, SIGMA, options)
-        self._asked: list[Float] = []
 
     def ask(self) -> Float:
         """Return the next population, none once cma finds itself converged."""
-        converged = bool(self._strategy.stop())
-        self._asked = [] if converged else self._strategy.ask()
-        return np.array(self._asked) if self._asked else np.empty((0, 0))
+        self._asked = [] if self._strategy.stop() else self._strategy.ask()
+        return np.array(self._asked)
 
     def tell(self, objectives: Float) -> None:
         """Take the one objective, shape (n, 1)."""

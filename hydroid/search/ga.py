@@ -40,10 +40,6 @@ class SimpleGa(GeneticAlgorithm):
         best = np.argsort(_objective(population), kind="stable")[:ELITE]
         return population.take(best).join(offspring)
 
-    def reached(self, population: Population) -> bool:
-        """Never: it ends after all generations."""
-        return False
-
 
 def _objective(population: Population) -> NDArray[np.float64]:
     """The one objective, shape (n,), inf where infeasible.

@@ -45,28 +45,24 @@ class LibraryAlgorithm:
     Args:
         settings: population and generations.
         single: whether it minimises one objective.
-        engine: begins a run from a source of randomness.
+        begin: begins a run from a source of randomness.
     """
 
     def __init__(
-        self, settings: PopulationSettings, engine: Callable[[Generator], Engine], *, single: bool
+        self, settings: PopulationSettings, begin: Callable[[Generator], Engine], *, single: bool
     ) -> None:
-        self.settings, self.single = settings, single
-        self.begin, self._engine = engine, None
-        self._asked = np.empty((0, 0))
-        self._penalty = _Penalty()
+        self.settings, self.single, self.begin = settings, single, begin
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Points that the library wants next, shape (n, p); without a population, begin the run."""
         if population is None:
-            self._engine, self._penalty = self.begin(rng), _Penalty()
+            self._engine, self._ends = self.begin(rng), list[Float]()
             self._asked = self._engine.ask()
         return self._asked
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Tell the library; return the best of present population and offspring."""
-        assert self._engine is not None
-        self._engine.tell(self._penalty.applied(offspring.objectives))
+        self._engine.tell(self._finite(offspring.objectives))
         self._asked = self._engine.ask()
         everyone = offspring if population is None else population.join(offspring)
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
@@ -79,23 +75,15 @@ class LibraryAlgorithm:
         """Whether the library's algorithm has ended by itself: converged, or without new points."""
         return not len(self._asked)
 
-
-class _Penalty:
-    """Finite objectives for infeasible candidates: worse, by their range, than all feasible ones so far."""
-
-    def __init__(self) -> None:
-        self._best: Float | float = np.inf
-        self._worst: Float | float = -np.inf
-
-    def applied(self, objectives: Float) -> Float:
+    def _finite(self, objectives: Float) -> Float:
+        """Objectives, (n, m), with those of infeasible candidates worse than all feasible ones so far."""
         usable = feasible(objectives) & np.all(np.abs(objectives) < HUGE, axis=1)
-        if usable.any():
-            self._best = np.minimum(self._best, objectives[usable].min(axis=0))
-            self._worst = np.maximum(self._worst, objectives[usable].max(axis=0))
-        if np.ndim(self._worst) == 0:
+        seen = [*self._ends, *objectives[usable]]
+        if not seen:
             return np.full_like(objectives, UNSCALED)
-        span = self._worst - self._best
-        return np.where(usable[:, None], objectives, self._worst + np.where(span > 0, span, 1.0))
+        self._ends = [best, worst] = [np.min(seen, axis=0), np.max(seen, axis=0)]
+        span = worst - best
+        return np.where(usable[:, None], objectives, worst + np.where(span > 0, span, 1.0))
 
 
 def need(module: str, extra: str) -> Any:

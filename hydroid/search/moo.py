@@ -52,22 +52,17 @@ def pymoo(
             hint="ask for more with objective.segments, or choose DE, PSO or cmaes",
         )
     need("pymoo.config", "moo").Config.warnings["not_compiled"] = False  # else it prints a hint
-    several = 1 if single else objectives
+    several, count = 1 if single else objectives, settings.population
 
     def begin(rng: Generator) -> _Pymoo:
         options: dict[str, Any] = {"seed": int(rng.integers(2**32))}
-        if name in DIRECTED:
-            options["ref_dirs"] = directions(settings.population, several)
-        else:
-            options["pop_size"] = settings.population
+        options |= {"ref_dirs": directions(count, several)} if name in DIRECTED else {"pop_size": count}
         if start is not None:
-            others = rng.random((settings.population - 1, parameters))
-            options["sampling"] = np.vstack([start, others])
+            options["sampling"] = np.vstack([start, rng.random((count - 1, parameters))])
         module, _, kind = ALGORITHMS[name].rpartition(".")
         algorithm = getattr(need(f"pymoo.algorithms.{module}", "moo"), kind)(**options)
-        problem = need("pymoo.core.problem", "moo").Problem(
-            n_var=parameters, n_obj=several, n_ieq_constr=0, xl=0.0, xu=1.0
-        )
+        box = {"n_var": parameters, "n_obj": several, "n_ieq_constr": 0, "xl": 0.0, "xu": 1.0}
+        problem = need("pymoo.core.problem", "moo").Problem(**box)
         algorithm.setup(problem, termination=("n_gen", 1 + settings.generations), verbose=False)
         return _Pymoo(algorithm)
 

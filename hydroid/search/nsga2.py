@@ -39,10 +39,6 @@ class Nsga2(GeneticAlgorithm):
         everyone = offspring if population is None else population.join(offspring)
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
 
-    def reached(self, population: Population) -> bool:
-        """Never: it ends after all generations."""
-        return False
-
 
 def crowded_order(objectives: Float) -> Int:
     """Candidates from best to worst by the crowded comparison: lower rank first, then more room around them.

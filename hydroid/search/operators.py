@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from hydroid.search.algorithm import Population
 from hydroid.search.coding import Coding, Genes, GrayCoding, IntegerCoding
 from hydroid.settings.search import GeneticSettings
 
@@ -123,6 +124,10 @@ class GeneticAlgorithm:
     def decode(self, chromosomes: Genes) -> Float:
         """Points of the unit box, shape (n, p)."""
         return self.coding.decode(chromosomes)
+
+    def reached(self, population: Population) -> bool:
+        """Never: it ends after all generations."""
+        return False
 
     def first(self, rng: Generator) -> Genes:
         """The first population: random but for the start, shape (population, length)."""

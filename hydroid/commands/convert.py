@@ -116,7 +116,7 @@ def _guessed(
             raise SettingsError("is no setting of `log`", where=f"--set {key}", hint="give it with --config")
         replace_setting(section, key, value)
     layout = validate(section["log"], LogSettings, "the guessed columns", overridden=[*changes])
-    return replace(guess, log=section["log"]), layout
+    return guess._replace(log=section["log"]), layout
 
 
 def _guess_lines(guess: "ColumnGuess") -> list[str]:

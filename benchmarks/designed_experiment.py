@@ -86,7 +86,7 @@ def study(given: Any) -> None:
     estimate = truth * np.exp(np.random.default_rng(SEED).uniform(np.log(0.8), np.log(1.25), len(truth)))
     clock = Clock()
     best = design(settings, estimate, [], given.seed, lambda what, done, of: None)
-    print(f"designed in {clock} from {best.tried} experiments", flush=True)
+    print(f"designed in {clock} from {settings.design.effort} experiments", flush=True)
     problem = Problem(settings, [best.log])
     boxes = [estimate_box(problem.parameters, theta) for theta in (estimate, truth)]
     known, there = (white_posterior(box, prior_slopes(problem.priors, box)) for box in boxes)

@@ -21,14 +21,6 @@ from hydroid.settings.fit import FitSettings
 
 Ints = NDArray[np.int64]
 
-RANGE_FACTORS = (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
-"""factors tried in turn on a level that leads out of a joint's range"""
-SPEED_FACTORS = (0.7, 0.5, 0.35, 0.2, 0.0)
-"""factors tried in turn on a level that makes a joint too fast"""
-
-LATELY = 20
-"""samples before two bodies come too near in which a joint that turned is held to be the cause"""
-
 
 @dataclass(frozen=True, eq=False)
 class Input:
@@ -233,7 +225,7 @@ def meeting(angle: Array, sample: int) -> Violation:
 
     `angle` is the motion [rad], shape (T, J); joint angles far out on the arm count as much as the others.
     """
-    turned = np.ptp(angle[max(0, sample - LATELY) : sample + 1], axis=0)
+    turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
     return Violation(sample, int(np.argmax(turned)), False)
 
 
@@ -241,7 +233,8 @@ def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[in
     """Change the level before a violation, or an earlier one where all factors of it have been tried."""
     signal = experiment.inputs.get(first.joint)
     if signal is not None:
-        factors = SPEED_FACTORS if first.fast else RANGE_FACTORS
+        # tried in turn on a level that makes a joint too fast, or leads out of its range
+        factors = (0.7, 0.5, 0.35, 0.2, 0.0) if first.fast else (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
         last = int(np.searchsorted(signal.start, first.sample - 1, side="right")) - 1
         for segment in range(last, -1, -1):
             tries = changes[first.joint, segment]

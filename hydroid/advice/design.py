@@ -24,13 +24,6 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.fit import FitSettings
 
-ELITE = 4
-"""number of best experiments that are kept and changed"""
-DRAWN = 6
-"""of so many experiments one is drawn at random; the others are changes of the best"""
-FEWEST = 8
-"""drawn at random, where the effort allows so many"""
-
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -43,8 +36,6 @@ class Design:
         directions: orthonormal basis of the directions that such experiments improve on PRIOR_SD, (p, d). The
             others stay at it, and must not hide them.
         names: of the p parameters.
-        period: of the commands [s].
-        tried: number of experiments simulated with all their sensitivities.
     """
 
     best: Trial
@@ -52,19 +43,12 @@ class Design:
     known: Posterior
     directions: Array
     names: tuple[str, ...]
-    period: float
-    tried: int
 
     @property
     def log(self) -> Log:
         """The commands to run, every angle in the start pose."""
         angle = np.broadcast_to(self.best.experiment.pose, self.best.log.angle.shape)
         return replace(self.best.log, angle=angle)
-
-    @property
-    def predicted(self) -> Log:
-        """The commands with the motion that the present estimate predicts."""
-        return self.best.log
 
     @property
     def after(self) -> Posterior:
@@ -114,7 +98,7 @@ def design(
     known = forecast(fitted)
     experiments, simulator = RandomExperiments(settings, rng), ExperimentSimulator(settings, known)
     random: list[Trial] = []
-    first = max(min(FEWEST, effort), effort // DRAWN)
+    first = max(min(8, effort), effort // 6)  # one in six is drawn at random
     for drawn in range(1, first + 1):
         trial = simulator.trial(experiments.draw())
         random += [trial] if trial is not None else []
@@ -133,7 +117,7 @@ def design(
             return float(np.sum(np.log(np.diag(after.root))))  # half the log determinant
         return -weakest(after, directions)[0]
 
-    elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:ELITE]
+    elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:4]
     for tried in range(first + 1, effort + 1):
         parent = elite[min(rng.integers(len(elite)), rng.integers(len(elite)))][2]
         child = simulator.trial(experiments.change(parent.experiment))
@@ -141,9 +125,8 @@ def design(
             elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
         least, _ = weakest(known.add(elite[0][2].gained), directions)
         progress(f"improving: weakest {100 * least:.3g} %", tried, effort)
-    names = tuple(n for n, each in zip(parameters.names, known.box.varied, strict=True) if each)
-    period = settings.log.period_s
-    return Design(elite[0][2], tuple(random), known, directions, names, period, max(effort, first))
+    names = tuple(np.array(parameters.names)[known.box.varied].tolist())
+    return Design(elite[0][2], tuple(random), known, directions, names)
 
 
 def weakest(known: Posterior, directions: Array) -> tuple[float, Array]:

@@ -34,11 +34,6 @@ from hydroid.settings.fit import FitSettings
 PRIOR_SD = 1.0
 """relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
 so weak that a direction which stays unknown would outweigh all that an experiment can do"""
-STEP = 1e-4
-"""step of an experiment's derivatives in standard deviations, to one side; central ones agree to 0.1 %"""
-MAX_REPAIRS = 60
-"""changes after which an experiment that still breaks a limit is given up"""
-ROUNDING = 1e-12
 
 
 def forecast(known: Posterior) -> Posterior:
@@ -61,7 +56,7 @@ def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
             *((slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals), strict=True
         )
     )
-    floor = ROUNDING * np.trace(scatter) + np.finfo(float).tiny
+    floor = 1e-12 * np.trace(scatter) + np.finfo(float).tiny
     lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
     return np.asarray(solve_triangular(lower, bread, lower=True), dtype=float)
 
@@ -99,7 +94,7 @@ class ExperimentSimulator:
         arm, self._machine = settings.arm, None
         if settings.design.clearance_m is not None:
             self._machine = load_machine(arm, pair=arm.pair is not None)
-        self._box, self._axes = known.box, known.axes(STEP).one_sided
+        self._box, self._axes = known.box, known.axes(1e-4).one_sided  # central ones agree to 0.1 %
 
     def trial(self, experiment: Experiment) -> Trial | None:
         """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
@@ -115,7 +110,7 @@ class ExperimentSimulator:
         None where it still breaks them, or its simulation diverges.
         """
         changes: Counter[tuple[int, int]] = Counter()
-        for _ in range(MAX_REPAIRS):
+        for _ in range(60):
             (angle,) = self._simulate(experiment, self._box.at[None])
             if not np.isfinite(angle).all():
                 return None

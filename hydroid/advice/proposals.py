@@ -1,4 +1,4 @@
-"""What suggestions propose: findings, the command that frees a term, and all as JSON has it."""
+"""What suggestions propose: all of them as JSON has them, findings, and the command that frees a term."""
 
 import math
 import shlex
@@ -7,95 +7,95 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import yaml
 
-from hydroid.advice.actions import STATED_SD, WEIGHED_SD
-from hydroid.advice.missing import TermTest, Verdict
-from hydroid.advice.residuals import LONG_S, Binned, Regressor, ResidualCheck
-from hydroid.advice.suggest import Suggestions
+from hydroid.advice.actions import STATED_SD, next_actions
+from hydroid.advice.missing import TermTest, Verdict, missing_terms
+from hydroid.advice.residuals import Regressor, ResidualCheck, residual_checks
 from hydroid.estimate import finite
 from hydroid.findings import Finding
+from hydroid.posterior.covariance import Uncertainty
+from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.problem.problem import Problem
+from hydroid.progress import Progress, no_progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
-from hydroid.words import plain
 
 UNITS = {Regressor.ANGLE: "deg", Regressor.VELOCITY: "deg/s", Regressor.COMMAND: "%"}
 """in which a regressor is shown"""
-_AROUND = 5.0
-"""proposed bounds reach from the proposed value divided by this to the value times this"""
-_PERCENT = {"weigh": 100 * WEIGHED_SD, "state": 100 * STATED_SD}
-
-_MOST_RESIDUALS = 8
-"""residuals that are kept with what they depend on"""
 
 Content = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """Suggestions as JSON has them (docs/json.md), and the residuals with the largest errors."""
+    """Suggestions as JSON has them (docs/json.md), and the eight residuals with the largest errors."""
 
     content: Content
     residuals: tuple[ResidualCheck, ...]
 
 
-def advice(problem: Problem, result: Suggestions, run: str = "RUN") -> Advice:
-    """Return suggestions as a run stores them; `run` is its folder in commands."""
-    worst = sorted(result.residuals, key=lambda check: -check.rms)[:_MOST_RESIDUALS]
-    return Advice(_content(problem, result, run), tuple(worst))
+def advice(
+    problem: Problem,
+    uncertainty: Uncertainty,
+    determined: Quantities | None = None,
+    *,
+    run: str = "RUN",
+    thorough: bool = True,
+    progress: Progress = no_progress,
+) -> Advice:
+    """Return the suggestions about an estimate, as a run stores them.
 
-
-def _content(problem: Problem, result: Suggestions, run: str) -> dict[str, Any]:
+    Args:
+        problem: that was fitted.
+        uncertainty: of its estimate.
+        determined: the quantities there, if they are known already.
+        run: its folder in commands.
+        thorough: simulate all, as `hydroid suggest` does, or only what a fit's report can afford.
+        progress: takes what is being done.
+    """
+    determined = quantities(problem, uncertainty) if determined is None else determined
+    found = missing_terms(problem, uncertainty, thorough=thorough, progress=progress)
+    several, labels = len(problem.active_joints) > 1, dict[str, str]()
+    for name, one in determined.scalars.items():
+        labels[name] = f"{one.label} of joint {one.joint}" if several else one.label
+    slopes = {labels[name]: each for name, each in determined.slopes.items()}
+    checks = residual_checks(problem, uncertainty)
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
-    missing = [
-        {
-            "name": test.term.name,
-            "verdict": test.verdict.value,
-            "unit": test.term.settings.unit,
-            "held": finite(test.term.value),
-            "freed": finite(test.value),
-            "rms_deg": math.degrees(test.rms),
-            "score": test.statistic,
-            "chance": test.chance,
-            "parameter": _proposed(test) if test.verdict is Verdict.FREE else None,
-            "command": freeing_command(problem, test, run) if test.verdict is Verdict.FREE else None,
-        }
-        for test in result.missing.tests
-    ]
-    residuals = [
-        {
-            "log": check.log,
-            "joint": check.joint,
-            "rms_deg": math.degrees(check.rms),
-            "correlation_s": check.correlation_s,
-            "at_stop_s": _stopped(check),
-            "depends_on": [w.value for w, b in check.binned.items() if b.clearest(check.rms) is not None],
-        }
-        for check in result.residuals
-    ]
-    actions = [
-        {
-            "action": action.kind.value,
-            "of": action.subject,
-            "known_before": action.known[0],
-            "known_after": action.known[1],
-            "total": action.total,
-            "parameter": action.parameter,
-            "before_percent": 100 * action.deviations[0],
-            "after_percent": 100 * action.deviations[1],
-            "quantity": action.quantity or None,
-            "quantity_before_percent": 100 * action.quantity_deviations[0] if action.quantity else None,
-            "quantity_after_percent": 100 * action.quantity_deviations[1] if action.quantity else None,
-        }
-        for action in result.actions
-    ]
-    return {
-        "rms_deg": math.degrees(result.missing.rms),
-        "thorough": result.thorough,
+    content = {
+        "rms_deg": math.degrees(found.rms),
+        "thorough": thorough,
         "command": f"hydroid suggest {given} --fit {shlex.quote(run)}",
-        "missing": missing,
-        "residuals": residuals,
-        "actions": actions,
+        "missing": [_missing(problem, test, run) for test in found.tests],
+        "residuals": [
+            {
+                "log": check.log,
+                "joint": check.joint,
+                "rms_deg": math.degrees(check.rms),
+                "correlation_s": check.correlation_s,
+                "at_stop_s": check.stopped_s,
+                "depends_on": [w.value for w, b in check.binned.items() if b.clearest(check.rms) is not None],
+            }
+            for check in checks
+        ],
+        "actions": next_actions(problem, uncertainty, slopes, simulate=thorough, progress=progress),
+    }
+    return Advice(content, tuple(sorted(checks, key=lambda check: -check.rms)[:8]))
+
+
+def _missing(problem: Problem, test: TermTest, run: str) -> dict[str, Any]:
+    free = test.verdict is Verdict.FREE
+    return {
+        "name": test.term.name,
+        "verdict": test.verdict.value,
+        "unit": test.term.settings.unit,
+        "held": finite(test.term.value),
+        "freed": finite(test.value),
+        "rms_deg": math.degrees(test.rms),
+        "score": test.statistic,
+        "chance": test.chance,
+        "parameter": proposed(test) if free else None,
+        "command": freeing_command(problem, test, run) if free else None,
     }
 
 
@@ -130,7 +130,7 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
         ]
         if falls:
             what, before, after = falls[0]
-            numbers = {"what": what, "before": before, "after": after, "sd": _PERCENT.get(kind, 0.0)}
+            numbers = {"what": what, "before": before, "after": after, "sd": 100 * STATED_SD.get(kind, 0.0)}
             link = settings.parameters[of].link if kind == "weigh" else None
             yield Finding(kind, "note", (link or of,), numbers)
 
@@ -140,16 +140,21 @@ def residual_findings(checks: Sequence[ResidualCheck], places: Sequence[str]) ->
     for check, place in zip(checks, places, strict=True):
         for what, binned in check.binned.items():
             if (clear := binned.clearest(check.rms)) is not None:
-                yield _dependence(place, what, binned, clear)
-        if check.correlation_s > LONG_S:
+                factor = 1.0 if what is Regressor.COMMAND else math.degrees(1.0)
+                mean = math.degrees(float(binned.mean[clear]))
+                low, high = (f"{factor * e:.3g}".replace("-", "−") for e in binned.edges[clear : clear + 2])
+                numbers = {"error": abs(mean), "side": "larger" if mean > 0 else "smaller"}
+                numbers |= {"unit": UNITS[what], "low": low, "high": high}
+                yield Finding("residual depends", "note", (place, what.value), numbers)
+        if check.correlation_s > 0.1:  # no sensor of an angle is that slow
             yield Finding("residual correlated", "note", (place,), {"seconds": check.correlation_s})
         if check.at_stop.any():
             error = float(np.sqrt(np.mean(check.residual[check.at_stop] ** 2)))
-            numbers = {"seconds": _stopped(check), "rms": math.degrees(error)}
+            numbers = {"seconds": check.stopped_s, "rms": math.degrees(error)}
             yield Finding("residual at stop", "note", (place,), numbers)
 
 
-def freeing_command(problem: Problem, test: TermTest, run: str = "RUN") -> str:
+def freeing_command(problem: Problem, test: TermTest, run: str) -> str:
     """Return the command that fits the same logs again from a run's estimate, with a term freed."""
     name, _, parameter = setting_line(test).partition(": ")
     given = " ".join(shlex.quote(log.source) for log in problem.logs)
@@ -161,55 +166,22 @@ def freeing_command(problem: Problem, test: TermTest, run: str = "RUN") -> str:
 
 
 def setting_line(test: TermTest) -> str:
-    """Return the parameter that frees a term, as a line of YAML without braces around it.
+    """Return the parameter that frees a term, as a line of YAML without braces around it."""
+    entry = yaml.safe_dump(proposed(test), default_flow_style=True, sort_keys=False, width=math.inf)
+    return f"{test.term.name}: {entry.strip()}"
 
+
+def proposed(test: TermTest) -> dict[str, Any]:
+    """Return the entry of `parameters` that frees a term.
+
+    Its bounds are a fifth and five times the value that the test found, with the present value inside.
     Stage 2 asks for a start of every mechanical parameter that no run of stage 1 gives.
     """
-    p, (low, high) = test.term.settings, proposed_bounds(test)
-    start = "".join(f", {key}: {plain(value)}" for key, value in _start(test).items())
-    where = f"link: {p.link}" if p.link else f"joints: [{', '.join(map(str, p.joints or ()))}]"
-    where = "" if p.link is None and p.joints is None else f"{where}, "
-    return (
-        f"{test.term.name}: {{quantity: {p.quantity}, {where}bounds: [{plain(low)}, {plain(high)}]{start}}}"
-    )
-
-
-def proposed_bounds(test: TermTest) -> tuple[float, float]:
-    """Return bounds around the value that the test found, with the present value inside."""
-    low, high = test.term.span
-    held = test.value if math.isinf(test.term.value) else test.term.value
-    least = 0.0 if low == 0 else min(test.value / _AROUND, held)
-    ends = max(least, low), min(max(_AROUND * test.value, held), high)
-    return float(f"{ends[0]:.2g}"), float(f"{ends[1]:.2g}")
-
-
-def _proposed(test: TermTest) -> dict[str, Any]:
-    """The entry of `parameters` that frees a term."""
-    settings = test.term.settings.model_dump(mode="json", exclude_defaults=True)
-    return settings | {"bounds": proposed_bounds(test)} | _start(test)
-
-
-def _start(test: TermTest) -> dict[str, float]:
-    """The start value of a mechanical parameter, within the proposed bounds."""
-    if test.term.settings.quantity not in MECHANICAL:
-        return {}
-    low, high = proposed_bounds(test)
-    return {"start": min(max(test.term.value, low), high)}
-
-
-def _dependence(place: str, what: Regressor, binned: Binned, b: int) -> Finding:
-    factor = 1.0 if what is Regressor.COMMAND else math.degrees(1.0)
-    mean = math.degrees(float(binned.mean[b]))
-    ends = (f"{factor * end:.3g}".replace("-", "−") for end in binned.edges[b : b + 2])
-    numbers = {"error": abs(mean), "side": "larger" if mean > 0 else "smaller", "unit": UNITS[what]}
-    return Finding(
-        "residual depends",
-        "note",
-        (place, what.value),
-        numbers | dict(zip(("low", "high"), ends, strict=True)),
-    )
-
-
-def _stopped(check: ResidualCheck) -> float:
-    """Time that the joint stands at its stop [s]."""
-    return float(check.at_stop.sum() * np.median(np.diff(check.time)))
+    (low, high), now = test.term.span, test.term.value
+    held = test.value if math.isinf(now) else now
+    least = 0.0 if low == 0 else min(test.value / 5.0, held)
+    ends = max(least, low), min(max(5.0 * test.value, held), high)
+    bounds = [float(f"{end:.2g}") for end in ends]
+    entry = test.term.settings.model_dump(mode="json", exclude_defaults=True) | {"bounds": bounds}
+    mechanical = test.term.settings.quantity in MECHANICAL
+    return entry | ({"start": min(max(now, bounds[0]), bounds[1])} if mechanical else {})

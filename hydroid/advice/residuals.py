@@ -12,23 +12,6 @@ from hydroid.posterior.covariance import Uncertainty
 from hydroid.problem.channels import Channel
 from hydroid.problem.problem import Problem
 
-BINS = 10
-"""intervals of angle, velocity and command, of equal width"""
-FEWEST = 20
-"""samples; a bin with fewer is left out"""
-SMOOTHING_S = 0.11
-"""length of the filter that gives the velocity [s]"""
-CLEAR = 3.0
-"""standard deviations by which a bin's mean must differ from zero to be reported"""
-LARGE = 0.5
-"""part of the rms residual that it must reach"""
-LONG_S = 0.1
-"""correlation time that is reported [s]: no sensor of an angle is that slow"""
-LAGS_S = 5.0
-"""longest lag of the autocorrelation [s]"""
-AT_STOP = float(np.deg2rad(0.5))
-"""distance from the end of the range within which a joint stands at its stop [rad]"""
-
 
 class Regressor(StrEnum):
     """What a residual is shown against."""
@@ -52,9 +35,12 @@ class Binned:
     error: Array
 
     def clearest(self, rms: float) -> int | None:
-        """Return the bin whose mean differs most clearly from zero, beside the rms residual; None: none."""
+        """Return the bin whose mean differs most clearly from zero; None: none.
+
+        By three standard deviations, and by half the rms residual.
+        """
         ratio = np.abs(self.mean) / np.maximum(self.error, np.finfo(float).tiny)
-        clear = (ratio >= CLEAR) & (np.abs(self.mean) > LARGE * rms)
+        clear = (ratio >= 3.0) & (np.abs(self.mean) > 0.5 * rms)
         return int(np.nanargmax(np.where(clear, ratio, -1.0))) if clear.any() else None
 
 
@@ -87,6 +73,11 @@ class ResidualCheck:
         """Of the residual [rad]."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
+    @property
+    def stopped_s(self) -> float:
+        """Time that the joint stands at its stop [s]."""
+        return float(self.at_stop.sum() * np.median(np.diff(self.time)))
+
 
 def residual_checks(problem: Problem, uncertainty: Uncertainty) -> tuple[ResidualCheck, ...]:
     """Check each compared angle, without simulations."""
@@ -100,39 +91,35 @@ def residual_checks(problem: Problem, uncertainty: Uncertainty) -> tuple[Residua
 def _check(problem: Problem, channel: Channel, residual: Array) -> ResidualCheck:
     log, arm, joint = problem.logs[channel.log], problem.settings.arm, channel.joint - 1
     angle = channel.measured
-    window = min(2 * round(SMOOTHING_S / log.period / 2) + 1, len(angle) - (len(angle) + 1) % 2)
+    window = min(2 * round(0.11 / log.period / 2) + 1, len(angle) - (len(angle) + 1) % 2)  # of 0.11 s
     velocity = np.asarray(savgol_filter(angle, window, min(2, window - 1), deriv=1, delta=log.period), float)
-    lags = min(round(LAGS_S / log.period), len(residual) - 1)
+    lags = min(round(5.0 / log.period), len(residual) - 1)  # up to 5 s
     correlation = _autocorrelation(residual, lags)
     below = np.flatnonzero(correlation < 1 / np.e)
     time = float(below[0] if len(below) else lags) * log.period
-    regressors = (angle, velocity, log.command[:, joint])
-    binned = {
-        what: _binned(values, residual, lags)
-        for what, values in zip(Regressor, regressors, strict=True)
-        if np.ptp(values) > 0
-    }
-    at_stop = (angle < arm.lower[joint] + AT_STOP) | (angle > arm.upper[joint] - AT_STOP)
-    return ResidualCheck(
-        channel.log, channel.joint, log.time, residual, binned, correlation, time, np.asarray(at_stop)
-    )
+    regressors = zip(Regressor, (angle, velocity, log.command[:, joint]), strict=True)
+    binned = {what: _binned(values, residual, lags) for what, values in regressors if np.ptp(values) > 0}
+    near = float(np.deg2rad(0.5))
+    at_stop = (angle < arm.lower[joint] + near) | (angle > arm.upper[joint] - near)
+    return ResidualCheck(channel.log, channel.joint, log.time, residual, binned, correlation, time, at_stop)
 
 
 def _binned(values: Array, residual: Array, lags: int) -> Binned:
-    edges = np.linspace(values.min(), values.max(), BINS + 1)
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, BINS - 1)
-    count = np.bincount(place, minlength=BINS)
+    """The residual in ten bins of equal width; one of fewer than 20 samples is left out."""
+    edges = np.linspace(values.min(), values.max(), 11)
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, 9)
+    count = np.bincount(place, minlength=10)
     least = np.maximum(count, 1)
-    mean = np.bincount(place, residual, BINS) / least
+    mean = np.bincount(place, residual, 10) / least
     rest = residual - mean[place]  # the noise is what the means leave
-    deviation = np.sqrt(np.bincount(place, rest**2, BINS) / least)
+    deviation = np.sqrt(np.bincount(place, rest**2, 10) / least)
     # samples per independent one: the sum of the autocorrelation up to where it first vanishes
     correlation = _autocorrelation(rest, lags)
     ends = np.flatnonzero(correlation <= 0)
     alike = 2 * float(correlation[: ends[0] if len(ends) else None].sum()) - 1
     error = rest.std() / np.sqrt(np.maximum(count / alike, 1.0))
-    few = count < FEWEST
-    return Binned(edges, np.where(few, np.nan, mean), np.where(few, np.nan, deviation), error)
+    mean[count < 20] = deviation[count < 20] = np.nan
+    return Binned(edges, mean, deviation, error)
 
 
 def _autocorrelation(residual: Array, lags: int) -> Array:

@@ -75,16 +75,16 @@ class Explained:
     @staticmethod
     def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
         """Return it for an estimate. Parameters at bounds are held."""
-        at, channels, linear = uncertainty.jacobian, problem.channels, uncertainty.linear
-        weak = np.zeros(int(linear.varied.sum()))  # the estimate does not depend on the weak priors
+        at, channels, effects = uncertainty.jacobian, problem.channels, uncertainty.linear.effects
         scores = at.prior_weight * problem.priors.scores(uncertainty.theta[None])[0]
+        own = np.concatenate([at.residual, scores])
+        residual = np.zeros(effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
+        residual[: own.size] = own
 
-        def noise_of(residual: Array) -> list[Noise]:
-            return [channel_noise(c, residual[c.rows], problem.settings.objective) for c in channels]
+        def noise_of(row: Array) -> list[Noise]:
+            return [channel_noise(c, row[c.rows], problem.settings.objective) for c in channels]
 
-        residual = np.concatenate([at.residual, scores, weak])
-        rows = [channel.rows for channel in channels]
-        return Explained(linear.effects, residual, noise_of, rows, at.prior_weight)
+        return Explained(effects, residual, noise_of, [c.rows for c in channels], at.prior_weight)
 
     def score(self, change: Array, after: Array | None = None) -> Score:
         """Return the score of a change of the residuals, shape (R,).
@@ -106,15 +106,14 @@ class Explained:
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
-        samples = sum(part.stop - part.start for part in self.rows)
-        variance, spectra = self.prior_weight**2 * float(np.sum(row[samples:] ** 2)), list[Array]()
+        variance = self.prior_weight**2 * float(np.sum(row[self.rows[-1].stop :] ** 2))
+        spectra: list[Array] = []
         for process, part in zip(noise, self.rows, strict=True):
             own = row[part]
             weighed = matmul_toeplitz(process.autocovariance, own)
             variance += float(own @ weighed)
-            spectra.append(
-                np.maximum(np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed)), 0.0) / own.size
-            )
+            power = np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed))
+            spectra.append(np.maximum(power, 0.0) / own.size)
         spectrum = np.concatenate(spectra)
         terms = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
         level = 0.5 * sum(process.effective_sample_size for process in noise)

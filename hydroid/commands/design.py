@@ -76,7 +76,7 @@ def design(
     files = written(page, out)
     if out is not None:
         write_log(Path(out) / "commands.csv", result.log, settings.log)
-        write_log(Path(out) / "predicted.csv", result.predicted, settings.log)
+        write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, str(commands))
     precision = page.tables["design"]
     content = {"commands": commands, "precision": rows(precision, *PRECISION)}

@@ -123,7 +123,6 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.advice.proposals import advice
-    from hydroid.advice.suggest import suggestions
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.reporting.drawing import draw
     from hydroid.run.record import fit_result, save_result
@@ -135,8 +134,8 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     began, advised = time.monotonic(), None
     last = problem.varied(result.model.settings) if fit.final == "joint" else problem
     if fit.best.usable:
-        suggested = suggestions(last, fit.uncertainty, fit.quantities, thorough=False)
-        advised = advice(last, suggested, str(folder.path))
+        run = str(folder.path)
+        advised = advice(last, fit.uncertainty, fit.quantities, run=run, thorough=False)
     save_result(folder.path, fit_result(last, fit, advised))
     draw([folder.path], folder.path)
     folder.done(dict(fit.seconds) | {"report": time.monotonic() - began})

@@ -45,15 +45,14 @@ def suggest(
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
     from hydroid.advice.proposals import advice
-    from hydroid.advice.suggest import suggestions
     from hydroid.posterior.covariance import uncertainty
     from hydroid.reporting.page import log_names
     from hydroid.reporting.suggestion_report import suggestion_page
 
-    with Progress() as progress:
-        result = suggestions(problem, uncertainty(problem, model.theta), progress=progress)
     folder = Path(model.source).parent
-    advised = advice(problem, result, str(folder) if is_file(folder / CONFIG) else "RUN")
+    run = str(folder) if is_file(folder / CONFIG) else "RUN"
+    with Progress() as progress:
+        advised = advice(problem, uncertainty(problem, model.theta), run=run, progress=progress)
     page = suggestion_page(problem.settings, advised, log_names(problem.logs), model.name)
     lines: list[Table | str] = [page.tables["missing_terms"]]
     for section in page.sections:

@@ -43,7 +43,7 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
         Step("Fit again with the new log beside the old ones.", "The table predicts how precise it will be."),
     )
     moving = "Commands and the motion that the present estimate predicts."
-    motion = Plot("motion", moving, partial(motion_chart, design.predicted, arm.joint_names, limits), True)
+    motion = Plot("motion", moving, partial(motion_chart, design.best.log, arm.joint_names, limits), True)
     sections = (
         Section("Do next", steps=steps),
         Section("Motion", plots=(motion,)),

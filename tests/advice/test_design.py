@@ -38,16 +38,16 @@ def designed() -> tuple[FitSettings, Design]:
 def keeps_limits(settings: FitSettings, result: Design) -> bool:
     """Whether `simulate` gives the predicted motion, within the limits, after a rest, and without jumps."""
     run, limits = simulate_log(settings, result.log, TRUTH, "truth"), settings.design
-    rest = round(limits.rest_s / result.period)
+    rest = round(limits.rest_s / settings.log.period_s)
     assert not run.command[:rest].any()
     assert limits.slew_pct_s is not None
     change = np.abs(np.diff(run.command, axis=0, prepend=0.0)).max()
-    assert 0 < change <= limits.slew_pct_s * result.period + 1e-9
+    assert 0 < change <= limits.slew_pct_s * settings.log.period_s + 1e-9
     assert limits.clearance_m is not None
     assert clearance(settings, run.angle).min() >= limits.clearance_m
     assert np.abs(run.angle - result.best.log.angle).max() < 1e-9
     assert np.abs(run.command).max() <= settings.design.command_pct
-    return violation(run.angle, result.period, settings.arm, settings.design) is None
+    return violation(run.angle, settings.log.period_s, settings.arm, settings.design) is None
 
 
 def clearance(settings: FitSettings, angle: np.ndarray) -> np.ndarray:

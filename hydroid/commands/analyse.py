@@ -144,7 +144,7 @@ def _uncertainty(
         return UncertaintyStudy(problem, source, uncertainty, identifiability, tuple(profiles))
 
     study = at(theta, source)
-    better = profiling.better_optimum(problem, study.uncertainty, study.profiles)
+    better = profiling.better_optimum(study.profiles)
     if better is None:
         return study
     refinement = problem.settings.refinement or RefinementSettings()

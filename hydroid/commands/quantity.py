@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hydroid.commands.inputs import ModelSource, open_model
+from hydroid.errors import RunError
 
 if TYPE_CHECKING:
     from hydroid.parameters import Array
@@ -55,10 +56,13 @@ def quantity(
         RunError: the folder has no covariance of these parameters, or a simulation diverged.
     """
     from hydroid.plant import Plant
-    from hydroid.posterior.posterior import required_posterior
+    from hydroid.posterior.posterior import stored_posterior
 
     opened = open_model(model)
-    known = required_posterior(opened)
+    known = stored_posterior(opened)
+    if known is None:
+        hint = "name the folder of a fit, with the settings that it used"
+        raise RunError("holds no covariance of these parameters", where=opened.source, hint=hint)
     shape = np.shape(function(Plant(opened)))
 
     def values(theta: "Array") -> "Array":

@@ -5,7 +5,7 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
-from hydroid.posterior.by_log import by_log, left_out_errors
+from hydroid.posterior.by_log import by_log
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
 from hydroid.problem.problem import Problem
@@ -75,6 +75,6 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
         noise_deg={angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()},
         left_out_deg={
             f"q{joint}": tuple(np.degrees(errors).tolist())
-            for joint, errors in left_out_errors(problem, known).items()
+            for joint, errors in ({} if logs is None else logs.left_out).items()
         },
     )

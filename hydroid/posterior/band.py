@@ -22,10 +22,6 @@ from hydroid.problem.free_start import start_slopes
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
 
-MOST_OUTSIDE = 0.1
-"""part of the samples outside the band, above which the model is at fault; 5 % are expected"""
-_END = 0.5 + COVERAGE / 2
-
 
 @dataclass(frozen=True, eq=False)
 class Band:
@@ -61,7 +57,7 @@ class Band:
     @property
     def model_limits(self) -> bool:
         """Whether the model, not the noise, limits the prediction."""
-        return self.inside < 1 - MOST_OUTSIDE and self.error > self.limit
+        return self.inside < 1 - 0.1 and self.error > self.limit  # 5 % are expected outside
 
 
 def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:
@@ -76,11 +72,11 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
     if any(f"q{joint}" not in levels for joint in outputs):
         return {}
     problem = Problem(model.settings, [log])
-    slopes = differentiate(
-        lambda theta: problem.responses(theta)[0].angle.reshape(len(theta), -1),
-        known.box,
-        known.axes(STEP),
-    )
+
+    def angles(theta: Array) -> Array:
+        return problem.responses(theta)[0].angle.reshape(len(theta), -1)
+
+    slopes = differentiate(angles, known.box, known.axes(STEP))
     noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
     start = start_effects(problem, model.theta, noises)
     parts = known.parts(slopes).reshape(-1, *response.shape)
@@ -94,7 +90,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         begun = np.sum(start[joint] ** 2, axis=0)
         right, unseen = variance + noise**2, np.radians(left_out.get(f"q{joint}", ()))
         wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
-        widened = wrong * float(student.ppf(_END, unseen.size or 1) / NORMAL) ** 2
+        widened = wrong * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
         half = np.sqrt(known.quantile**2 * (right + begun) + NORMAL**2 * widened)
         inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
         expected = float(np.mean(right + begun)) + wrong

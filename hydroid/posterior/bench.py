@@ -1,4 +1,8 @@
-"""One joint on the test bench: weighed and driven by itself, all other joints locked."""
+"""One joint on the test bench: weighed, and driven by itself with its command stepped and held.
+
+All other joints are locked. Speeds are in the direction of the command. Events between two samples are
+interpolated, so that everything is smooth in the parameters, and differences give its derivatives.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +18,6 @@ from hydroid.settings.linkage import LinearActuator
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
-
-MARGIN = float(np.radians(1.0))
-"""distance that test movements keep from the joint's stops [rad]"""
-LEAST_TRAVEL = float(np.radians(5.0))
-"""of a joint that its logs hardly move [rad]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +41,12 @@ class Bench:
     scenario: Scenario
 
     @property
-    def name(self) -> str:
-        """Begins the names of its quantities."""
-        return f"joint{self.joint}"
-
-    @property
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
         actuator = self.settings.arm.joints[self.joint - 1].actuator
         return (
             float(np.sign(actuator.moment_arm(self.angle))) if isinstance(actuator, LinearActuator) else 1.0
         )
-
-    def at(self, angle: float) -> "Bench":
-        """Return the joint tested at another angle [rad]."""
-        return replace(self, angle=angle)
 
     def weigh(self, candidates: Candidates, angles: Array) -> tuple[Array, Array]:
         """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at angles, shape (n, A) each."""
@@ -79,12 +69,70 @@ class Bench:
         simulation = Simulation(scenario, self.settings.arm, self.settings.hydraulics.substeps)
         return simulation.simulate(candidates).angle[:, :, 0]
 
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A step of the command [%] from an angle [rad], held for some samples.
+
+    The speed at its end is the mean over a `window` of samples.
+    """
+
+    bench: Bench
+    command: float
+    start: float
+    samples: int
+    window: int
+
+    def speeds(self, candidates: Candidates) -> tuple[Array, Array]:
+        """Return speeds [deg/s] between samples, shape (n, samples), and at the end, shape (n,)."""
+        angle = self.bench.drive(candidates, self.command, self.start, self.samples)
+        speeds = self._sign * np.degrees(np.diff(angle, axis=1)) / self.bench.period
+        return speeds, speeds[:, -self.window :].mean(axis=1)
+
+    def speed(self, candidates: Candidates) -> Array:
+        """Return the speed at the end [deg/s], shape (n,)."""
+        return self.speeds(candidates)[1]
+
+    def reaches(self, speeds: Array, level: Array) -> Array:
+        """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s]; NaN where never."""
+        over = speeds >= level[:, None]
+        k, row = np.argmax(over, axis=1), np.arange(len(speeds))
+        before = np.where(k > 0, speeds[row, k - 1], 0.0)  # the joint starts at rest
+        width = np.where(k > 0, 1.0, 0.5)  # and the first speed is that of half a sample
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = (level - before) / (speeds[row, k] - before)
+        return np.where(over.any(axis=1), (k + 0.5 - width * (1.0 - part)) * self.bench.period, np.nan)
+
+    def through_pose(self, estimate: Candidates) -> "Movement":
+        """Return the movement in which one candidate passes the joint's angle in the middle of the window.
+
+        It starts as long before as this one lasts, or at the joint's stop and is shorter.
+        """
+        half, angle, move = self.window // 2, self.bench.angle, self
+        arm, i = self.bench.settings.arm, self.bench.joint - 1
+        margin = float(np.radians(1.0))
+        low, high = float(arm.lower[i]) + margin, float(arm.upper[i]) - margin
+        turned = self.bench.drive(estimate, self.command, move.start, self.samples)[0]
+        for _ in range(3):  # each correction leaves a tenth of the error or less
+            if not np.isfinite(turned).all():
+                return self
+            start = move.start + angle - float(turned[self.samples - half])
+            move = replace(move, start=float(np.clip(start, min(low, angle), max(high, angle))))
+            turned = self.bench.drive(estimate, self.command, move.start, self.samples)[0]
+        passed = self._sign * (turned - angle) >= 0
+        last = int(np.argmax(passed)) + half if passed.any() else self.samples
+        return replace(move, samples=min(max(last, self.window + 1), self.samples))
+
     @property
-    def reach(self) -> tuple[float, float]:
-        """Smallest and largest angle from which a test movement may start [rad]."""
-        arm, i = self.settings.arm, self.joint - 1
-        low, high = float(arm.lower[i]) + MARGIN, float(arm.upper[i]) - MARGIN
-        return min(low, self.angle), max(high, self.angle)
+    def _sign(self) -> float:
+        """Direction in which the command turns the joint."""
+        return -self.bench.sense if self.command < 0 else self.bench.sense
+
+
+def movement(bench: Bench, command: float) -> Movement:
+    """Return the movement of 1.2 s from the joint's angle, whose last tenth of a second is its end."""
+    samples, window = max(round(1.2 / bench.period), 2), max(round(0.1 / bench.period), 1)
+    return Movement(bench, command, bench.angle, samples, window)
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
@@ -92,7 +140,7 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
     middle = float(np.radians(round(np.degrees((angles.min() + angles.max()) / 2))))
-    half = max(float(np.ptp(angles)) / 2, LEAST_TRAVEL)
+    half = max(float(np.ptp(angles)) / 2, float(np.radians(5.0)))  # its logs may hardly move it
     rest = Log(
         "a test movement", np.array([0.0, period]), np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
     )

@@ -22,7 +22,6 @@ that the logs do not determine says nothing by lying there, and stays free.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -38,47 +37,21 @@ from hydroid.posterior.noise import STEP, Noise, channel_noise, neighbours, tran
 from hydroid.posterior.posterior import COVERAGE, NORMAL, WEAK_PRIOR, Posterior, regular
 from hydroid.problem.problem import Problem
 
-BOUND_MARGIN = 1e-3
-"""part of the range within which an estimate is called at a bound"""
-DOUBT_ABOVE = 0.25
-"""relative change of a standard deviation in the last round, above which it is reported"""
-LIMITED = 0.5
-"""part of the weak prior's standard deviation below which stated priors limit a parameter"""
-MAX_LOG_SPREAD = 5.0
-"""beyond it nothing is known of a variance, and no interval is of use"""
-_NODES, _WEIGHTS = hermegauss(60)
-
 
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Least squares at an estimate, linearised in the p parameters that vary: J = V D U.
 
     Attributes:
-        varied: which of the P parameters, shape (P,).
         changes: relative change of each parameter per unit of each effect, V D^-1, shape (p, p).
         effects: orthonormal rows U of the residuals, behind them the M priors' scores, behind these the weak
             priors' of the p parameters, shape (p, R + M + p).
-        samples: R.
-        weight: standard deviation of a prior's row.
+        prior_scatter: what the priors' uncertainty scatters in each effect, shape (p, p).
     """
 
-    varied: NDArray[np.bool_]
     changes: Array
     effects: Array
-    samples: int
-    weight: float
-
-    @cached_property
-    def prior_scatter(self) -> Array:
-        """What the priors' uncertainty scatters in each effect, shape (p, p)."""
-        priors = self.weight * self.effects[:, self.samples :]
-        return priors @ priors.T
-
-    @property
-    def root(self) -> Array:
-        """D V', the inverse of `changes`, shape (p, p)."""
-        size = np.linalg.norm(self.changes, axis=0)
-        return (self.changes / size**2).T
+    prior_scatter: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +68,6 @@ class Uncertainty:
         relative: relative standard deviation of each parameter, shape (P,); inf where it is not
             identifiable, NaN where it is fixed or held.
         interval: of 95 %, shape (P, 2); infinite where not identifiable, NaN where fixed or at a bound.
-        quantile: half the interval in standard deviations, shape (P,): 1.96 where the noise is well known.
         status: of each parameter.
     """
 
@@ -107,21 +79,12 @@ class Uncertainty:
     posterior: Posterior
     relative: Array
     interval: Array
-    quantile: Array
     status: tuple[ParameterStatus, ...]
 
     @property
     def standard_deviation(self) -> Array:
         """Of each parameter, in its unit, shape (P,)."""
         return self.relative * self.jacobian.scale
-
-    @property
-    def correlation(self) -> Array:
-        """Of the free parameters' estimates, (free, free); NaN where held or not identifiable."""
-        whole = np.full((len(self.theta),) * 2, np.nan)
-        whole[np.ix_(self.linear.varied, self.linear.varied)] = self.posterior.covariance
-        deviation = np.where(np.isfinite(self.relative), self.relative, np.nan)
-        return (whole / np.outer(deviation, deviation))[np.ix_(self.free, self.free)]
 
 
 def uncertainty(problem: Problem, theta: Array, first: Array | None = None) -> Uncertainty:
@@ -136,13 +99,13 @@ def uncertainty_from(
     problem: Problem, theta: Array, derivatives: Jacobian, noise: tuple[Noise, ...] | None = None
 ) -> Uncertainty:
     """Return the uncertainty from the derivatives, without simulations; None: for the residual's noise."""
-    found = _with_varied(problem, theta, derivatives, noise, problem.parameters.free)
-    determined = Flag.IDENTIFIABLE, Flag.WEAK
-    held = np.array([status.at_bound is not None and status.flag in determined for status in found.status])
-    if not held.any() or not (found.free & ~held).any():
-        return found
-    inside = _with_varied(problem, theta, derivatives, noise, found.free & ~held)
-    status = tuple(a if h else b for a, b, h in zip(found.status, inside.status, held, strict=True))
+    free, determined = problem.parameters.free, (Flag.IDENTIFIABLE, Flag.WEAK)
+    whole = _with_varied(problem, theta, derivatives, noise, free)
+    held = np.array([status.at_bound is not None and status.flag in determined for status in whole.status])
+    if not held.any() or not (free & ~held).any():
+        return whole
+    inside = _with_varied(problem, theta, derivatives, noise, free & ~held)
+    status = tuple(a if h else b for a, b, h in zip(whole.status, inside.status, held, strict=True))
     return replace(inside, status=status)
 
 
@@ -152,7 +115,8 @@ def linearise(varied: NDArray[np.bool_], derivatives: Jacobian) -> Linear:
     weak = np.eye(int(varied.sum())) / WEAK_PRIOR
     rows = np.hstack([np.nan_to_num(derivatives.slopes[varied]), weight * scores, weight * weak])
     directions, values, effects = np.linalg.svd(rows, full_matrices=False)
-    return Linear(varied, directions / values, effects, derivatives.residual.size, weight)
+    priors = weight * effects[:, derivatives.residual.size :]
+    return Linear(directions / values, effects, priors @ priors.T)
 
 
 def ends(parameters: ParameterSet, theta: Array, scale: Array, half: Array) -> Array:
@@ -170,12 +134,9 @@ def ends(parameters: ParameterSet, theta: Array, scale: Array, half: Array) -> A
 
 
 def at_bounds(parameter: Parameter, value: Array | float) -> tuple[tuple[Side, NDArray[np.bool_]], ...]:
-    """Return for each bound whether values lie at it, on the parameter's scale."""
+    """Return for each bound whether values lie within a thousandth of the range from it, on its scale."""
     position = parameter.position(value)
-    return (
-        ("lower", np.asarray(position <= BOUND_MARGIN)),
-        ("upper", np.asarray(position >= 1 - BOUND_MARGIN)),
-    )
+    return ("lower", np.asarray(position <= 1e-3)), ("upper", np.asarray(position >= 1 - 1e-3))
 
 
 def quantile(spread: float) -> float:
@@ -183,9 +144,10 @@ def quantile(spread: float) -> float:
 
     `spread` is the standard deviation of the logarithm of the estimated variance: 0 gives 1.96.
     """
+    nodes, weights = hermegauss(60)
 
     def outside(half: float) -> float:
-        chance = _WEIGHTS @ (2 * normal.sf(half * np.exp(spread * _NODES / 2))) / _WEIGHTS.sum()
+        chance = weights @ (2 * normal.sf(half * np.exp(spread * nodes / 2))) / weights.sum()
         return float(chance) - (1 - COVERAGE)
 
     return float(root_scalar(outside, bracket=(1.0, 3.0 * np.exp(3 * spread))).root)
@@ -199,25 +161,26 @@ def _with_varied(
     varied: NDArray[np.bool_],
 ) -> Uncertainty:
     """Return the uncertainty if the parameters `varied`, shape (P,), vary and the others are held."""
-    free, scale = problem.parameters.free, derivatives.scale
+    free, scale, idle = problem.parameters.free, derivatives.scale, derivatives.without_effect
     linear = linearise(varied, derivatives)
     noise = _noise(problem, derivatives, linear) if noise is None else noise
     scatter, spread = _scatter(problem, linear, noise)
-    root = regular(solve_triangular(np.linalg.cholesky(scatter), linear.root, lower=True))
+    size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
+    half = np.linalg.cholesky(scatter)
+    root = regular(solve_triangular(half, (linear.changes / size**2).T, lower=True))
     box = replace(estimate_box(problem.parameters, theta), scale=scale, varied=varied)
     posterior = Posterior(box, root)
-    relative, widths = np.full((2, len(theta)), np.nan)
+    relative, widths, prior = np.full((3, len(theta)), np.nan)
     relative[varied] = posterior.deviations
-    widths[varied] = [quantile(each) for each in np.minimum(spread, MAX_LOG_SPREAD)]
-    # where the noise is not well known the intervals are wider, and the flags are set accordingly
+    # where the logarithm of a variance is known to 5 or worse, nothing is, and no interval is of use
+    widths[varied] = [quantile(each) for each in np.minimum(spread, 5.0)]
+    prior[varied] = white_posterior(box, derivatives.prior_slopes[varied]).deviations
+    shares = np.where(varied, np.clip(1 - (relative / prior) ** 2, 0.0, 1.0), 1.0)
+    shares[idle] = 0.0  # not the rounding of their factorisation
+    # where the noise is not well known the intervals are wider, and the flags are set accordingly;
+    # a stated prior limits a parameter to half of what the weak one leaves, or less
     widened = relative * widths / NORMAL
-    prior = white_posterior(box, derivatives.prior_slopes[varied]).deviations
-    shares = np.ones(len(theta))
-    shares[varied] = np.clip(1 - (relative[varied] / prior) ** 2, 0.0, 1.0)
-    shares[derivatives.without_effect] = 0.0  # not the rounding of their factorisation
-    limited = np.zeros(len(theta), dtype=bool)
-    limited[varied] = prior < LIMITED * WEAK_PRIOR
-    unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~limited
+    unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
     relative[unknown] = np.inf
     interval = ends(problem.parameters, theta, scale, widths * relative)
     status: list[ParameterStatus] = []
@@ -225,17 +188,15 @@ def _with_varied(
         if not free[i]:
             status.append(ParameterStatus(Flag.FIXED))
             continue
-        bound: Side | None = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
+        bound = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
         if bound is not None and not unknown[i]:
             interval[i] = np.nan
+        flag = Flag.NO_EFFECT if idle[i] else flag_of(float(widened[i]), shares[i])
         doubt, diverges = float(derivatives.doubt[i]), not np.isfinite(derivatives.slopes[i]).all()
-        flag = Flag.NO_EFFECT if derivatives.without_effect[i] else flag_of(float(widened[i]), shares[i])
-        doubtful = doubt if doubt > DOUBT_ABOVE else None
+        doubtful = doubt if doubt > 0.25 else None
         status.append(ParameterStatus(flag, bound, doubtful, diverges, float(shares[i]), not unknown[i]))
     posterior = replace(posterior, quantile=float(np.nanmax(widths)))  # a quantity may depend on the worst
-    return Uncertainty(
-        theta, derivatives, noise, free, linear, posterior, relative, interval, widths, tuple(status)
-    )
+    return Uncertainty(theta, derivatives, noise, free, linear, posterior, relative, interval, tuple(status))
 
 
 def _scatter(problem: Problem, linear: Linear, noise: tuple[Noise, ...]) -> tuple[Array, Array]:
@@ -256,8 +217,9 @@ def _scatter(problem: Problem, linear: Linear, noise: tuple[Noise, ...]) -> tupl
 
 def _noise(problem: Problem, derivatives: Jacobian, linear: Linear) -> tuple[Noise, ...]:
     """Return each channel's noise before the fit absorbed a part of it."""
-    objective = problem.settings.objective
-    parts = [(linear.effects[:, c.rows], derivatives.residual[c.rows], c) for c in problem.channels]
-    noise = [(channel_noise(c, residual, objective), effects) for effects, residual, c in parts]
-    spread = linear.prior_scatter + np.sum([each.covariance_of(part) for each, part in noise], axis=0)
-    return tuple(each if each.source == "settings" else unbiased(each, part, spread) for each, part in noise)
+    objective, residual = problem.settings.objective, derivatives.residual
+    effects = [linear.effects[:, c.rows] for c in problem.channels]
+    noise = [channel_noise(c, residual[c.rows], objective) for c in problem.channels]
+    pairs = list(zip(noise, effects, strict=True))
+    spread = linear.prior_scatter + np.sum([each.covariance_of(part) for each, part in pairs], axis=0)
+    return tuple(each if each.source == "settings" else unbiased(each, part, spread) for each, part in pairs)

@@ -5,7 +5,6 @@ it is unidentifiable. Parameters that are so by themselves come first; the other
 what is left.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -14,18 +13,9 @@ from numpy.typing import NDArray
 
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
-from hydroid.posterior.posterior import WEAK_PRIOR
+from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import MECHANICAL
-
-MIN_COMPONENT = 0.1
-"""components below this part of the largest are left out of a direction's parameters"""
-
-NEW_ABOVE = 0.5
-"""part of a common scale outside the parameters already named, above which it is a direction of its own"""
-
-Flags = NDArray[np.bool_]
 
 
 class DirectionKind(StrEnum):
@@ -43,22 +33,10 @@ class DirectionKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """One unidentifiable direction.
-
-    Attributes:
-        kind: what it consists of.
-        parameters: relative changes by name of those that take part, the largest +1.
-        relative_sd: standard deviation of the largest relative change; inf where nothing limits it.
-    """
+    """One unidentifiable direction: the relative changes of those that take part, the largest +1."""
 
     kind: DirectionKind
-    parameters: Mapping[str, float]
-    relative_sd: float
-
-    @property
-    def flag(self) -> Flag:
-        """Weakly identifiable, or not identifiable."""
-        return flag_of(self.relative_sd)
+    parameters: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,65 +57,51 @@ class Identifiability:
 def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiability:
     """Return the directions that are determined at an estimate, and those that are not."""
     root, varied = uncertainty.posterior.root, uncertainty.posterior.box.varied
-    names = tuple(n for n, each in zip(problem.parameters.names, varied, strict=True) if each)
+    names = tuple(np.array(problem.parameters.names)[varied].tolist())
     idle = uncertainty.jacobian.without_effect[varied]
     alone = np.linalg.norm(root, axis=0) < 1 / WEAK_ABOVE
-    named = [
-        Direction(kind, {names[i]: 1.0}, _deviation(root, np.eye(len(names))[i]))
-        for kind, which in ((DirectionKind.NO_EFFECT, alone & idle), (DirectionKind.SINGLE, alone & ~idle))
-        for i in np.flatnonzero(which)
-    ]
+    order = [*np.flatnonzero(alone & idle), *np.flatnonzero(alone & ~idle)]
+    kinds = [DirectionKind.NO_EFFECT if idle[i] else DirectionKind.SINGLE for i in order]
+    named = [Direction(kind, {names[i]: 1.0}) for kind, i in zip(kinds, order, strict=True)]
     basis = np.eye(len(names))[~alone]  # of the directions that are not named yet
-    scale = _common_scale(problem, names, root, (idle, alone))
-    if scale is not None:
-        named.append(_combination(names, scale, root, DirectionKind.COMMON_SCALE))
+    quantities = np.array([problem.settings.parameters[name].quantity for name in names])
+    scale = _common_scale(root, np.isin(quantities, list(MECHANICAL)) & ~idle, quantities == "mass")
+    # a weak one is new if most of it lies outside the parameters that are named already
+    if _weak(root, scale) and np.linalg.norm(scale[~alone]) > 0.5 * np.linalg.norm(scale):
+        scale /= scale[np.argmax(np.abs(scale))]
+        parts = {names[i]: float(scale[i]) for i in np.flatnonzero(scale)}
+        named.append(Direction(DirectionKind.COMMON_SCALE, parts))
         basis = np.linalg.svd((scale @ basis.T)[None])[2][1:] @ basis
-    _, values, axes = np.linalg.svd(root @ basis.T, full_matrices=False)
-    weak = (axes @ basis)[values < 1 / WEAK_ABOVE][::-1]
-    named += [_combination(names, one, root) for one in weak]
+    axes = np.linalg.svd(root @ basis.T, full_matrices=False)[2] @ basis
+    named += [_combination(names, axis) for axis in axes[::-1] if _weak(root, axis)]
     return Identifiability(names, len(names) - len(named), tuple(named))
 
 
-def _common_scale(
-    problem: Problem, names: tuple[str, ...], root: Array, flags: tuple[Flags, Flags]
-) -> Array | None:
+def _weak(root: Array, changes: Array) -> bool:
+    """Whether the standard deviation along a direction is above WEAK_ABOVE."""
+    return bool(np.linalg.norm(root @ changes) < np.linalg.norm(changes) / WEAK_ABOVE)
+
+
+def _common_scale(root: Array, linear: NDArray[np.bool_], mass: NDArray[np.bool_]) -> Array:
     """A common factor on all parameters that the equation of motion (1) is linear in, shape (p,).
 
     A fixed mass, such as the jaws', keeps its value. The free masses then deviate from the common factor so
-    that they compensate for it best. None where the data determine the factor, or where most of it is named.
-    `flags`: which parameters have no effect, and which are named by themselves.
+    that they compensate for it best. 0 where there are fewer than two such parameters.
     """
-    idle, named = flags
-    quantities = [problem.settings.parameters[name].quantity for name in names]
-    linear = np.array([q in MECHANICAL for q in quantities]) & ~idle
-    mass = np.array([q == "mass" for q in quantities]) & linear
+    changes, mass = linear.astype(float), linear & mass
     if linear.sum() < 2:
-        return None
-    changes = linear.astype(float)
+        return np.zeros(len(linear))
     if mass.any():
         # a change of 100 % from the common factor counts as much as the noise
         matrix = np.vstack([root[:, mass], np.eye(mass.sum())])
         target = np.append(-root @ changes, np.zeros(mass.sum()))
         changes[mass] += np.linalg.lstsq(matrix, target)[0]
-    weak = np.linalg.norm(root @ changes) < np.linalg.norm(changes) / WEAK_ABOVE
-    new = np.linalg.norm(changes[~named]) > NEW_ABOVE * np.linalg.norm(changes)
-    return changes if weak and new else None
+    return changes
 
 
-def _combination(
-    names: tuple[str, ...], changes: Array, root: Array, kind: DirectionKind = DirectionKind.COMBINATION
-) -> Direction:
-    """Describe a direction by its components, the largest first; those of a common scale in their order."""
+def _combination(names: tuple[str, ...], changes: Array) -> Direction:
+    """Describe a direction by its components of a tenth of the largest or more, the largest first."""
     changes = changes / changes[np.argmax(np.abs(changes))]
-    order = [int(i) for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= MIN_COMPONENT]
-    if kind is DirectionKind.COMMON_SCALE:
-        order = [int(i) for i in np.flatnonzero(changes)]
-    elif len(order) == 1:
-        kind = DirectionKind.SINGLE
-    return Direction(kind, {names[i]: float(changes[i]) for i in order}, _deviation(root, changes))
-
-
-def _deviation(root: Array, changes: Array) -> float:
-    """Standard deviation along a direction; infinite where it is no less than the weak prior's."""
-    found = 1 / float(np.linalg.norm(root @ changes))
-    return found if found * np.linalg.norm(changes) < 0.9 * WEAK_PRIOR else np.inf
+    order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= 0.1]
+    kind = DirectionKind.SINGLE if len(order) == 1 else DirectionKind.COMBINATION
+    return Direction(kind, {names[i]: float(changes[i]) for i in order})

@@ -9,8 +9,6 @@ WEAK_ABOVE = 0.3
 """relative standard deviation above which a parameter or direction is weakly identifiable"""
 UNIDENTIFIABLE_ABOVE = 1.0
 """relative standard deviation above which it is not identifiable: a linear interval then means nothing"""
-MOSTLY = 0.9
-"""share of the information above which the logs, or the priors, are the only source that is named"""
 
 Side = Literal["lower", "upper"]
 
@@ -58,9 +56,8 @@ class ParameterStatus:
         """Where the information comes from; None where there is none, or the parameter is fixed."""
         if self.flag is Flag.FIXED or not self.known:
             return None
-        if self.share > MOSTLY:
-            return Source.DATA
-        return Source.BOTH if self.share >= 1 - MOSTLY else Source.PRIOR
+        # nine tenths of the information are the only source that is named
+        return Source.DATA if self.share > 0.9 else Source.BOTH if self.share >= 0.1 else Source.PRIOR
 
 
 def flag_of(relative_sd: float, share: float = 1.0) -> Flag:

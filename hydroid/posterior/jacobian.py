@@ -13,21 +13,8 @@ from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import Box, differentiate, single_axes
 
-STEP = 1e-3
-"""relative step of the first differences, by each parameter"""
-ROUNDS = 2
-"""rounds of differences along the axes of the covariance at most"""
-FAR = 3.0
-"""relative change of a standard deviation, above which the first axes were so far off that another round
-follows; below it, one changes standard deviations by a few per cent"""
-UNKNOWN = 1.0
-"""relative standard deviation above which it does not matter how large it is"""
-MIN_SCALE = 0.01
-"""part of the bounds' width: a smaller value is changed by parts of this instead of its own"""
 NO_EFFECT_BELOW = 1e-6
 """a parameter whose effect is below this part of the strongest one's has none"""
-FINE_STEP = 1e-4
-"""relative step of what is smooth: the priors, and a design's responses"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +54,8 @@ def jacobian(problem: Problem, theta: Array, first: Array | None = None) -> Jaco
 
     The first differences are by each parameter. Then come rounds of differences, a standard deviation to each
     side along the axes of the covariance that follows. A second round follows where a standard deviation
-    changed by far.
+    changed to four times or a quarter: the first axes were that far off. Below, one changes standard
+    deviations by a few per cent.
 
     Args:
         problem: the problem.
@@ -78,47 +66,46 @@ def jacobian(problem: Problem, theta: Array, first: Array | None = None) -> Jaco
     at, residual = estimate_box(problem.parameters, theta), problem.residuals(theta[None])[0]
     scores = prior_slopes(problem.priors, at)
     weight = prior_weight(problem.channels, residual, problem.settings.objective)
-    slopes = _by_parameter(problem, at, residual) if first is None else first.copy()
+    if first is None:
+        single = single_axes(at, 1e-3)
+        slopes = differentiate(problem.residuals, at, single.one_sided, residual)
+        if not np.isfinite(slopes).all():  # NaN where simulations diverge on both sides
+            slopes = differentiate(problem.residuals, at, single, residual)
+    else:
+        slopes = first.copy()
     diverges = np.logical_not(np.isfinite(slopes).all(axis=1))
     slopes[diverges] = 0.0
-    change = np.zeros(len(slopes))
+    doubt = np.zeros(len(slopes))
     after = white_posterior(at, slopes / weight, scores)
-    rounds = 0
-    while rounds < ROUNDS:
-        rounds += 1
+    for further in (False, True):
         before = after.deviations
         slopes = differentiate(problem.residuals, at, after.axes(step=1.0), residual, slopes)
         after = white_posterior(at, slopes / weight, scores)
-        known = np.minimum(before, after.deviations) < UNKNOWN
+        # above 100 % it does not matter how large a standard deviation is
+        known = np.minimum(before, after.deviations) < 1.0
         change = np.where(known, np.exp(np.abs(np.log(after.deviations / before))) - 1, 0.0)
-        if (change <= FAR).all():
+        doubt = change if further else doubt
+        if (change <= 3.0).all():
             break
-    doubt = change if rounds > 1 else np.zeros(len(slopes))
     effects = np.linalg.norm(slopes, axis=1)
     slopes[effects <= NO_EFFECT_BELOW * effects.max()] = 0.0  # not the rounding that the axes bring
     slopes[diverges] = np.nan
-    free = at.varied
-    all_slopes, all_scores = (np.full((len(theta), part.shape[1]), np.nan) for part in (slopes, scores))
-    all_slopes[free], all_scores[free], doubts = slopes, scores, np.zeros(len(theta))
-    doubts[free] = doubt
-    return Jacobian(residual, all_slopes, all_scores, at.scale, doubts, weight)
 
+    def spread(values: Array, rest: float) -> Array:
+        whole = np.full((len(theta), *values.shape[1:]), rest)
+        whole[at.varied] = values
+        return whole
 
-def _by_parameter(problem: Problem, at: Box, residual: Array) -> Array:
-    """Derivatives by each parameter, (p, R); NaN where simulations diverge on both sides."""
-    single = single_axes(at, STEP)
-    slopes = differentiate(problem.residuals, at, single.one_sided, residual)
-    if np.isfinite(slopes).all():
-        return slopes
-    return differentiate(problem.residuals, at, single, residual)
+    doubts = spread(doubt, 0.0)
+    return Jacobian(residual, spread(slopes, np.nan), spread(scores, np.nan), at.scale, doubts, weight)
 
 
 def estimate_box(parameters: ParameterSet, theta: Array) -> Box:
     """Return theta, (P,), between its bounds, with the scale of relative changes; the free ones vary.
 
-    A relative change of 1 is the value; on a linear scale at least MIN_SCALE of the bounds' width.
+    A relative change of 1 is the value; on a linear scale at least a hundredth of the bounds' width.
     """
-    least = np.where(parameters.log, 0.0, MIN_SCALE * (parameters.upper - parameters.lower))
+    least = np.where(parameters.log, 0.0, 0.01 * (parameters.upper - parameters.lower))
     scale = np.maximum(np.abs(theta), least)
     return Box(theta, parameters.lower, parameters.upper, scale, parameters.free)
 
@@ -127,7 +114,7 @@ def prior_slopes(priors: Priors, at: Box) -> Array:
     """Derivatives of the M priors' scores, shape (p, M), per relative change of each free parameter."""
     if not len(priors):
         return np.zeros((int(at.varied.sum()), 0))
-    return differentiate(priors.scores, at, single_axes(at, FINE_STEP))
+    return differentiate(priors.scores, at, single_axes(at, 1e-4))  # they are smooth
 
 
 def white_posterior(at: Box, *parts: Array) -> Posterior:

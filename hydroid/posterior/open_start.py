@@ -1,8 +1,8 @@
 """The prior of open start angles: how well a log's sensor shows where the arm starts.
 
 A start is wrong by the noise of one reading, or of the mean of a few. A residual shows this noise, and the
-error of the model besides. So it is no more than the residual's level, and no more than WORST unless the
-signal itself jumps more between samples. What the start angles may explain then stays small where the model
+error of the model besides. So it is no more than the residual's level, and no more than 0.2°, or what the
+signal itself jumps between samples. What the start angles may explain then stays small where the model
 errs by degrees. A joint that is not compared has a sensor like the others', and no more noise than its angle
 spreads.
 """
@@ -16,12 +16,7 @@ from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.noise import channel_noise, prior_weight
 from hydroid.problem.free_start import start_slopes
-from hydroid.problem.problem import OpenStart, Problem
-
-WORST = float(np.radians(0.2))
-"""noise of a joint's sensor above which a residual is the model's error (ours)"""
-UNBOUND = 1e9
-"""weight of a start angle without a prior"""
+from hydroid.problem.problem import Problem
 
 
 def with_open_start(problem: Problem, theta: Array) -> Problem:
@@ -39,25 +34,23 @@ def with_open_start(problem: Problem, theta: Array) -> Problem:
 def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
     theta = np.array(values)
     slopes = start_slopes(problem, theta)
-    compared = problem.settings.outputs
-    without_prior = problem.with_open_starts(
-        [each.opened(np.where(np.isin(each.joints, compared), UNBOUND, 0.0)) for each in slopes]
-    )
-    row = without_prior.residuals(theta[None])[0]
+    # first without a prior
+    unbound = [
+        each.opened(np.where(np.isin(each.joints, problem.settings.outputs), 1e9, 0.0)) for each in slopes
+    ]
+    free = problem.with_open_starts(unbound)
+    row, objective = free.residuals(theta[None])[0], problem.settings.objective
     if not np.isfinite(row).all():
-        return without_prior
-    objective = problem.settings.objective
-    weight = prior_weight(problem.channels, row, objective)
-    opened: list[OpenStart] = []
-    for each in slopes:
-        levels = {
-            channel.joint: channel_noise(channel, row[channel.rows], objective).level / channel.weight
-            for channel in problem.channels
-            if channel.log == each.log and channel.quantity == "angle"
-        }
-        deviations = start_deviations(problem.logs[each.log], each.joints, levels)
-        opened.append(each.opened(deviations / weight))
-    return problem.with_open_starts(opened)
+        return free
+    weight, levels = prior_weight(problem.channels, row, objective), dict[int, dict[int, float]]()
+    for channel in problem.channels:
+        if channel.quantity == "angle":
+            level = channel_noise(channel, row[channel.rows], objective).level / channel.weight
+            levels.setdefault(channel.log, {})[channel.joint] = level
+    deviations = [start_deviations(problem.logs[each.log], each.joints, levels[each.log]) for each in slopes]
+    return problem.with_open_starts(
+        [each.opened(sd / weight) for each, sd in zip(slopes, deviations, strict=True)]
+    )
 
 
 def start_deviations(log: Log, joints: Sequence[int], levels: Mapping[int, float]) -> Array:
@@ -78,4 +71,5 @@ def sensor_noise(log: Log, joint: int, level: float) -> float:
     The third difference of white noise has 20 times its variance, and that of a motion is next to nothing.
     """
     jumps = np.diff(log.angle[:, joint - 1], n=3)
-    return min(level, max(WORST, float(np.sqrt(np.mean(jumps**2) / 20)) if len(jumps) else 0.0))
+    shown = float(np.sqrt(np.mean(jumps**2) / 20)) if len(jumps) else 0.0
+    return min(level, max(float(np.radians(0.2)), shown))

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.stats import norm as normal
 
-from hydroid.errors import RunError
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
@@ -32,8 +31,6 @@ WEAK_PRIOR = 10.0
 """relative standard deviation of every parameter before any log and any stated prior (ours)"""
 STEP = 0.1
 """step of the differences in standard deviations: wide enough for the small jumps that events make"""
-GIVEN_BELOW = 1e-3
-"""relative change per relative change of any free parameter, below which the settings give a quantity"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,23 +146,23 @@ class Posterior:
         with np.errstate(over="ignore"):
             factor = np.exp(half[logarithmic] / value[logarithmic])
         interval[logarithmic] = np.stack([value[logarithmic] / factor, value[logarithmic] * factor], axis=1)
-        lost = self.undetermined(slopes, sd) | (logarithmic & (half > UNIDENTIFIABLE_ABOVE * NORMAL * value))
+        lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
+        lost |= logarithmic & (half > UNIDENTIFIABLE_ABOVE * NORMAL * value)
         sd[lost] = np.inf
         interval[lost] = -np.inf, np.inf
         interval[lost & positive] = 0.0, np.inf
-        return Known(value, sd, interval, np.all(abs(slopes) <= GIVEN_BELOW * abs(value), axis=0), slopes)
-
-    def undetermined(self, slopes: Array, sd: Array) -> NDArray[np.bool_]:
-        """Which quantities, (m,), parameters known to 100 % each would determine as well."""
-        return sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
+        # a relative change by less than a thousandth of a parameter's: the settings give it
+        return Known(value, sd, interval, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0), slopes)
 
     def stored(self, parameters: ParameterSet) -> Covariance:
         """Return what a file keeps of it."""
         varied = self.box.varied
-        names = tuple(n for n, each in zip(parameters.names, varied, strict=True) if each)
-        root = tuple(tuple(row) for row in self.root.tolist())
-        scale = tuple(self.box.scale[varied].tolist())
-        return Covariance(parameters=names, scale=scale, root=root, quantile=self.quantile)
+        return Covariance(
+            parameters=tuple(np.array(parameters.names)[varied].tolist()),
+            scale=tuple(self.box.scale[varied].tolist()),
+            root=tuple(map(tuple, self.root.tolist())),
+            quantile=self.quantile,
+        )
 
 
 def regular(rows: Array) -> Array:
@@ -183,26 +180,13 @@ def stored_posterior(model: IdentifiedModel) -> Posterior | None:
     if model.summary is None or covariance is None:
         return None
     parameters, fitted = model.settings.parameter_set(), model.summary.estimate
-    free = {n for n, each in zip(parameters.names, parameters.free, strict=True) if each}
-    held = {n for n in free if n in fitted and fitted[n].at_bound}
-    if not free - held <= set(covariance.parameters) <= free:
+    free = {p.name for p in parameters.parameters if p.fixed is None}
+    if any(name not in fitted or model.values[name] != fitted[name].value for name in free):
         return None
-    if any(n not in fitted or model.values[n] != fitted[n].value for n in free):
+    held = {name for name in free if fitted[name].at_bound}
+    if not free - held <= set(covariance.parameters) <= free:
         return None
     scale, varied = np.zeros(len(model.theta)), np.isin(parameters.names, covariance.parameters)
     scale[varied] = covariance.scale
     box = Box(model.theta, parameters.lower, parameters.upper, scale, varied)
     return Posterior(box, np.array(covariance.root), covariance.quantile)
-
-
-def required_posterior(model: IdentifiedModel) -> Posterior:
-    """Return the posterior that a fit kept.
-
-    Raises:
-        RunError: there is none for these parameters.
-    """
-    found = stored_posterior(model)
-    if found is None:
-        hint = "name the folder of a fit, with the settings that it used"
-        raise RunError("holds no covariance of these parameters", where=model.source, hint=hint)
-    return found

@@ -1,14 +1,14 @@
 """Intervals without the linear approximation: profile likelihood."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
-from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty, at_bounds, linearise
+from hydroid.parameters import Array, ParameterSet
+from hydroid.posterior.covariance import Uncertainty, at_bounds
 from hydroid.posterior.open_start import with_open_start
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.problem.problem import Problem
@@ -17,19 +17,10 @@ from hydroid.settings.search import RefinementSettings
 
 THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
-STEPS_PER_REACH = 6
-"""points of a profile on each side, if the deviance is the parabola of the linear approximation"""
-REACH = 3.0
-"""standard deviations that these points then reach; they reach the bound of an unidentifiable parameter"""
-MAX_POINTS = 12
-"""points on each side at most; the steps grow after STEPS_PER_REACH"""
-ZOOMS = 4
-"""times that steps are made smaller because the interval ends within the first two"""
-BETTER_BELOW = -0.1
-"""deviance below which a profile has reached a better optimum; above it, only rounding"""
-QUICK = RefinementSettings(iterations=50, gain_tolerance=1e-6)
-Residuals = Callable[[Array], Array]
-"""(n, P) -> (n, R + M): residuals with the priors' weighted scores behind them, as in a refinement"""
+STEPS = 6
+"""points on each side before the steps grow: they reach three standard deviations, or the bound"""
+Points = list[tuple[float, Array]]
+"""deviances, and all parameters there, shape (P,)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +34,7 @@ class Profile:
         interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
         lowest: all parameters at the point of the lowest deviance, shape (P,).
         bounded: other parameters that lie at a bound somewhere within the interval.
+        gain: by which the sum of squares there is below the estimate's.
     """
 
     name: str
@@ -51,11 +43,12 @@ class Profile:
     interval: tuple[float, float]
     lowest: Array
     bounded: tuple[str, ...] = ()
+    gain: float = 0.0
 
     @property
     def better_optimum(self) -> bool:
-        """Whether a point fits better than the estimate, which then is no optimum."""
-        return bool(self.deviance.min() < BETTER_BELOW)
+        """Whether a point fits better than the estimate, which then is no optimum, by more than rounding."""
+        return bool(self.deviance.min() < -0.1)
 
 
 def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
@@ -67,107 +60,91 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     Raises:
         SettingsError: no free parameter of that name.
     """
-    names = problem.parameters.names
-    if name not in names or not uncertainty.free[names.index(name)]:
-        free = ", ".join(n for n, is_free in zip(names, uncertainty.free, strict=True) if is_free)
-        raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {free}")
-    i = names.index(name)
-    theta, residuals = uncertainty.theta, _with_priors(problem, uncertainty)
+    parameters, theta = problem.parameters, uncertainty.theta
+    known = {p.name: i for i, p in enumerate(parameters.parameters) if p.fixed is None}
+    if name not in known:
+        raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {', '.join(known)}")
+    i = known[name]
+    opened, weight = with_open_start(problem, theta), uncertainty.jacobian.prior_weight
+
+    def residuals(theta: Array) -> Array:
+        return np.hstack([opened.residuals(theta), weight * problem.priors.scores(theta)])
+
     cost, unit = float(np.sum(residuals(theta[None])[0] ** 2)), _deviance_unit(uncertainty, i)
 
     def point(start: Array, value: float) -> tuple[float, Array]:
-        others, square = _fit_others(problem, residuals, start, i, value)
-        return (square - cost) / unit, others
+        best, square = _fit_others(parameters, residuals, start, i, value)
+        return (square - cost) / unit, best
 
-    reach = REACH * float(uncertainty.standard_deviation[i])
-    sides: list[list[tuple[float, Array]]] = []
-    for bound in (problem.parameters.lower[i], problem.parameters.upper[i]):
-        room = float(bound - theta[i])
-        step = float(np.sign(room)) * min(abs(room), reach) / STEPS_PER_REACH
-        sides.append(_walk(point, theta, i, float(bound), step))
+    deviation = float(uncertainty.standard_deviation[i])
+    reach = np.inf if np.isnan(deviation) else 3.0 * deviation  # NaN: it lies at a bound
+    sides = [_side(point, theta, i, float(ends[i]), reach) for ends in (parameters.lower, parameters.upper)]
     points = [*reversed(sides[0]), (0.0, theta), *sides[1]]
-    deviance, values = np.array([d for d, _ in points]), np.array([t[i] for _, t in points])
-    centre = len(sides[0])
-    interval = (
-        _crossing(values[centre::-1], deviance[centre::-1], -np.inf),
-        _crossing(values[centre:], deviance[centre:], np.inf),
-    )
-    within = np.array([t for d, t in points if d <= THRESHOLD])
+    deviance, rows = np.array([d for d, _ in points]), np.array([t for _, t in points])
+    centre, values = len(sides[0]), rows[:, i]
+    left = _crossing(values[centre::-1], deviance[centre::-1], -np.inf)
+    interval = left, _crossing(values[centre:], deviance[centre:], np.inf)
+    within, best = rows[deviance <= THRESHOLD], int(np.argmin(deviance))
     bounded = tuple(
-        parameter.name
-        for j, parameter in enumerate(problem.parameters.parameters)
-        if j != i and uncertainty.free[j] and any(at.any() for _, at in at_bounds(parameter, within[:, j]))
+        other
+        for other, j in known.items()
+        if j != i and any(at.any() for _, at in at_bounds(parameters.parameters[j], within[:, j]))
     )
-    return Profile(name, values, deviance, interval, points[int(np.argmin(deviance))][1], bounded)
+    return Profile(name, values, deviance, interval, rows[best], bounded, -unit * float(deviance[best]))
 
 
-def better_optimum(problem: Problem, uncertainty: Uncertainty, profiles: Sequence[Profile]) -> Array | None:
+def better_optimum(profiles: Sequence[Profile]) -> Array | None:
     """Return the best of all parameters that profiles reached, shape (P,); None: the estimate."""
-    lowest = [p.lowest for p in profiles if p.better_optimum]
-    if not lowest:
-        return None
-    cost = np.sum(_with_priors(problem, uncertainty)(np.array(lowest)) ** 2, axis=1)
-    return lowest[int(np.argmin(cost))]
+    better = [one for one in profiles if one.better_optimum]
+    return max(better, key=lambda one: one.gain).lowest if better else None
 
 
-def _walk(
-    point: Callable[[Array, float], tuple[float, Array]], theta: Array, i: int, bound: float, step: float
-) -> list[tuple[float, Array]]:
+def _side(
+    point: Callable[[Array, float], tuple[float, Array]], theta: Array, i: int, bound: float, reach: float
+) -> Points:
     """Deviances and refitted parameters at values ever further from the estimate.
 
-    The walk ends beyond THRESHOLD or at the bound. Where fewer than three steps lead there, shorter ones are
-    taken.
+    The walk ends beyond THRESHOLD or at the bound, or after twelve points. Where fewer than three steps lead
+    beyond THRESHOLD, they are taken again six times as fine.
     """
-    points: list[tuple[float, Array]] = []
-    for _ in range(ZOOMS if step else 0):
-        points, value, length = [], float(theta[i]), step
-        while value != bound and len(points) < MAX_POINTS and not (points and points[-1][0] > THRESHOLD):
-            length *= 1.5 if len(points) >= STEPS_PER_REACH else 1.0
+    points: Points = []
+    end, room = float(np.clip(bound, theta[i] - reach, theta[i] + reach)), bound - float(theta[i])
+    for _ in range(4 if room else 0):
+        points, value, length = [], float(theta[i]), (end - float(theta[i])) / STEPS
+        while value != bound and len(points) < 2 * STEPS and not (points and points[-1][0] > THRESHOLD):
+            length *= 1.5 if len(points) >= STEPS else 1.0
             value += length
-            if abs(bound - value) < 1e-6 * abs(length) or (value - bound) * step > 0:
+            if abs(bound - value) < 1e-6 * abs(length) or (value - bound) * length > 0:
                 value = bound
             points.append(point(points[-1][1] if points else theta, value))
         if len(points) > 2 or points[-1][0] <= THRESHOLD:
             break
-        step = (float(points[-1][1][i]) - float(theta[i])) / STEPS_PER_REACH
+        end = float(points[-1][1][i])
     return points
 
 
-def _with_priors(problem: Problem, uncertainty: Uncertainty) -> Residuals:
-    weight, problem = uncertainty.jacobian.prior_weight, with_open_start(problem, uncertainty.theta)
-    return lambda theta: np.hstack([problem.residuals(theta), weight * problem.priors.scores(theta)])
-
-
 def _fit_others(
-    problem: Problem, residuals: Residuals, start: Array, i: int, value: float
+    parameters: ParameterSet, residuals: Callable[[Array], Array], start: Array, i: int, value: float
 ) -> tuple[Array, float]:
     """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
-    parameters, column = problem.parameters, int(np.sum(problem.parameters.free[:i]))
-
-    def full(unit: Array) -> Array:
-        theta = parameters.from_unit(np.insert(unit, column, 0.5, axis=1))
-        theta[:, i] = value
-        return theta
-
-    unit = np.delete(parameters.to_unit(start[None])[0], column)
-    if not unit.size:
-        theta = full(np.empty((1, 0)))
-        return theta[0], float(np.sum(residuals(theta)[0] ** 2))
-    result = least_squares(unit, lambda points: residuals(full(points)), QUICK)
-    return full(result.point[None])[0], 2 * result.cost
+    held = [replace(p, fixed=value) if j == i else p for j, p in enumerate(parameters.parameters)]
+    others, theta = ParameterSet(tuple(held)), start.copy()
+    theta[i] = value
+    if others.free.any():
+        unit, how = others.to_unit(start[None])[0], RefinementSettings(iterations=50, gain_tolerance=1e-6)
+        ended = least_squares(unit, lambda points: residuals(others.from_unit(points)), how)
+        return others.from_unit(ended.point[None])[0], 2 * ended.cost
+    return theta, float(np.sum(residuals(theta[None])[0] ** 2))
 
 
 def _deviance_unit(uncertainty: Uncertainty, i: int) -> float:
-    """Rise of the sum of squares that is one unit of deviance of parameter i: its variance over (J J')^-1."""
-    free = uncertainty.free
-    bread = np.sum(linearise(free, uncertainty.jacobian).changes ** 2, axis=1)
-    relative = uncertainty.relative[free]
-    known, column = np.isfinite(relative), int(np.sum(free[:i]))
-    if known[column]:
-        return float(relative[column] ** 2 / bread[column])
-    if known.any():
-        return float(np.max(relative[known] ** 2 / bread[known]))
-    return float(np.mean([noise.level**2 for noise in uncertainty.noise]))
+    """Rise of the sum of squares that is one unit of deviance of parameter i: its variance over (J J')^-1.
+
+    Of one that is held at a bound, the largest of the others'.
+    """
+    varied = uncertainty.posterior.box.varied
+    units = uncertainty.posterior.deviations**2 / np.sum(uncertainty.linear.changes**2, axis=1)
+    return float(units[int(np.sum(varied[:i]))] if varied[i] else units.max())
 
 
 def _crossing(values: Array, deviance: Array, unlimited: float) -> float:
@@ -177,5 +154,4 @@ def _crossing(values: Array, deviance: Array, unlimited: float) -> float:
         return unlimited
     b = int(above[0])
     root = np.sqrt(np.maximum(deviance[b - 1 : b + 1], 0.0))
-    part = (np.sqrt(THRESHOLD) - root[0]) / (root[1] - root[0])
-    return float(values[b - 1] + part * (values[b] - values[b - 1]))
+    return float(np.interp(np.sqrt(THRESHOLD), root, values[b - 1 : b + 1]))

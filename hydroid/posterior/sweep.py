@@ -11,10 +11,6 @@ from hydroid.posterior.jacobian import jacobian
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 
-SWEEP_POINTS = 20
-"""values of each parameter within its bounds, as in the article"""
-BATCH = 256
-"""points of a surface between two reports of progress"""
 WIDE = 20.0
 """ratio of the bounds above which a surface has equal ratios instead of equal steps"""
 
@@ -27,8 +23,8 @@ class Sweep:
         free: indices of the F free parameters, shape (F,).
         slopes: change of each channel per 1 % of each free parameter [rad or Pa], one array (F, T) per
             channel; NaN where the simulation diverges.
-        values: of each free parameter within its bounds, shape (F, SWEEP_POINTS).
-        responses: each channel at these [rad or Pa], one array (F, SWEEP_POINTS, T) per channel.
+        values: of each free parameter, 20 within its bounds as in the article, shape (F, 20).
+        responses: each channel at these [rad or Pa], one array (F, 20, T) per channel.
     """
 
     free: NDArray[np.intp]
@@ -42,20 +38,23 @@ def sweep(problem: Problem, theta: Array, progress: Progress = no_progress) -> S
 
     Slopes are those of `jacobian`; 1 % of a value near 0 is 1 % of its scale.
     """
-    parameters = problem.parameters
+    parameters, channels = problem.parameters, problem.channels
     free = np.flatnonzero(parameters.free)
     slopes = -0.01 * jacobian(problem, theta).slopes[free]
-    values = np.array([parameters.parameters[i].at(np.linspace(0, 1, SWEEP_POINTS)) for i in free])
-    responses = tuple(np.empty((*values.shape, len(c.measured))) for c in problem.channels)
-    for i, column in enumerate(free):
-        points = np.tile(theta, (SWEEP_POINTS, 1))
-        points[:, column] = values[i]
-        rows = problem.residuals(points)
-        for channel, response in zip(problem.channels, responses, strict=True):
-            response[i] = channel.measured - rows[:, channel.rows] / channel.weight
-        progress("values of parameters", SWEEP_POINTS * (i + 1), values.size)
-    changes = tuple(slopes[:, channel.rows] / channel.weight for channel in problem.channels)
-    return Sweep(free, changes, values, responses)
+    values = np.array([parameters.parameters[i].at(np.linspace(0, 1, 20)) for i in free])
+    rows: list[Array] = []
+    for column, swept in zip(free, values, strict=True):
+        points = np.tile(theta, (len(swept), 1))
+        points[:, column] = swept
+        rows.append(problem.residuals(points))
+        progress("values of parameters", len(rows) * len(swept), values.size)
+    residuals = np.array(rows)
+    return Sweep(
+        free,
+        tuple(slopes[:, c.rows] / c.weight for c in channels),
+        values,
+        tuple(c.measured - residuals[:, :, c.rows] / c.weight for c in channels),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +81,6 @@ class Surface:
         row, column = np.unravel_index(int(np.argmin(self.error)), self.error.shape)
         return float(self.values[0][row]), float(self.values[1][column]), float(self.error[row, column])
 
-    @property
-    def infeasible(self) -> int:
-        """Points whose simulation diverges or that no arm can have."""
-        return int(np.sum(~np.isfinite(self.error)))
-
 
 def surface(
     problem: Problem,
@@ -110,33 +104,29 @@ def surface(
             raise SettingsError(f"no parameter {name!r}", where="--over", hint=f"known: {', '.join(known)}")
     if names[0] == names[1]:
         raise SettingsError(f"{names[0]} stands there twice", where="--over", hint="name two parameters")
-    first, second = (known.index(name) for name in names)
-    chosen = problem.parameters.parameters[first], problem.parameters.parameters[second]
-    values = _axis(chosen[0], theta[first], points, around), _axis(chosen[1], theta[second], points, around)
-    shape = len(values[0]), len(values[1])
-    grid = np.tile(theta, (shape[0] * shape[1] + 1, 1))  # the last row is the estimate
-    grid[:-1, first], grid[:-1, second] = (a.ravel() for a in np.meshgrid(*values, indexing="ij"))
+    at = [known.index(name) for name in names]
+    first, second = (problem.parameters.parameters[i] for i in at)
+    values = _axis(first, theta[at[0]], points, around), _axis(second, theta[at[1]], points, around)
+    pairs = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1)
+    grid = np.tile(theta, (pairs.size // 2 + 1, 1))  # the last row is the estimate
+    grid[:-1, at] = pairs.reshape(-1, 2)
     error = np.empty(len(grid))
-    for start in range(0, len(grid), BATCH):
-        error[start : start + BATCH] = problem.evaluate(grid[start : start + BATCH]).overall
-        progress(f"{names[0]}, {names[1]}: points", min(start + BATCH, len(grid)), len(grid))
-    estimate = float(theta[first]), float(theta[second])
-    return Surface(chosen, values, error[:-1].reshape(shape), estimate, float(error[-1]))
+    for start in range(0, len(grid), 256):
+        error[start : start + 256] = problem.evaluate(grid[start : start + 256]).overall
+        progress(f"{names[0]}, {names[1]}: points", min(start + 256, len(grid)), len(grid))
+    estimate = float(theta[at[0]]), float(theta[at[1]])
+    return Surface((first, second), values, error[:-1].reshape(pairs.shape[:2]), estimate, float(error[-1]))
 
 
 def _axis(parameter: Parameter, value: float, points: int, around: float | None) -> Array:
     """Values of one parameter on the grid, and the estimate where it lies within them and is none of them."""
-    if around is None:
-        low, high = parameter.lower, parameter.upper
-        hint = "give a distance around the estimate with --around"
-    else:
+    low, high, hint = parameter.lower, parameter.upper, "give a distance around the estimate with --around"
+    if around is not None:
         low, high = sorted((value * (1 - around), value * (1 + around)))
-        low = max(low, 0.0)  # no quantity may be negative
-        hint = "leave --around out"
+        low, hint = max(low, 0.0), "leave --around out"  # no quantity may be negative
     if not low < high:
-        raise SettingsError(
-            f"{parameter.name} has no range from {low:g} to {high:g}", where="--over", hint=hint
-        )
+        what = f"{parameter.name} has no range from {low:g} to {high:g}"
+        raise SettingsError(what, where="--over", hint=hint)
     wide = around is None and low > 0 and high > WIDE * low
     grid = np.geomspace(low, high, points) if wide else np.linspace(low, high, points)
     known = not low <= value <= high or np.isclose(grid, value, rtol=1e-12, atol=0.0).any()

@@ -40,7 +40,8 @@ def test_a_given_white_noise_gives_the_textbook_covariance():
     np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-7)
     outer = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     sign = np.sign(np.outer(theta, theta))  # relative changes of a negative parameter count the other way
-    np.testing.assert_allclose(found.correlation * np.abs(sign), expected / outer, atol=1e-6)
+    relative = found.posterior.covariance / np.outer(found.relative, found.relative)
+    np.testing.assert_allclose(relative * np.abs(sign), expected / outer, atol=1e-6)
     assert problem.simulated == 1 + 3 + 2 * 3  # by each parameter, and one round along the axes
 
 
@@ -299,6 +300,6 @@ def test_a_profile_from_no_optimum_finds_the_better_one():
     np.testing.assert_allclose(found.lowest, theta, atol=0.3 * deviation)
     cost = np.sum(problem.residuals(np.stack([off, found.lowest])) ** 2, axis=1)
     assert cost[1] < cost[0]
-    assert better_optimum(problem, uncertainty(problem, off), [found]) is found.lowest
-    at = uncertainty(problem, theta)
-    assert better_optimum(problem, at, [profile(problem, at, "b")]) is None
+    assert better_optimum([found]) is found.lowest
+    assert found.gain == pytest.approx(cost[0] - cost[1])
+    assert better_optimum([profile(problem, uncertainty(problem, theta), "b")]) is None

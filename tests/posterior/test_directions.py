@@ -46,9 +46,9 @@ def test_the_three_null_directions_of_the_solenoids_are_not_identifiable():
     problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **OPEN)
     flags = flags_of(problem, told)
     assert {n for n, f in flags.items() if f is Flag.UNIDENTIFIABLE} == {"I_max", "I_min", *COIL}
-    null = [d for d in found.unidentifiable if d.flag is Flag.UNIDENTIFIABLE]
-    assert len(null) == 3
-    assert {name for d in null for name in d.parameters} <= {"I_max", "I_min", *COIL}
+    assert np.sum(np.linalg.svd(told.posterior.root)[1] < 1) == 3
+    assert len(found.unidentifiable) == 3
+    assert {name for d in found.unidentifiable for name in d.parameters} <= {"I_max", "I_min", *COIL}
 
 
 def test_m1_has_no_effect_and_one_scale_of_all_is_open(mech):
@@ -57,7 +57,6 @@ def test_m1_has_no_effect_and_one_scale_of_all_is_open(mech):
     assert (first.kind, list(first.parameters)) == (DirectionKind.NO_EFFECT, ["M1"])
     direction = next(d for d in others if d.kind is DirectionKind.COMMON_SCALE)
     assert list(direction.parameters) == ["K", "D", "S", "M2", "M3", "M4", "M5", "M6"]
-    assert direction.flag is Flag.UNIDENTIFIABLE
     # but for the known jaws K, D and S scale by one factor, and so does the one mass that dwarfs the jaws
     scale = np.array(list(direction.parameters.values()))
     np.testing.assert_allclose(scale[:3] / scale[0], 1.0, atol=0.02)
@@ -114,7 +113,8 @@ def test_pins_close_the_hydraulic_directions(pins, open_):
     problem, told, found = look("article-hyd", HYD | COIL, **QUIET, **pins)
     known = zip(problem.parameters.names, told.status, strict=True)
     assert {n for n, s in known if s.flag is Flag.UNIDENTIFIABLE and s.source is not Source.PRIOR} == open_
-    assert bool(open_) == any(direction.flag is Flag.UNIDENTIFIABLE for direction in found.unidentifiable)
+    assert bool(open_) == bool((np.linalg.svd(told.posterior.root)[1] < 1).any())
+    assert bool(found.unidentifiable) >= bool(open_)
 
 
 def test_a_parameter_that_drowns_in_the_noise_by_itself_is_named_so():

@@ -38,7 +38,7 @@ def measured(bench: Bench, estimate: Candidates) -> dict[str, list[float]]:
     """All quantities of one candidate by name; curves in the order of their points."""
     found: dict[str, list[float]] = {}
     for column, value in sorted(joint_measure(bench, estimate)(estimate), key=lambda pair: pair[0].at):
-        found.setdefault(column.name, []).append(float(value[0]))
+        found.setdefault(f"joint{bench.joint}_{column.name}", []).append(float(value[0]))
     return found
 
 

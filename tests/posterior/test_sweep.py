@@ -9,7 +9,7 @@ import pytest
 from hydroid import load_settings
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.posterior.sweep import SWEEP_POINTS, Sweep, surface, sweep
+from hydroid.posterior.sweep import Sweep, surface, sweep
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.analysis_report import analysis_page, landscape
@@ -49,7 +49,7 @@ def test_a_parameter_without_effect_moves_nothing_within_its_bounds(problem: Pro
     idle = list(TRUTH).index("M1")
     assert np.abs(swept.slopes[0][idle]).max() < 1e-9 * np.abs(swept.slopes[0]).max()
     assert np.ptp(swept.responses[0][idle], axis=0).max() < 1e-9
-    assert swept.responses[0].shape == (9, SWEEP_POINTS, len(problem.logs[0].time))
+    assert swept.responses[0].shape == (9, 20, len(problem.logs[0].time))
 
 
 def test_sensitivity_of_free_parameters_is_written_in_the_readers_units(study_log: Log, tmp_path: Path):
@@ -80,7 +80,6 @@ def test_the_surface_of_noise_free_data_is_lowest_at_the_truth(problem: Problem)
     error = result.error.copy()
     error[0, 0] = np.inf
     holed = replace(result, error=error)
-    assert holed.infeasible == 1
     assert np.isfinite(holed.lowest[2])
     (panel,) = landscape(holed, problem.settings.objective).panels
     assert "infeasible (1 points)" in [mark.label for mark in panel.marks]

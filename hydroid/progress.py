@@ -1,7 +1,8 @@
-"""How long work reports its progress."""
+"""How work reports its progress: calls while it runs, and lines of its loggers."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 
 NOTE = logging.INFO + 5
 """level of a log line that a user sees though nothing is wrong"""
@@ -13,3 +14,18 @@ Progress = Callable[[str, int, int], None]
 
 def no_progress(what: str, done: int, total: int) -> None:
     """Show nothing."""
+
+
+@contextmanager
+def logging_to(handler: logging.Handler) -> Generator[None]:
+    """Let a handler take the lines of hydroid's loggers, INFO and above."""
+    logger = logging.getLogger("hydroid")
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+        handler.close()

@@ -3,11 +3,12 @@
 import json
 import logging
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
     from hydroid.commands.result import Printed
@@ -64,8 +65,7 @@ def _print_json(content: dict[str, Any]) -> None:
     typer.echo(json.dumps({"schema": SCHEMA} | content, ensure_ascii=False, allow_nan=False))
 
 
-@contextmanager
-def log_lines(*, verbose: bool, quiet: bool) -> Generator[None]:
+def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:
     """Print warnings and notes of hydroid's loggers, nothing where quiet, every line where verbose.
 
     An error is not among them: it ends the command, which prints it.
@@ -74,15 +74,7 @@ def log_lines(*, verbose: bool, quiet: bool) -> Generator[None]:
     form = "%(asctime)s %(levelname)-7s %(message)s" if verbose else "hydroid: %(message)s"
     handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     handler.addFilter(lambda record: verbose or (logging.INFO < record.levelno < logging.ERROR and not quiet))
-    logger = logging.getLogger("hydroid")
-    level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)
-        logger.removeHandler(handler)
+    return logging_to(handler)
 
 
 class _Terminal(logging.Handler):

@@ -1,6 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import logging
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -81,7 +82,7 @@ def fit(
     from hydroid.fitting.search import check_search
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
-    from hydroid.run.run_log import log_end, log_start
+    from hydroid.run.run_log import log_start
 
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
@@ -102,7 +103,10 @@ def fit(
         except Exception as error:
             _log.error("ended by %s: %s", type(error).__name__, error)
             raise
-        log_end(result.fit, time.monotonic() - began)
+        simulated, diverged = map(int, result.fit.history[-1, 2:4])
+        rms = math.degrees(result.fit.best.rms)
+        _log.info("search: %d parameter sets simulated, %d of them diverged", simulated, diverged)
+        _log.info("done in %.0f s: %s, rms error %.6g deg", time.monotonic() - began, result.fit.final, rms)
     return result
 
 
@@ -138,5 +142,5 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
         advised = advice(last, fit.uncertainty, fit.quantities, run=run, thorough=False)
     save_result(folder.path, fit_result(last, fit, advised))
     draw([folder.path], folder.path)
-    folder.done(dict(fit.seconds) | {"report": time.monotonic() - began})
+    folder.status("done", seconds=dict(fit.seconds) | {"report": time.monotonic() - began})
     return result

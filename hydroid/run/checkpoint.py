@@ -1,22 +1,19 @@
 """A run's checkpoints as a file: whole, checked before it is believed, and the one before it kept."""
 
-import hashlib
-import io
 import logging
 from collections import UserDict
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.errors import RunError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.fitting.checkpoints import Arrays
+from hydroid.run.archive import pack, unpack
 
 _log = logging.getLogger(__name__)
 
 
 class CheckpointFile(UserDict[str, Arrays]):
-    """Checkpoints by name; every change is written to one file, as npz without pickle.
+    """Checkpoints by name; every change is written to one file.
 
     The file before it is kept as `checkpoint.previous.npz`. Where the newest one is damaged, it is put aside
     as `checkpoint.damaged.npz` with a warning, and the one before it is taken: what the run did since is done
@@ -41,21 +38,16 @@ class CheckpointFile(UserDict[str, Arrays]):
 
     def __setitem__(self, name: str, arrays: Arrays) -> None:
         self.data[name] = arrays
-        flat = {f"{n}/{part}": array for n, several in self.data.items() for part, array in several.items()}
-        flat["run"] = np.array(self._run)
-        buffer = io.BytesIO()
+        # sorted: what a run ends with does not depend on where it was interrupted
+        tree = {part: dict(sorted(self.data[part].items())) for part in sorted(self.data)}
         with undisturbed():
-            # sorted: what a run ends with does not depend on where it was interrupted
-            np.savez(buffer, checksum=_checksum(flat), **dict(sorted(flat.items())))  # pyright: ignore
-            write_atomic(self._file, buffer.getvalue(), keep=self._previous)
+            packed = pack({"run": self._run, "parts": tree}, compressed=False)
+            write_atomic(self._file, packed, keep=self._previous)
 
     def _read(self, file: Path, *before: Path) -> dict[str, Arrays]:
         """Read a file; where it is damaged, the one before it."""
         try:
-            with np.load(file, allow_pickle=False) as data:
-                flat: Arrays = {name: data[name] for name in data.files}
-            if flat.pop("checksum") != _checksum(flat):
-                raise ValueError("checksum")
+            content = unpack(file)
         except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
             damage = f"is damaged ({type(error).__name__})"
             if not before:
@@ -65,19 +57,6 @@ class CheckpointFile(UserDict[str, Arrays]):
             _log.warning("%s: %s; going on from the checkpoint before it", file, damage)
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
-        if str(flat.pop("run")) != self._run:
+        if content["run"] != self._run:
             raise RunError("is another run's", where=str(file), hint="put the run's own checkpoint back")
-        result: dict[str, Arrays] = {}
-        for key, array in flat.items():
-            name, _, part = key.partition("/")
-            result.setdefault(name, {})[part] = array
-        return result
-
-
-def _checksum(arrays: Arrays) -> str:
-    """Of names, types, shapes and contents: the zip's own CRC is not looked at where a header lies."""
-    digest = hashlib.sha256()
-    for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+        return content["parts"]

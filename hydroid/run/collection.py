@@ -3,7 +3,7 @@
 import glob
 import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,9 @@ import numpy as np
 
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, FitSummary, read_estimate
-from hydroid.identified_model import ARM, CONFIG
 from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
-from hydroid.run.identity import file_hash, other_settings
+from hydroid.run.identity import difference
 from hydroid.settings.fit import FitSettings
 
 _log = logging.getLogger(__name__)
@@ -84,15 +83,20 @@ def read_runs(names: Sequence[str], out: Path) -> Runs:
         except HydroidError as error:
             _log.warning("left out: %s", error)
     if not runs:
-        raise RunError(
-            "no finished run is there", where=" ".join(names), hint="resume those that were stopped"
-        )
-    runs.sort(key=lambda run: (run.seed, run.path))
-    _refuse_others(*runs)
-    once: dict[int, Run] = {}
-    for run in runs:
-        if (kept := once.setdefault(run.seed, run)) is not run:
+        hint = "resume those that were stopped"
+        raise RunError("no finished run is there", where=" ".join(names), hint=hint)
+    first, *others = sorted(runs, key=lambda run: (run.seed, run.path))
+    once, differing = {first.seed: first}, 0
+    for run in others:
+        other = (run.identity, run.settings), (first.identity, first.settings)
+        if text := difference(*other, but="search.seed"):
+            _log.warning("%s: %s", run.path, text)
+            differing += 1
+        elif (kept := once.setdefault(run.seed, run)) is not run:
             _log.warning("left out: %s: has seed %d, as %s has", run.path, run.seed, kept.path)
+    if differing:
+        what = f"{differing} of {len(runs)} runs differ from {first.path} in more than the seed"
+        raise RunError(what, hint="collect them apart")
     return Runs(tuple(once.values()))
 
 
@@ -113,50 +117,10 @@ def _read(path: Path) -> Run:
     identity = folder.identity()
     if identity.get("status") != "done":
         raise RunError(f"is not finished ({identity.get('status')})", where=str(path), hint="resume it")
-    for name in (CONFIG, ARM):
-        if not (path / name).is_file() or file_hash(path / name) != identity.get("files", {}).get(name):
-            raise RunError("is gone, or has changed since the run began", where=str(path / name))
+    folder.refuse_changes()
     settings, summary = folder.settings(), read_estimate(file)
     final = summary.estimates.get(summary.final or "")
-    if final is None:
-        raise RunError("is not an estimate that a run has written", where=str(file))
-    if final.rms_deg is None:
-        raise RunError("is the estimate of a simulation that diverged", where=str(file))
+    if final is None or final.rms_deg is None:
+        raise RunError("has no final estimate that could be simulated", where=str(file))
     theta = settings.parameter_set().vector(final.values, str(file))
     return Run(path, identity, settings, summary, theta, final.rms_deg)
-
-
-def _refuse_others(first: Run, *others: Run) -> None:
-    """Name each run that is not the first with another seed, and raise RunError where there is one."""
-    differing = 0
-    for run in others:
-        if difference := next(_differences(first, run), ""):
-            _log.warning("%s: %s", run.path, difference)
-            differing += 1
-    if differing:
-        what = f"{differing} of {1 + len(others)} runs differ from {first.path} in more than the seed"
-        raise RunError(what, hint="collect them apart")
-
-
-def _differences(first: Run, run: Run) -> Iterator[str]:
-    """Yield what makes a run another one than the first with another seed."""
-    for key in ("hydroid", "mujoco"):
-        if run.identity.get(key) != first.identity.get(key):
-            yield f"made by {key} {run.identity.get(key)}, not {first.identity.get(key)}"
-    if _logs(run) != _logs(first):
-        yield f"of other logs ({', '.join(name for name, _ in _logs(run))}, or their content)"
-    for key, old, new in other_settings(first.settings, run.settings):
-        if key != "search.seed":
-            yield f"has {key} = {new}, not {old}"
-    if _model(run) != _model(first):
-        yield "of another arm"
-
-
-def _logs(run: Run) -> list[tuple[str, str]]:
-    """Names and hashes: the same log may lie elsewhere."""
-    return [(Path(path).name, known) for path, known in run.identity.get("logs", {}).items()]
-
-
-def _model(run: Run) -> dict[str, str]:
-    """Hashes of the arm, its model and its meshes, by file."""
-    return {name: known for name, known in run.identity.get("files", {}).items() if name != CONFIG}

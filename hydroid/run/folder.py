@@ -3,7 +3,7 @@
 import hashlib
 import json
 import logging
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.estimate import FitSummary, write_estimate
 from hydroid.files import remove_parts, write_atomic
-from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
+from hydroid.identified_model import CONFIG, MODEL, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.plant import Plant
 from hydroid.run.checkpoint import CheckpointFile
-from hydroid.run.identity import DESCRIPTION, identity, model_hash, own_hashes, refuse_other_run
+from hydroid.run.identity import DESCRIPTION, difference, identity, own_hashes
 from hydroid.run.lock import LOCK, locked
 from hydroid.run.run_log import run_log
 from hydroid.settings.fit import FitSettings
@@ -66,8 +66,7 @@ class RunFolder:
         self.check(settings, logs)
         checkpoints = self.checkpoints()
         self.status("running")
-        stored = ", ".join(checkpoints) or "no checkpoint"
-        _log.info("resumed from %s", stored)
+        _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
         return checkpoints
 
     def begin(self, settings: FitSettings, logs: Sequence[Log]) -> None:
@@ -78,8 +77,7 @@ class RunFolder:
         """
         self._refuse_other_files()
         write_settings(self.path, settings)
-        files = {"files": own_hashes(self.path), "origin": model_hash(settings.arm), "status": "running"}
-        self._describe(identity(settings, logs) | files)
+        self._describe(identity(settings, logs) | {"files": own_hashes(self.path), "status": "running"})
 
     def check(self, settings: FitSettings, logs: Sequence[Log]) -> None:
         """Refuse to continue a run that was another one.
@@ -87,7 +85,25 @@ class RunFolder:
         Raises:
             RunError: other settings, another arm, another log, another version, or a file that was changed.
         """
-        refuse_other_run(self.path, self.identity(), self.settings(), settings, logs)
+        self.refuse_changes()
+        then, now = self.identity(), identity(settings, logs)
+        if settings.arm.model.resolve() == (self.path / MODEL).resolve():  # the run's own copy
+            now["origin"] = then.get("origin")
+        if other := difference((then, self.settings()), (now, settings)):
+            hint = "continue it as it is with only --resume and --out, or choose another folder"
+            raise RunError(f"the run here {other}", where=str(self.path), hint=hint)
+
+    def refuse_changes(self) -> None:
+        """Refuse a run whose settings or model were changed since it began.
+
+        Raises:
+            RunError: a file is gone, or is another.
+        """
+        hashes = own_hashes(self.path)
+        for name, known in self.identity().get("files", {}).items():
+            if hashes.get(name) != known:
+                hint = "put it back as it was, or choose another folder"
+                raise RunError("has changed since the run began", where=str(self.path / name), hint=hint)
 
     def identity(self) -> dict[str, Any]:
         """Read the run's description.
@@ -125,22 +141,21 @@ class RunFolder:
         plant.reset(log.start)
         plant.export(self.path / "model")
 
-    def status(self, word: str) -> None:
-        """Record whether the run is running, interrupted or done."""
-        self._describe(self.identity() | {"status": word})
-
-    def done(self, seconds: Mapping[str, float]) -> None:
-        """Record that the run is done, and the wall-clock time of its parts [s]."""
-        self._describe(self.identity() | {"status": "done", "seconds": dict(seconds)})
+    def status(self, word: str, **more: Any) -> None:
+        """Record whether the run is running, interrupted or done, and more about it."""
+        self._describe(self.identity() | {"status": word} | more)
 
     def interrupt(self) -> str:
         """Record the status `interrupted`, and return what is kept, empty where nothing was written."""
         if not self.exists:
             return ""
         self.status("interrupted")
-        if not self.checkpoints():
-            return f"{self.path} holds no checkpoint yet, and resuming begins again"
-        return f"{self.path} holds a checkpoint to resume from"
+        kept = (
+            "a checkpoint to resume from"
+            if self.checkpoints()
+            else "no checkpoint yet: resuming begins again"
+        )
+        return f"{self.path} holds {kept}"
 
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name.
@@ -148,15 +163,12 @@ class RunFolder:
         Raises:
             RunError: no checkpoint is whole.
         """
-        return CheckpointFile(self.path / "checkpoint.npz", self._id())
+        fixed = {key: value for key, value in self.identity().items() if key not in CHANGING}
+        run = hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
+        return CheckpointFile(self.path / "checkpoint.npz", run)
 
     def _describe(self, content: dict[str, Any]) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")
-
-    def _id(self) -> str:
-        """A digest that distinguishes this run's checkpoints from those of others."""
-        identity = {key: value for key, value in self.identity().items() if key not in CHANGING}
-        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
     def _refuse_other_files(self) -> None:
         """A folder is the run's if it is empty, or holds a run's description or at least its lock."""

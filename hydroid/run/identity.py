@@ -1,9 +1,9 @@
-"""What makes a run that run: settings, arm, logs and versions; and refusing to continue another one."""
+"""What makes a run that run: settings, arm, logs and versions."""
 
 import hashlib
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.errors import RunError
 from hydroid.files import is_file
 from hydroid.identified_model import ARM, CONFIG, MODEL, portable
 from hydroid.log import Log
@@ -20,22 +19,63 @@ from hydroid.settings.fit import FitSettings
 
 DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
-FREE = ("cluster.", "simulation.threads")
-"""settings on which no result depends"""
-ELSEWHERE = frozenset({"model", "pair"})
-"""of an arm's settings: where its files are, and what stands beside it"""
+ALGORITHMS = ("ga", "nsga2", "cmaes", "pymoo", "multistart")
 
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
-    """Return versions, seed, and hashes of the logs."""
-    return {
-        "hydroid": version("hydroid"),
-        "mujoco": version("mujoco"),
-        "numpy": version("numpy"),
+    """Return versions, seed, and hashes of the logs and of the arm's model."""
+    versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
+    return versions | {
         "python": platform.python_version(),
         "seed": settings.search.seed,
         "logs": {log.source: log_hash(log) for log in logs},
+        "origin": model_hash(settings.arm),
     }
+
+
+def deciding(settings: FitSettings) -> dict[str, Any]:
+    """Return the settings that decide a result, and the arm's.
+
+    Without threads, the cluster and unused searches, and without where the arm's files are.
+    """
+    values = portable(settings)
+    del values["cluster"], values["simulation"]["threads"]
+    for name in ALGORITHMS:
+        if name != settings.search.algorithm:
+            del values["search"][name]
+    return values | {"arm": settings.arm.file.model_dump(mode="json", exclude={"model", "pair"})}
+
+
+def difference(
+    run: tuple[Mapping[str, Any], FitSettings], other: tuple[Mapping[str, Any], FitSettings], but: str = ""
+) -> str:
+    """Say what makes a run another one, as "has search.seed = 1, not 2"; empty where nothing does.
+
+    Both are an identity with its settings. The setting `but` may differ.
+    """
+    (own, settings), (others, other_settings) = run, other
+    for key in ("hydroid", "mujoco"):
+        if own.get(key) != others.get(key):
+            return f"was made by {key} {own.get(key)}, not {others.get(key)}"
+    if text := _other_logs(own.get("logs", {}), others.get("logs", {})):
+        return f"has other logs: {text}"
+    values, other_values = _flat(deciding(settings)), _flat(deciding(other_settings))
+    for key in sorted(values.keys() | other_values.keys()):
+        if values.get(key) != other_values.get(key) and key != but:
+            return f"has {key} = {values.get(key)}, not {other_values.get(key)}"
+    return "" if own.get("origin") == others.get("origin") else "has another model of the arm"
+
+
+def _other_logs(own: dict[str, str], others: dict[str, str]) -> str:
+    """Say how the logs' contents differ, empty if they do not; the files may have moved."""
+    if list(own.values()) == list(others.values()):
+        return ""
+    if len(own) != len(others):
+        return f"{len(own)} of them, not {len(others)}"
+    if sorted(own.values()) == sorted(others.values()):
+        return f"their order is {', '.join(own)}"
+    a, b = next((a, b) for a, b in zip(own, others, strict=True) if own[a] != others[b])
+    return f"{b} is not its {a}, or the content has changed"
 
 
 def was_fitted(run: Path, log: Log) -> bool | None:
@@ -47,104 +87,36 @@ def was_fitted(run: Path, log: Log) -> bool | None:
     return log_hash(log) in known.values() if isinstance(known, dict) else None
 
 
-def _other_logs(before: dict[str, str], now: dict[str, str]) -> str:
-    """Say how the logs' contents differ, empty if they do not; the files may have moved."""
-    if list(before.values()) == list(now.values()):
-        return ""
-    if len(before) != len(now):
-        return f"{len(before)} of them, now {len(now)}"
-    if sorted(before.values()) == sorted(now.values()):
-        return f"their order was {', '.join(before)}"
-    changed = next((b, n) for b, n in zip(before, now, strict=True) if before[b] != now[n])
-    return f"{changed[1]} is not the {changed[0]} of the run, or its content has changed"
-
-
 def own_hashes(folder: Path) -> dict[str, str]:
     """Return hashes of the settings and the model in a run folder, by file."""
     files = [folder / name for name in (CONFIG, ARM, MODEL)]
     files += sorted((folder / MODEL).parent.glob("meshes/*"))
-    return {f.relative_to(folder).as_posix(): file_hash(f) for f in files if f.is_file()}
-
-
-def refuse_other_run(
-    folder: Path, then: dict[str, Any], before: FitSettings, settings: FitSettings, logs: Sequence[Log]
-) -> None:
-    """Refuse to continue the run in a folder where anything that decides its result is another.
-
-    Args:
-        folder: of the run.
-        then: its description.
-        before: its settings.
-        settings: of now.
-        logs: of now.
-
-    Raises:
-        RunError: other logs, versions, settings, another arm or model, or a file of the run that was changed.
-    """
-    other = "choose another folder"
-    now = identity(settings, logs)
-    for key in ("hydroid", "mujoco"):
-        if then.get(key) != now[key]:
-            what = f"holds a run of {key} {then.get(key)}, this is {now[key]}"
-            raise RunError(what, where=str(folder), hint=other)
-    if difference := _other_logs(then.get("logs", {}), now["logs"]):
-        raise RunError(f"holds a run of other logs: {difference}", where=str(folder), hint=other)
-    hashes = own_hashes(folder)
-    for name, known in then.get("files", {}).items():
-        if hashes.get(name) != known:
-            hint = f"put it back as it was, or {other}"
-            raise RunError("has changed since the run began", where=str(folder / name), hint=hint)
-    for key, old, new in other_settings(before, settings):
-        hint = (
-            f"to continue it with the settings it was started with, give only --resume and --out; or {other}"
-        )
-        what = f"this run was started with {key} = {old}, but your command gives {new}"
-        raise RunError(what, where=str(folder), hint=hint)
-    if settings.arm.model.resolve() == (folder / MODEL).resolve():
-        return
-    arms = (arm.file.model_dump(mode="json", exclude=set(ELSEWHERE)) for arm in (before.arm, settings.arm))
-    for key, old, new in _differences(*arms):
-        hint = f"continue it with its own arm, or {other}"
-        raise RunError(f"holds a run of an arm with {key} = {old}, now {new}", where=str(folder), hint=hint)
-    if model_hash(settings.arm) != then.get("origin"):
-        hint = f"resume it by its folder alone, or {other}"
-        what = f"holds a run of another model than {settings.arm.model} is now"
-        raise RunError(what, where=str(folder), hint=hint)
-
-
-def other_settings(then: FitSettings, now: FitSettings) -> list[tuple[str, Any, Any]]:
-    """Return the settings that differ and change the result, with their values."""
-    return [d for d in _differences(portable(then), portable(now)) if not d[0].startswith(FREE)]
+    return {f.relative_to(folder).as_posix(): _file_hash(f) for f in files if f.is_file()}
 
 
 def model_hash(arm: Arm) -> str:
     """Return the hash of the arm's MJCF and of its meshes."""
     spec = load_model(arm)
     folder = Path(spec.modelfiledir) / spec.meshdir
-    return file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
-
-
-def file_hash(*files: Path) -> str:
-    """Return the SHA-256 of the files' contents."""
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    return _file_hash(arm.model, *(folder / mesh.file for mesh in spec.meshes if mesh.file))
 
 
 def log_hash(log: Log) -> str:
     """Return the hash of the log's file, or of its samples where it has none."""
-    if is_file(Path(log.source)):
-        return file_hash(Path(log.source))
+    return _file_hash(Path(log.source)) if is_file(Path(log.source)) else samples_hash(log)
+
+
+def samples_hash(log: Log) -> str:
+    """Return the hash of a log's samples, wherever they are from."""
     return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
 
 
-def _differences(old: Any, new: Any) -> list[tuple[str, Any, Any]]:
-    before, after = _flat(old), _flat(new)
-    keys = sorted(before.keys() | after.keys())
-    return [(k, before.get(k), after.get(k)) for k in keys if before.get(k) != after.get(k)]
+def _file_hash(*files: Path) -> str:
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _flat(values: Any, prefix: str = "") -> dict[str, Any]:
     if not isinstance(values, dict):
         return {prefix: values}
-    return {
-        k: v for key, inner in values.items() for k, v in _flat(inner, f"{prefix}.{key}".lstrip(".")).items()
-    }
+    inner = (_flat(value, f"{prefix}.{key}".lstrip(".")) for key, value in values.items())
+    return {key: value for flat in inner for key, value in flat.items()}

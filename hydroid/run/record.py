@@ -3,15 +3,12 @@
     record = load_record("runs/a")
     record.summary.values, record.result.fitted[0].response
 
-`result.npz` holds a tree of dataclasses: its arrays as they are, and what is left as JSON under `content`. A
-validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
+A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
 """
 
-import io
-import json
 import shlex
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,6 +26,7 @@ from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
 
@@ -160,7 +158,7 @@ def save_result(folder: Path, result: FitResult) -> None:
     Raises:
         RunError: the folder cannot be written.
     """
-    write_atomic(folder / RESULT, _packed(result))
+    write_atomic(folder / RESULT, pack(result))
 
 
 def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
@@ -181,9 +179,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
         return None
     taken: set[str] = set()
     for one in unseen:
-        write_atomic(
-            folder / VALIDATIONS / file_name(Path(one.log.source).name, taken) / RESULT, _packed(one)
-        )
+        write_atomic(folder / VALIDATIONS / file_name(Path(one.log.source).name, taken) / RESULT, pack(one))
     return folder
 
 
@@ -207,51 +203,19 @@ def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:
     return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), kept)
 
 
-def _packed(value: object) -> bytes:
-    """Return a tree of dataclasses, mappings, sequences and arrays as npz without pickle."""
-    arrays: dict[str, np.ndarray] = {}
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, np.ndarray):
-            arrays[name := f"a{len(arrays)}"] = value
-            return {"array": name}
-        if is_dataclass(value):
-            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-        if isinstance(value, Mapping):
-            return {str(key): plain(one) for key, one in value.items()}
-        if isinstance(value, tuple | list):
-            return [plain(one) for one in value]
-        return value.item() if isinstance(value, np.generic) else value
-
-    content = np.frombuffer(json.dumps(plain(value)).encode(), dtype=np.uint8)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, content=content, **arrays)  # pyright: ignore[reportArgumentType]
-    return buffer.getvalue()
-
-
 def _read(file: Path, kind: type[T]) -> T:
-    """Read a tree that `_packed` made, as a dataclass.
+    """Read a stored dataclass.
 
     Raises:
         RunError: it cannot be read, or another version wrote it.
     """
     try:
-        with np.load(file, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-        return _adapter(kind).validate_python((_filled(json.loads(arrays["content"].tobytes()), arrays),))[0]
+        return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:
         raise RunError("holds no result", where=str(file.parent), hint="finish the fit: --resume") from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
         raise RunError(what, where=str(file), hint="fit again with this version") from None
-
-
-def _filled(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
-    if isinstance(value, dict):
-        if value.keys() == {"array"}:
-            return arrays[value["array"]]
-        return {key: _filled(one, arrays) for key, one in value.items()}
-    return [_filled(one, arrays) for one in value] if isinstance(value, list) else value
 
 
 @cache

@@ -11,15 +11,10 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.errors import RunError
-from hydroid.fitting.fit import Fit
 from hydroid.log import Log, LogFinding
+from hydroid.progress import logging_to
 from hydroid.settings.fit import FitSettings
-
-LINE = logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", datefmt="%Y-%m-%dT%H:%M:%S%z")
-"""how an event is written"""
 
 _log = logging.getLogger(__name__)
 
@@ -31,43 +26,26 @@ def run_log(file: Path) -> Generator[None]:
     Raises:
         RunError: it cannot be written.
     """
-    logger = logging.getLogger("hydroid")
     try:
         handler = _File(file, encoding="utf-8")
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", where=str(file)) from None
-    handler.setFormatter(LINE)
-    level = logger.level
-    logger.setLevel(logging.INFO)
-    logger.addHandler(handler)
-    try:
+    form = "%(asctime)s %(levelname)-7s %(message)s"
+    handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
+    with logging_to(handler):
         yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(level)
-        handler.close()
 
 
 def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[LogFinding]) -> None:
     """Log what runs, where, with what."""
-    names = ("hydroid", "mujoco", "numpy", "numba")
-    versions = ", ".join(f"{name} {version(name)}" for name in names)
+    versions = ", ".join(f"{name} {version(name)}" for name in ("hydroid", "mujoco", "numpy", "numba"))
     _log.info("%s, Python %s", versions, platform.python_version())
     _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
-    search = settings.search
-    _log.info(
-        "stage %s, search %s, seed %d; settings in config.yaml", settings.stage, search.name, search.seed
-    )
+    search = f"search {settings.search.name}, seed {settings.search.seed}"
+    _log.info("stage %s, %s; settings in config.yaml", settings.stage, search)
     _log.info("logs: %s", ", ".join(log.source for log in logs))
     for finding in findings:
         _log.info("%s: %s", finding.level, finding)
-
-
-def log_end(fit: Fit, seconds: float) -> None:
-    """Log how a fit ended."""
-    simulated, diverged = fit.history[-1, 2:4]
-    _log.info("search: %d parameter sets simulated, %d of them diverged", simulated, diverged)
-    _log.info("done in %.0f s: %s, rms error %.6g deg", seconds, fit.final, np.rad2deg(fit.best.rms))
 
 
 class _File(logging.FileHandler):

@@ -16,11 +16,11 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import fit
-from hydroid.identified_model import IdentifiedModel, portable
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
-from hydroid.run.identity import ELSEWHERE, FREE, model_hash
+from hydroid.run.identity import deciding, model_hash, samples_hash
 from hydroid.search.compromise import segment_best
 from hydroid.settings.fit import FitSettings
 
@@ -28,7 +28,6 @@ Result = dict[str, Any]
 """what `perform` returns, or {"failed": why}"""
 
 VERSIONS = ("hydroid", "mujoco", "numpy")
-ALGORITHMS = ("ga", "nsga2", "cmaes", "pymoo", "multistart")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,31 +42,15 @@ class Task:
 
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
-        checks = [(name, _plain(settings), _samples(log)) for name, settings, log in self.checks]
+        checks = [(name, deciding(settings), samples_hash(log)) for name, settings, log in self.checks]
         content = {
             "versions": {name: version(name) for name in VERSIONS},
-            "settings": _plain(self.settings),
+            "settings": deciding(self.settings),
             "model": model_hash(self.settings.arm),
-            "logs": [_samples(log) for log in self.logs],
+            "logs": [samples_hash(log) for log in self.logs],
             "checks": checks,
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
-
-
-def _plain(settings: FitSettings) -> dict[str, Any]:
-    """Return the settings that decide a result: without threads and without unused searches."""
-    values = portable(settings)
-    for group, name in (key.split(".") for key in FREE):
-        values[group].pop(name, None) if name else values.pop(group)
-    for name in ALGORITHMS:
-        if name != settings.search.algorithm:
-            del values["search"][name]
-    arm = settings.arm.file.model_dump(mode="json", exclude=set(ELSEWHERE))
-    return values | {"arm": arm}
-
-
-def _samples(log: Log) -> str:
-    return hashlib.sha256(np.column_stack([log.time, log.command, log.angle]).tobytes()).hexdigest()
 
 
 def perform(task: Task) -> Result:

@@ -17,7 +17,6 @@ from conftest import step_log
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
-from hydroid.files import write_atomic
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -72,6 +71,7 @@ def folder(made, tmp_path) -> RunFolder:
     settings, _arm, path, _ = made
     folder = RunFolder(tmp_path / "run")
     folder.begin(settings, read_logs([path], settings))
+    assert "holds no checkpoint yet" in folder.interrupt()
     for number in (1, 2):
         folder.checkpoints()["search"] = stored(number)
     return folder
@@ -103,10 +103,6 @@ def content(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_a_checkpoint_comes_back_as_it_was(folder, made):
-    assert same(folder, 2)
-
-
 def test_flipped_bits_never_change_a_checkpoint(folder, made):
     """Wherever a bit flips: the newest to its last bit, where the zip does not care, or the one before it."""
     file, previous = folder.path / "checkpoint.npz", folder.path / "checkpoint.previous.npz"
@@ -136,12 +132,7 @@ def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, made, sha
     assert (folder.path / "checkpoint.damaged.npz").exists()
     folder.checkpoints()["search"] = stored(3)  # the damaged one must not take the good one's place
     assert same(folder, 3)
-    (folder.path / "checkpoint.npz").write_bytes(b"")
-    assert same(folder, 1)
-
-
-def test_a_crash_between_the_two_renamings_loses_nothing(folder, made):
-    (folder.path / "checkpoint.npz").unlink()
+    (folder.path / "checkpoint.npz").unlink()  # as a crash between the two renamings leaves it
     assert same(folder, 1)
 
 
@@ -200,30 +191,11 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_fit_stopped_in_a_refinement_says_that_it_kept_one(made, tmp_path):
-    settings, _arm, path, _ = made
-    folder = RunFolder(tmp_path)
-    folder.begin(settings, read_logs([path], settings))
-    assert "holds no checkpoint yet" in folder.interrupt()
-    folder.checkpoints()["refined"] = {"point": np.zeros(2)}
-    assert folder.interrupt() == f"{tmp_path} holds a checkpoint to resume from"
-
-
 def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
     settings, _arm, path, _ = made
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match=r"file/run: cannot be written \(Not a directory\)"):
         fit(settings, read_logs([path], settings), tmp_path / "file" / "run", progress=Watcher())
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_read_only_folder_is_refused_before_anything_is_simulated(folder, made):
-    settings, _arm, path, _ = made
-    folder.path.chmod(0o555)
-    with pytest.raises(RunError, match=r"cannot be written \(Permission denied\)"):
-        fit(settings, read_logs([path], settings), folder.path, resume=True, progress=Watcher(1))
-    folder.path.chmod(0o755)
-    assert same(folder, 2)
 
 
 def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
@@ -264,7 +236,7 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
         changed = replace(arm, file=arm.file.model_copy(update=changes))
         return settings.model_copy(update={"arm": changed}), read_logs([path], settings)
 
-    with pytest.raises(RunError, match=r"an arm with actuators = .*now \{\}|an arm with actuators"):
+    with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
         folder.check(*other(actuators={}))
     model = tmp_path / "model.xml"
     text = arm.model.read_text().replace('meshdir="', f'meshdir="{arm.model.parent}/')
@@ -278,10 +250,10 @@ def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, made,
     moved = tmp_path / "moved.csv"
     moved.write_bytes(path.read_bytes())
     folder.check(settings, read_logs(moved, settings))
-    with pytest.raises(RunError, match="other logs: 1 of them, now 2"):
+    with pytest.raises(RunError, match="other logs: 1 of them, not 2"):
         folder.check(settings, read_logs([moved, path], settings))
     moved.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
-    with pytest.raises(RunError, match=r"moved.csv is not the .*log.csv of the run"):
+    with pytest.raises(RunError, match=r"moved.csv is not its .*log.csv"):
         folder.check(settings, read_logs(moved, settings))
 
 
@@ -342,10 +314,3 @@ def test_a_run_tells_its_course_in_its_log(made, tmp_path):
     times, levels = zip(*(line.split()[:2] for line in lines), strict=True)
     assert set(levels) == {"INFO"}
     assert all(len(time) == len("2026-01-01T00:00:00+0000") for time in times)
-
-
-def test_what_is_kept_is_the_content_before(tmp_path):
-    file, kept = tmp_path / "a", tmp_path / "b"
-    for text in ("1", "2", "3"):
-        write_atomic(file, text, keep=kept)
-    assert (file.read_text(), kept.read_text()) == ("3", "2")

@@ -47,7 +47,7 @@ def fit_page(record: Record) -> Page:
         *_actuators(record),
         *motion(predictions, settings.arm),
         *(replace(section, folded=True) for section in folded),
-        Section("Reproduce", facts=tuple(_facts(record, logs)), folded=True),
+        Section("Reproduce", facts=tuple(_facts(record)), folded=True),
     )
     ended = {None: ("fair", "Not refined."), True: ("good", "Yes."), False: ("bad", "No.")}[summary.converged]
     judged = verdict({"The fit": predictions}, _known(summary), Light("Converged", *ended))
@@ -132,14 +132,11 @@ def _search(record: Record) -> Section:
     return Section("How the search went", facts=tuple(facts), plots=plots)
 
 
-def _facts(record: Record, logs: list[str]) -> Iterator[tuple[str, str]]:
-    """Yield the command, the logs with their hashes, and the settings that are not the defaults."""
+def _facts(record: Record) -> Iterator[tuple[str, str]]:
+    """Yield the command, and the settings that are not the defaults."""
     run, settings = record.folder, record.settings
     config, again = shlex.quote(f"{run}/config.yaml"), shlex.quote(f"{run}-again")
     yield "command", f"hydroid fit-{settings.stage} {record.given} --config {config} --out {again}"
-    for one, name in zip(record.result.fitted, logs, strict=True):
-        digest = record.identity["logs"][one.log.source][:12]
-        yield name, f"{number(len(one.log.time) * one.log.period)} s, SHA-256 {digest}…"
     kinds = {"objective", "search", "payloads", "priors"}
     for kind, given in settings.model_dump(mode="json", exclude_defaults=True, include=kinds).items():
         yield (

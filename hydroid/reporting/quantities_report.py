@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.reporting.chart import Chart, Color, Mark, Panel
+from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Section
 from hydroid.reporting.table import Table
 from hydroid.settings.fit import FitSettings
@@ -18,8 +17,8 @@ from hydroid.words import number
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as fixed"""
 _CAPTION = (
-    "Speed against command in the middle of the logged travel, and at 50 % over the travel. Grey: commands "
-    "beyond the logs. Ticks: those that they hold."
+    "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond the "
+    "logs. Ticks: those that they hold."
 )
 
 
@@ -73,32 +72,23 @@ def curves_csv(curves: Mapping[str, CurveEstimate]) -> str:
 
 def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
     """Draw each joint's speed against command with its band and, in stage 2, at 50 % over its travel."""
-    panels, over_poses = list[Panel](), any("_over_poses" in name for name in curves)
-    for curve in (c for name, c in curves.items() if name.endswith("_speed")):
-        marks = _logged(np.concatenate([log.command[:, curve.joint - 1] for log in logs]), logs[0].period)
-        at = np.array(curve.at)
-        marks += [*_curve(curve, at > 0, "blue"), *_curve(curve, at < 0, "orange")]
-        title = f"{joints[curve.joint - 1]}: speed in mid travel"
-        panels.append(Panel("command [%]", "speed [deg/s]", tuple(marks), title, 250, (-105.0, 105.0)))
-        if over_poses:
-            poses = [c for n, c in curves.items() if n.startswith(f"joint{curve.joint}_speed_50_over_poses")]
-            marks = [
-                mark
-                for one, color in zip(poses, ("blue", "orange"), strict=False)
-                for mark in _curve(one, np.ones(len(one.at), bool), color, one.label.rpartition(", ")[2])
+    panels: list[Panel] = []
+    for name, curve in curves.items():
+        at, value, ends = np.array(curve.at), np.array(curve.value), np.array(curve.interval, dtype=float)
+        whole, marks = [np.ones(len(at), dtype=bool)], list[Mark]()
+        if name.endswith("_speed"):  # over commands: its two directions, with the dead band between them
+            whole, commands = [at > 0, at < 0], [log.command[:, curve.joint - 1] for log in logs]
+            marks = _logged(np.concatenate(commands), logs[0].period)
+        for part, color in zip(whole, ("blue", "orange"), strict=False):
+            low, high = ends[part].T
+            marks += [
+                Mark("band", at[part], low, high, color=color, alpha=0.25),
+                Mark("line", at[part], value[part], color=color),
+                Mark("points", at[part], value[part], color=color, width=5),
             ]
-            panels.append(Panel("angle [deg]", "speed [deg/s]", tuple(marks), "Speed at 50 % command", 250))
-    return Chart(tuple(panels), columns=2 if over_poses else 1)
-
-
-def _curve(curve: CurveEstimate, chosen: NDArray[np.bool_], color: Color, label: str = "") -> list[Mark]:
-    at, value = np.array(curve.at)[chosen], np.array(curve.value)[chosen]
-    ends = np.array(curve.interval, dtype=float)[chosen]
-    return [
-        Mark("band", at, ends[:, 0], ends[:, 1], color=color, alpha=0.25),
-        Mark("line", at, value, color=color, label=label),
-        Mark("points", at, value, color=color, width=5),
-    ]
+        title = f"{joints[curve.joint - 1]}: {curve.label}"
+        panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
+    return Chart(tuple(panels), columns=len(panels) // len({curve.joint for curve in curves.values()}))
 
 
 def _logged(commands: Array, period: float) -> list[Mark]:

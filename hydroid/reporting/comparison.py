@@ -58,9 +58,9 @@ def _page(
     beware: tuple[str, ...],
 ) -> Page:
     fits = by_fit(predictions)
-    ordered, judged = [p for own in fits.values() for p in own], verdict(fits)
+    ordered = sorted((p for own in fits.values() for p in own), key=lambda p: p.unseen is not True)
+    judged, data = verdict(fits), response_data(ordered, arm)
     sections = (prediction_section(ordered, arm), *motion(ordered, arm), *parts)
-    data = response_data(ordered, arm)
     return Page(name, title, judged.prediction, sections, beware, data=data, verdict=judged)
 
 

@@ -80,9 +80,8 @@ def joint_responses(predictions: Sequence[Prediction], arm: Arm) -> list[JointRe
 
 
 def prediction_section(predictions: Sequence[Prediction], arm: Arm) -> Section:
-    """Return the section with one tab per log, unseen logs first, and the table of errors."""
-    ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    responses = joint_responses(ordered, arm)
+    """Return the section with one tab per log, and the table of errors."""
+    responses = joint_responses(predictions, arm)
     bins = min(_MOST, max(150, 9000 // max(len(responses), 1)))  # a page of many responses stays small
     tabs: dict[str, Tab] = {}
     for i, one in enumerate(responses):
@@ -90,14 +89,14 @@ def prediction_section(predictions: Sequence[Prediction], arm: Arm) -> Section:
         plots = (*(tabs[one.log].plots if one.log in tabs else ()), plot)
         tabs[one.log] = Tab(one.log, plots, _KINDS[one.of.unseen].capitalize())
     text = "Angle; measured minus simulated angle with the 95 % prediction band; command."
-    errors = {"errors": error_table(ordered, arm)}
+    errors = {"errors": error_table(predictions, arm)}
     return Section("Prediction", text, tabs=tuple(tabs.values()), more=errors)
 
 
 def motion(predictions: Sequence[Prediction], arm: Arm) -> tuple[Section, ...]:
     """Return the section with the arm in motion in each log, as the first prediction of the log has it."""
     names, first = _names(predictions), dict[str, Prediction]()
-    for one in sorted(predictions, key=lambda p: p.unseen is not True):
+    for one in predictions:
         first.setdefault(names[one.log.source], one)
     return motion_section(arm, first)
 

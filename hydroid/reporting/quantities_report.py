@@ -17,8 +17,8 @@ from hydroid.words import number
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as fixed"""
 _CAPTION = (
-    "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond the "
-    "logs. Ticks: those that they hold."
+    "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond "
+    "the logs. Ticks: those that they hold."
 )
 
 

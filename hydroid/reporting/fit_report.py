@@ -71,8 +71,8 @@ def _known(summary: FitSummary) -> str:
     known = sum(p.sd is not None and p.sd <= WEAK_ABOVE * abs(p.value) for p in free)
     fixed = sum(q.within <= BEST_WITHIN for q in summary.quantities.values())
     return (
-        f"The logs fix {fixed} of the machine's properties, such as speeds and dead bands, and {known} of the "
-        f"{len(free)} parameters to {100 * WEAK_ABOVE:.0f} % or better."
+        f"The logs fix {fixed} of the machine's properties, such as speeds and dead bands, and {known} of "
+        f"the {len(free)} parameters to {100 * WEAK_ABOVE:.0f} % or better."
     )
 
 

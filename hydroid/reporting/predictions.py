@@ -11,7 +11,7 @@ import numpy as np
 from hydroid.files import file_name
 from hydroid.fitting.validation import Prediction
 from hydroid.parameters import Array
-from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
+from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import motion_section
 from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name, unique
 from hydroid.reporting.table import Cell, Table, numbers_csv
@@ -141,7 +141,7 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
     """Draw the measured angle of one joint, every model's response and residual, command and pressures."""
     log, measured = response.of.log, np.degrees(response.measured)
     upper = [Mark("line", log.time, measured, color="ink", label="measured", width=5, alpha=0.35)]
-    middle = [Mark("rule", y=np.zeros(1), color="grey", width=1)]
+    middle = [ZERO]
     # a response that runs away, by three ranges of the measured angle, must not flatten the others
     far = 3.0 * max(float(np.ptp(measured)), 1.0)
     for i, (name, angle) in enumerate(response.simulated.items()):

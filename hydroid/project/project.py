@@ -1,6 +1,7 @@
-"""Writing a project: all of its files, or none."""
+"""Writing a project, all of its files or none, and the commands that come next."""
 
 import os
+import shlex
 import shutil
 import tempfile
 from collections.abc import Generator, Sequence
@@ -17,7 +18,6 @@ from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, arm_text
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
-from hydroid.project.steps import next_steps, steps_page
 from hydroid.reporting.arm_chart import arm_chart
 from hydroid.reporting.figure import rendered
 from hydroid.settings.arm import Arm, load_arm
@@ -28,6 +28,22 @@ from hydroid.settings.load import validate
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
 FIT, STEPS = "fit.yaml", "next-steps.md"
 FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
+PAGE = """\
+# {name}
+
+Look first: `arm.png` shows the arm, its axes and its cylinders. Compare the directions of positive angles
+with your log.
+
+Then, from the folder in which you ran `hydroid init`:
+
+```sh
+{commands}
+```
+
+- `arm.xml` is the arm's model, `arm.yaml` has its actuators: correct both.
+- `fit.yaml` are the settings of the fit: columns of the log, parameters, starts, priors.
+- A log should begin with a second without a command. Record several: fit on some, validate on another.
+"""
 
 
 @dataclass(frozen=True)
@@ -72,44 +88,59 @@ def write_project(
     if taken:
         raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint="name another folder")
     table = open_table(logs[0]) if logs else None
-    own = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
-    imported, reference = None, ARM
-    if robot is not None and own:
-        reference = Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
+    imported, reference, own = None, ARM, None
+    if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
+        own, reference = robot, Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
     elif robot is not None:
         imported = import_arm(robot, table.names if table else (), tip)
+    title = f"{imported.name}, from {robot.name}" if imported and robot else ""
     with _stage(folder) as stage:
-        arm = load_arm(robot) if robot is not None and own else _write_arm(stage, imported, robot)
+        arm = load_arm(own) if own else _write_arm(stage, imported, title)
         layout = find_layout(table, arm, joints) if table is not None else None
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
-            arm = _write_arm(stage, imported, robot, arm.joint_names, sizes)
-        title = f"{arm.name}, near to 0: does it look and turn like your arm?"
-        write_atomic(stage / PICTURE, rendered(arm_chart(arm), title)[0])
+            arm = _write_arm(stage, imported, title, arm.joint_names, sizes)
+        caption = f"{arm.name}, near to 0: does it look and turn like your arm?"
+        write_atomic(stage / PICTURE, rendered(arm_chart(arm), caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
         steps = next_steps(folder, logs)
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
-        write_atomic(stage / STEPS, steps_page(arm.name, folder, steps, notes, reasons))
+        page = PAGE.format(name=arm.name, commands="\n".join(steps))
+        for heading, lines in (("What was assumed of the arm", notes), ("The log's columns", reasons)):
+            page += f"\n## {heading}\n\n" + "".join(f"- {line}\n" for line in lines) if lines else ""
+        write_atomic(stage / STEPS, page)
         written = _move(stage, folder)
     return Project(folder, written, notes, reasons, layout.unused if layout else (), steps)
+
+
+def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
+    """Return the commands to run; of several logs the last is kept to validate on."""
+    names = [shlex.quote(str(log)) for log in logs] or ["LOG.csv", "OTHER.csv"]
+    fitted, other = " ".join(names[:-1] or names), names[-1]
+    home = shlex.quote(str(folder))
+    config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
+    return (
+        f"hydroid check {' '.join(names)} {config}",
+        f"hydroid fit-hyd {fitted} {config} --out {run}",
+        f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
+        f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
+    )
 
 
 def _write_arm(
     stage: Path,
     imported: ImportedArm | None,
-    robot: Path | None,
+    title: str,
     joints: Sequence[str] = (),
     sizes: Sequence[JointSize] = (),
 ) -> Arm:
     """Write model, meshes and the arm's file, with actuators of the given sizes, and return the arm."""
-    if imported is None or robot is None:
-        model, text, meshes = TEMPLATE_MODEL, TEMPLATE_FILE, dict[str, bytes]()
-    else:
-        title = f"{imported.name}, from {robot.name}"
-        model, text, meshes = imported.mjcf, arm_text(imported, joints, sizes, title), imported.meshes
-    for name, content in {MODEL: model, ARM: text, **meshes}.items():
+    files: dict[str, str | bytes] = {MODEL: TEMPLATE_MODEL, ARM: TEMPLATE_FILE}
+    if imported is not None:
+        files = {MODEL: imported.mjcf, ARM: arm_text(imported, joints, sizes, title), **imported.meshes}
+    for name, content in files.items():
         write_atomic(stage / name, content)
     return load_arm(stage / ARM)
 

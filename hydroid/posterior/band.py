@@ -57,7 +57,7 @@ class Band:
     @property
     def model_limits(self) -> bool:
         """Whether the model, not the noise, limits the prediction."""
-        return self.inside < 1 - 0.1 and self.error > self.limit  # 5 % are expected outside
+        return self.inside < 0.9 and self.error > self.limit  # 5 % are expected outside
 
 
 def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:

@@ -24,14 +24,6 @@ from hydroid.parameters import Array
 from hydroid.problem.channels import Channel
 from hydroid.settings.problem import ObjectiveSettings
 
-MAX_AR_ORDER = 30
-"""the highest order of the AR process"""
-ABSORBED_ROUNDS = 4
-"""rounds in which the noise that a fit has absorbed is estimated"""
-MAX_ABSORBED = 0.5
-"""part of the noise; a fit that has absorbed more leaves too little to correct the level with"""
-NEGLIGIBLE = 0.05
-"""Akaike weight of all higher orders together, below which they are left out"""
 STEP = 1e-4
 """of the differences by a process's numbers, in hyperbolic arc tangents of its reflection coefficients"""
 MIN_LEVEL = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
@@ -126,14 +118,11 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
-    if channel.quantity == "angle":
-        given = objective.noise_deg
-        given = given.get(channel.joint) if isinstance(given, dict) else given
-        level = None if given is None else float(np.deg2rad(given))
-    else:
-        level = None if objective.noise_bar is None else objective.noise_bar * 1e5
-    samples = len(residual)
-    if level is not None:
+    angle, samples = channel.quantity == "angle", len(residual)
+    given = objective.noise_deg if angle else objective.noise_bar
+    given = given.get(channel.joint) if isinstance(given, dict) else given
+    if given is not None:
+        level = float(np.deg2rad(given)) if angle else given * 1e5
         return Noise(samples, level * channel.weight, np.empty(0), "settings")
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
     if lacking <= 0:
@@ -184,7 +173,7 @@ def neighbours(noise: Noise) -> list[Noise]:
     return others
 
 
-def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
+def fit_noise(rows: Array, max_order: int = 30) -> Noise:
     """Fit an average of AR processes of order 0 to `max_order` to a residual of zero mean, shape (T,).
 
     A process of order m has no reflection coefficients beyond k_m: the average of k_j is k_j times the weight
@@ -206,7 +195,7 @@ def fit_noise(rows: Array, max_order: int = MAX_AR_ORDER) -> Noise:
         criterion.append(criterion[-1] + samples * float(np.log1p(-(k**2))) + 2.0)
     weight = np.exp(-0.5 * (np.array(criterion) - min(criterion)))
     share = np.cumsum((weight / weight.sum())[::-1])[::-1][1:]
-    order = int(np.sum(share > NEGLIGIBLE))
+    order = int(np.sum(share > 0.05))  # higher orders weigh less than this together
     return Noise(samples, level, share[:order] * np.array(reflection[:order]))
 
 
@@ -220,18 +209,17 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
     """
     samples, order, spread_out = noise.samples, len(noise.reflection), spread @ effects
     left, whole = noise.autocovariance[: order + 1], noise
-    for _ in range(ABSORBED_ROUNDS):
+    lags = np.arange(order + 1)
+
+    def lagged(a: Array, b: Array) -> Array:
+        return np.array([np.sum(a[:, : samples - k] * b[:, k:]) for k in lags])
+
+    for _ in range(4):
         smooth = np.asarray(matmul_toeplitz(whole.autocovariance, effects.T), dtype=np.float64).T
-        absorbed = np.array(
-            [
-                np.sum(effects[:, : samples - k] * smooth[:, k:])
-                + np.sum(smooth[:, : samples - k] * effects[:, k:])
-                - np.sum(spread_out[:, : samples - k] * effects[:, k:])
-                for k in range(order + 1)
-            ]
-        )
-        reflection = _levinson(left + absorbed / (samples - np.arange(order + 1)))
-        if reflection is None or absorbed[0] > MAX_ABSORBED * samples * left[0]:
+        absorbed = lagged(effects, smooth) + lagged(smooth, effects) - lagged(spread_out, effects)
+        reflection = _levinson(left + absorbed / (samples - lags))
+        # a fit that has absorbed half the noise leaves too little to correct the level with
+        if reflection is None or absorbed[0] > 0.5 * samples * left[0]:
             break
         whole = replace(noise, level=float(np.sqrt(left[0] + absorbed[0] / samples)), reflection=reflection)
     return whole

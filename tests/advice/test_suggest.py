@@ -9,15 +9,12 @@ from conftest import step_log
 
 from hydroid import load_settings
 from hydroid.advice.actions import next_actions
-from hydroid.advice.information import measured
 from hydroid.advice.missing import Verdict, missing_terms
 from hydroid.advice.proposals import advice, setting_line
 from hydroid.advice.residuals import Regressor, residual_checks
 from hydroid.advice.terms import ExtendedModel, terms
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty, uncertainty
-from hydroid.posterior.noise import Noise
 from hydroid.posterior.open_start import with_open_start
 from hydroid.posterior.posterior import regular
 from hydroid.prediction import simulate_log
@@ -158,22 +155,6 @@ def test_stating_a_value_leaves_it_as_stated_and_helps_what_goes_with_it(late: t
         assert action["quantity"] == "difference"
         for when in ("before_percent", "after_percent"):
             assert action[f"quantity_{when}"] == pytest.approx(2 * action[when], rel=0.03)
-
-
-def information(slopes: Array, noise: Noise) -> Array:
-    rows = measured([(slopes, noise)])
-    return rows.T @ rows
-
-
-def test_the_information_of_white_noise_is_fishers_and_of_slow_noise_what_least_squares_gets():
-    rng = np.random.default_rng(3)
-    slopes: Array = rng.normal(size=(3, 400))
-    white = Noise(400, 0.5, np.empty(0))
-    np.testing.assert_allclose(information(slopes, white), slopes @ slopes.T / 0.25, rtol=1e-9)
-    slow = Noise(400, 0.5, np.array([-0.8]))
-    bread = np.linalg.inv(slopes @ slopes.T)
-    covariance = bread @ slow.covariance_of(slopes) @ bread
-    np.testing.assert_allclose(np.linalg.inv(information(slopes, slow)), covariance, rtol=1e-6)
 
 
 def test_a_perfect_fit_and_one_at_its_bounds_are_tested_too(late: tuple[Problem, Uncertainty]):

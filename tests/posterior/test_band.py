@@ -73,14 +73,6 @@ def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
     np.testing.assert_allclose(np.var(off, axis=0).mean(), variance.mean(), rtol=0.4)
 
 
-def test_values_that_no_fit_gave_have_no_band(fitted):
-    settings, model = fitted
-    log = noisy(settings, [40.0, -40.0], 3)
-    response = predict(model, log, settings.outputs)
-    assert prediction_bands(replace(model, summary=None), log, response) == {}
-    assert prediction_bands(replace(model, theta=1.1 * model.theta), log, response) == {}
-
-
 def test_leaving_out_each_log_predicts_it(fitted):
     settings, model = fitted
     logs = [

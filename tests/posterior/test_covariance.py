@@ -59,13 +59,6 @@ def test_the_sandwich_is_right_where_weights_and_noise_do_not_match():
     np.testing.assert_allclose(found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-6)
 
 
-def test_a_unit_changes_no_relative_deviation():
-    (one, theta), (other, _) = white_problem(), white_problem(unit=1000.0)
-    a, b = uncertainty(one, theta), uncertainty(other, 1000 * theta)
-    np.testing.assert_allclose(a.relative, b.relative, rtol=1e-9)
-    np.testing.assert_allclose(1000 * a.interval, b.interval, rtol=1e-9)
-
-
 def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
     columns = slow(4)
     columns[1], columns[2] = 2 * columns[0], 0.0  # a and b trade, c does nothing
@@ -114,23 +107,6 @@ def test_a_bound_takes_the_interval():
     assert np.isfinite(found.interval[:2]).all()
 
 
-def jumping(size):
-    """A linear problem whose response jumps at the estimate, with the estimate."""
-    problem, theta = white_problem()
-    smooth, jump = problem.residuals, size * problem.columns[0]
-    problem.residuals = lambda t: smooth(t) + np.where(t[:, :1] > theta[0], 1.0, 0.0) * jump
-    return problem, theta
-
-
-def test_a_step_is_as_wide_as_the_uncertainty_where_the_response_jumps():
-    problem, theta = jumping(1e-5)
-    smooth, _ = white_problem()
-    expected = uncertainty(smooth, theta).standard_deviation
-    found = uncertainty(problem, theta)
-    np.testing.assert_allclose(found.standard_deviation, expected, rtol=0.1)
-    assert [status.doubt for status in found.status] == [None] * 3
-
-
 def test_parameters_that_trade_have_their_interval_though_the_response_is_rough():
     """Two nearly equal effects, and a response in steps of 1e-5 rad, as where oil cavitates."""
     columns, rng = slow(3), np.random.default_rng(4)
@@ -148,20 +124,6 @@ def test_an_interval_is_doubted_where_the_response_is_rougher_than_the_noise():
     smooth = problem.residuals
     problem.residuals = lambda t: np.round(smooth(t) / DEG) * DEG
     assert any(status.doubt is not None for status in uncertainty(problem, theta).status)
-
-
-def test_derivatives_at_a_bound_stay_inside():
-    problem, theta = white_problem()
-    seen = []
-    inner = problem.residuals
-    problem.residuals = lambda t: (seen.append(t), inner(t))[1]
-    at = theta.copy()
-    at[0], at[2] = problem.parameters.upper[0], problem.parameters.lower[2]
-    found = jacobian(problem, at)
-    points = np.vstack(seen)
-    assert (points <= problem.parameters.upper).all()
-    assert (points >= problem.parameters.lower).all()
-    np.testing.assert_allclose(found.slopes, -problem.columns * np.abs(at)[:, None], atol=1e-8)
 
 
 @pytest.mark.parametrize("reflection", [[], [-AR1], [0.5, -0.3, 0.8]])
@@ -281,14 +243,6 @@ def test_the_profile_of_a_linear_problem_is_its_parabola():
     np.testing.assert_allclose(one.interval, [theta[1] - half, theta[1] + half], rtol=1e-4)
     with pytest.raises(SettingsError, match="no free parameter 'z'"):
         profile(problem, found, "z")
-
-
-def test_the_profile_of_an_unidentifiable_parameter_is_unlimited():
-    columns = slow(3)
-    columns[1] = columns[0]
-    problem = Linear(columns, THETA @ columns + np.random.default_rng(0).normal(0, DEG, 1000), THETA)
-    found = uncertainty(problem, THETA)
-    assert profile(problem, found, "a").interval == (-np.inf, np.inf)
 
 
 def test_a_profile_from_no_optimum_finds_the_better_one():

@@ -15,8 +15,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from hydroid.quantity_table import Quantity
 from hydroid.settings.arm import Arm, ArmFile
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.hydraulics import ROWS, HydraulicSettings
 from hydroid.settings.log import JointColumns
 from hydroid.settings.study import StudySettings
 
@@ -53,26 +55,46 @@ def reference() -> str:
 
 def _table(kind: type[BaseModel]) -> str:
     lines = ["| setting | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
-    for key, field, meaning in _settings(kind, ""):
+    for key, field, meaning, default in _settings(kind, ""):
         unit = _unit(field, meaning)
         text = _UNIT.sub("", meaning, count=1) if unit and f"[{unit}]" in meaning else meaning
-        cells = f"`{key}`", _type(field.annotation), _default(field), unit, text.replace("|", "\\|")
+        cells = f"`{key}`", _type(field.annotation), default, unit, text.replace("|", "\\|")
         lines.append(f"| {' | '.join(cells)} |")
+        if field.annotation is HydraulicSettings:
+            lines += map(_row, ROWS.values())
     return "\n".join(lines) + "\n"
 
 
-def _settings(kind: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo, str]]:
-    """Key, field and meaning of every setting of a class and of the classes within it."""
+def _row(quantity: Quantity) -> str:
+    """A quantity of the hydraulics as a row of the table of settings."""
+    kind = "number or null" if quantity.optional else "number"
+    meaning = quantity.meaning + (" (the article's value)" if quantity.source == "article" else "")
+    cells = f"`hydraulics.{quantity.name}`", kind, f"`{_yaml(quantity.default)}`", quantity.unit, meaning
+    return f"| {' | '.join(cells)} |"
+
+
+def _settings(
+    kind: type[BaseModel], prefix: str, given: BaseModel | None = None
+) -> Iterator[tuple[str, FieldInfo, str, str]]:
+    """Key, field, meaning and default of every setting of a class and of the classes within it.
+
+    `given` holds the defaults where the class stands; None: its own.
+    """
     for name, field in kind.model_fields.items():
-        key = prefix + name
+        key, default = prefix + name, "" if field.is_required() else _given(field, given, name)
         inner = [] if kind in (FitSettings, JointColumns) and name in _ELSEWHERE else _inner(field.annotation)
-        meaning = field.description or _docstring(kind, name)
-        if isinstance(extra := field.json_schema_extra, dict) and extra["source"] == "article":
-            meaning += " (the article's value)"
+        meaning = _docstring(kind, name)
+        below = default if isinstance(default, BaseModel) else None
         if not inner or meaning:
-            yield key, field, meaning
+            yield key, field, meaning, "" if below or default == "" else f"`{_yaml(default)}`"
         for suffix, model in inner:
-            yield from _settings(model, f"{key}{suffix}.")
+            yield from _settings(model, f"{key}{suffix}.", below if suffix == "" else None)
+
+
+def _given(field: FieldInfo, given: BaseModel | None, name: str) -> Any:
+    if given is not None:
+        return getattr(given, name)
+    return field.get_default(call_default_factory=True, validated_data={})
 
 
 def _inner(annotation: Any) -> list[tuple[str, type[BaseModel]]]:
@@ -123,18 +145,6 @@ def _plural(kind: str) -> str:
     return kind.replace("list of", "lists of", 1) if kind.startswith("list of") else f"{kind}s"
 
 
-def _default(field: FieldInfo) -> str:
-    if field.is_required():
-        return ""
-    value = field.get_default(call_default_factory=True, validated_data={})
-    if value == "":
-        return ""
-    if isinstance(value, BaseModel):
-        given = value.model_dump(exclude_unset=True)
-        return f"`{{{', '.join(f'{k}: {v}' for k, v in given.items())}}}`" if given else ""
-    return f"`{_yaml(value)}`"
-
-
 def _yaml(value: Any) -> str:
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
@@ -144,8 +154,6 @@ def _yaml(value: Any) -> str:
 
 
 def _unit(field: FieldInfo, meaning: str) -> str:
-    if isinstance(extra := field.json_schema_extra, dict):
-        return str(extra["unit"])
     found = _UNIT.search(meaning)
     return found[1] if found and "number" in _type(field.annotation) else ""
 
@@ -182,7 +190,7 @@ def undescribed() -> list[str]:
     return [
         key
         for kind in (FitSettings, ArmFile, StudySettings)
-        for key, _, meaning in _settings(kind, "")
+        for key, _, meaning, _ in _settings(kind, "")
         if not meaning
     ]
 

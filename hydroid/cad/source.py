@@ -10,7 +10,6 @@ import mujoco
 from hydroid.errors import ModelError
 from hydroid.files import is_file
 from hydroid.mjcf import mujoco_errors
-from hydroid.settings.arm_outline import read_xml
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
@@ -53,7 +52,12 @@ def read_source(path: Path) -> Source:
         ModelError: missing, not XML, of another kind, a xacro, or refused by MuJoCo.
     """
     where = str(path)
-    root = read_xml(path, "robot", "give a URDF or an MJCF file")
+    if not is_file(path):
+        raise ModelError("no such robot", where=where, hint="give a URDF or an MJCF file")
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except (ElementTree.ParseError, OSError, ValueError) as error:
+        raise ModelError(f"cannot be read as XML ({error})", where=where) from None
     if any("xacro" in str(element.tag).lower() for element in root.iter()):
         hint = f"expand it first: xacro {path.name} > robot.urdf"
         raise ModelError("is a xacro, not a URDF", where=where, hint=hint)

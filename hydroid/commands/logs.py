@@ -14,7 +14,6 @@ from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
 from hydroid.progress import NOTE
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.two_arms import angles_only, columns_of
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
@@ -101,12 +100,12 @@ def read_arms(
         hint = f"choose {', '.join(SIDES)} or both"
         raise SettingsError(f"{arm!r} is no arm of a pair", where="--arm", hint=hint)
     moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
-    columns = angles_only(settings.log) if angles else settings.log
+    columns = settings.log.angles_only() if angles else settings.log
     layouts = {moving[0]: columns}
     if isinstance(log, str | Path) and arm is not None:
         prefixes = tuple(f"{side}_" for side in SIDES)
         if any(name.startswith(prefixes) for name in open_table(Path(log), settings.log).names):
-            layouts = {side: columns_of(columns, side) for side in moving}
+            layouts = {side: columns.of_arm(side) for side in moving}
     stand = None if pose is None else settings.arm.pose(pose)
     logs: dict[str, Log] = {}
     for side, layout in layouts.items():

@@ -63,8 +63,8 @@ Processes = Annotated[int, typer.Option(min=0, max=1024, help="Number of process
 Dask = Annotated[
     str | None,
     typer.Option(
-        metavar="local[:N]|slurm|ADDRESS",
-        help="Simulate in N processes of this machine, in Slurm jobs (see the setting cluster), or on the "
+        metavar="local[:N]|slurm[:N]|ADDRESS",
+        help="Simulate in N processes of this machine, in N Slurm jobs, or on the "
         "workers of the Dask scheduler at ADDRESS. The result is the same.",
     ),
 ]

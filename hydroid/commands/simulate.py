@@ -83,7 +83,6 @@ def simulate(
     read = read_arms(commands, model.settings, arm, pose=pose, repair=repair)
     from hydroid.log import write_logs
     from hydroid.prediction import predict_log, trace_csv
-    from hydroid.settings.two_arms import columns_of
 
     logs: dict[str, Log] = {}
     for number, (name, log) in enumerate(read.items()):
@@ -92,7 +91,7 @@ def simulate(
         logs[name] = replace(predicted, angle=predicted.angle + noise)
     columns = model.settings.log
     if target:
-        write_logs(target, [(log, columns_of(columns, n) if arm else columns) for n, log in logs.items()])
+        write_logs(target, [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
     if traced:
         write_atomic(traced, trace_csv(model, *read.values()))
     files = {name: file and str(file) for name, file in {"out": target, "trace": traced}.items()}

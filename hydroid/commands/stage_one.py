@@ -15,7 +15,6 @@ from hydroid.posterior.flags import Flag
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
-from hydroid.settings.parameters import nominal_value
 
 MOVED = 0.1
 """relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""
@@ -74,7 +73,7 @@ def with_mechanics(
     }
     for name, value in held.items() if summary else ():
         flag = summary.estimate[name].flag if summary else None
-        nominal = nominal_value(settings, wanted[name]) if wanted[name].quantity == "mass" else None
+        nominal = settings.nominal(wanted[name]) if wanted[name].quantity == "mass" else None
         doubtful = nominal and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
         if doubtful and nominal and abs(value - nominal) > MOVED * nominal:
             _log.warning(

@@ -236,7 +236,7 @@ def _workers(settings: FitSettings, options: FitOptions) -> Any:
         return nullcontext()
     from hydroid.parallel.cluster import open_workers
 
-    return open_workers(dask, settings.cluster, insecure=options.get("dask_insecure", False))
+    return open_workers(dask, insecure=options.get("dask_insecure", False))
 
 
 def _several(results: list[FitResult], out: "Source | None") -> FitRuns:

@@ -50,11 +50,10 @@ def study(
     from hydroid.parallel.cluster import open_workers
     from hydroid.reporting.study_report import study_page
     from hydroid.run.lock import locked
-    from hydroid.settings.simulation import ClusterSettings
     from hydroid.studies.execution import processes as open_processes
     from hydroid.studies.study import run_study
 
-    with locked(folder), open_workers(dask, ClusterSettings(), insecure=dask_insecure) as workers:
+    with locked(folder), open_workers(dask, insecure=dask_insecure) as workers:
         pool = nullcontext(workers.executor()) if workers else open_processes(processes)
         try:
             with pool as executor, Progress() as progress:

@@ -27,7 +27,6 @@ import yaml
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.parallel.workers import DaskWorkers
-from hydroid.settings.simulation import ClusterSettings
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""
@@ -41,15 +40,13 @@ if that takes longer than 15 s, as on a busy machine"""
 
 
 @contextmanager
-def open_workers(
-    dask: str | None, settings: ClusterSettings, *, insecure: bool = False
-) -> Generator[DaskWorkers | None]:
+def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskWorkers | None]:
     """Connect to workers; at the end, stop those that were started here.
 
     Args:
-        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; `slurm` submits
-            jobs; anything else is the address of a scheduler, or its scheduler file. None: no workers.
-        settings: of the Slurm jobs.
+        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; `slurm[:N]` submits
+            N jobs, one if left out, with a worker per core; anything else is the address of a scheduler, or
+            its scheduler file. None: no workers.
         insecure: accept an address without TLS that other machines can reach.
 
     Raises:
@@ -67,11 +64,14 @@ def open_workers(
         raise SettingsError(f"Dask cannot be imported ({error})", where="--dask", hint=hint) from None
     with ExitStack() as stack:
         stack.enter_context(config.set(CLOSED))
-        if local := re.fullmatch(r"local(?::([1-9][0-9]{0,3}))?", dask):
-            stack.enter_context(config.set(PATIENT))
-            target = _start_local(stack, int(local[1] or os.cpu_count() or 1))
+        own = re.fullmatch(r"(local|slurm)(?::([1-9][0-9]{0,3}))?", dask)
+        if own is None:
+            target = _address(dask, insecure)
+        elif own[1] == "slurm":
+            target = _start_slurm(stack, int(own[2] or 1))
         else:
-            target = _start_slurm(stack, settings) if dask == "slurm" else _address(dask, insecure)
+            stack.enter_context(config.set(PATIENT))
+            target = _start_local(stack, int(own[2] or os.cpu_count() or 1))
         client: Any = Client.__new__(Client)
         try:
             client.__init__(target, timeout=CONNECT)
@@ -144,9 +144,10 @@ def _signals_blocked() -> Generator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
+def _start_slurm(stack: ExitStack, jobs: int) -> Any:
     if shutil.which("sbatch") is None:
         raise SettingsError("there is no sbatch here", where="--dask slurm", hint="run on a Slurm machine")
+    from dask import config
     from dask_jobqueue.slurm import SLURMCluster
     from distributed.security import Security
 
@@ -155,19 +156,18 @@ def _start_slurm(stack: ExitStack, settings: ClusterSettings) -> Any:
     credentials, files = _new_credentials(), {name: f"{folder}/{name}.pem" for name in PEM}
     for name, file in files.items():
         Path(file).write_text(getattr(credentials, name))
+    cores = config.get("jobqueue.slurm.cores") or 4  # Dask's configuration has the site's defaults
     cluster: Any = SLURMCluster(
-        cores=settings.cores,
-        processes=settings.cores,
-        memory=settings.memory,
-        walltime=settings.walltime,
-        queue=settings.queue,
+        cores=cores,
+        processes=cores,
+        memory=config.get("jobqueue.slurm.memory") or "4GiB",
         log_directory="runs/slurm",
         security=Security(require_encryption=True, **files),
         scheduler_options={"dashboard": False, "dashboard_address": ":0"},
         worker_extra_args=["--no-dashboard"],
     )
     stack.callback(_close, cluster)
-    cluster.adapt(minimum_jobs=settings.jobs, maximum_jobs=settings.jobs)  # a job that ends is replaced
+    cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that ends is replaced
     return cluster
 
 
@@ -179,11 +179,11 @@ def _address(given: str, insecure: bool) -> str:
     try:
         if Path(given).is_file():
             address = str(json.loads(Path(given).read_text())["address"])
-        elif given.startswith("local:"):
+        elif given.startswith(("local:", "slurm:")):
             raise ValueError(given)  # not the host of that name
         scheme, host = parse_address(address)[0], get_address_host(address)
     except (OSError, ValueError, TypeError, KeyError):
-        hint = "give local[:N], slurm, tls://HOST:PORT, or a scheduler file"
+        hint = "give local[:N], slurm[:N], tls://HOST:PORT, or a scheduler file"
         raise SettingsError("is no Dask scheduler", where=where, hint=hint) from None
     with suppress(ValueError):
         insecure |= ipaddress.ip_address(host).is_loopback

@@ -118,12 +118,10 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
 
     Simulated data without noise leave a residual below MIN_LEVEL. White noise then fills the difference.
     """
-    angle, samples = channel.quantity == "angle", len(residual)
-    given = objective.noise_deg if angle else objective.noise_bar
+    given, samples = objective.noise_deg, len(residual)
     given = given.get(channel.joint) if isinstance(given, dict) else given
-    if given is not None:
-        level = float(np.deg2rad(given)) if angle else given * 1e5
-        return Noise(samples, level * channel.weight, np.empty(0), "settings")
+    if given is not None and channel.quantity == "angle":
+        return Noise(samples, float(np.deg2rad(given)) * channel.weight, np.empty(0), "settings")
     lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
     if lacking <= 0:
         return fit_noise(residual)

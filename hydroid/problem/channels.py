@@ -1,6 +1,5 @@
 """Channels: the signals that are compared, one of one log each, and their places in a row of residuals."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -59,15 +58,13 @@ def make_channels(
     Compared are the angles of the joints `outputs`, and in log i the pressures of `pressures[i]`, 0-based.
     """
     signals: list[tuple[int, int, Quantity, int, Array, float]] = []
-    mean = sum(len(log.time) for log in logs) / len(logs)
     for i, log in enumerate(logs):
-        share = 1.0 if objective.count == "samples" else math.sqrt(mean / len(log.time))
         for column, joint in enumerate(outputs):
-            weight = share * objective.weights.get(joint + 1, 1.0)
+            weight = objective.weights.get(joint + 1, 1.0)
             signals.append((i, joint + 1, "angle", column, log.angle[:, joint], weight))
         for column, joint in enumerate(pressures[i]):
             assert log.pressure is not None
-            weight = share * float(np.deg2rad(objective.pressure_weight)) / 1e5  # deg/bar -> rad/Pa
+            weight = float(np.deg2rad(objective.pressure_weight)) / 1e5  # deg/bar -> rad/Pa
             for side, quantity in enumerate(SIDES):
                 measured = log.pressure[:, joint, side]
                 if not np.isnan(measured[0]):

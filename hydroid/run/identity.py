@@ -36,10 +36,10 @@ def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
 def deciding(settings: FitSettings) -> dict[str, Any]:
     """Return the settings that decide a result, and the arm's.
 
-    Without threads, the cluster and unused searches, and without where the arm's files are.
+    Without threads and unused searches, and without where the arm's files are.
     """
     values = portable(settings)
-    del values["cluster"], values["simulation"]["threads"]
+    del values["simulation"]["threads"]
     for name in ALGORITHMS:
         if name != settings.search.algorithm:
             del values["search"][name]

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from hydroid.search.library import LibraryAlgorithm, need
-from hydroid.settings.search import CmaesSettings
+from hydroid.settings.search import PopulationSettings
 
 Float = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ SIGMA = 0.3
 """standard deviation of the first population around its mean in the unit box"""
 
 
-def cmaes(settings: CmaesSettings, parameters: int, start: Float | None = None) -> LibraryAlgorithm:
+def cmaes(settings: PopulationSettings, parameters: int, start: Float | None = None) -> LibraryAlgorithm:
     """CMA-ES on the unit box of so many parameters, from a start, shape (p,), or from its middle.
 
     Raises:
@@ -27,7 +27,7 @@ def cmaes(settings: CmaesSettings, parameters: int, start: Float | None = None) 
 
 
 class _Cmaes:
-    def __init__(self, cma: Any, settings: CmaesSettings, mean: Float, rng: Generator) -> None:
+    def __init__(self, cma: Any, settings: PopulationSettings, mean: Float, rng: Generator) -> None:
         options = {
             "bounds": [0.0, 1.0],
             "popsize": settings.population,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hydroid.search.algorithm import Population
 from hydroid.search.coding import Genes
 from hydroid.search.operators import GeneticAlgorithm, roulette
-from hydroid.settings.search import GaSettings
+from hydroid.settings.search import GeneticSettings
 
 ELITE = 1
 """best candidates that survive unchanged (ours; the article gives none)"""
@@ -22,7 +22,7 @@ class SimpleGa(GeneticAlgorithm):
     Minimises one objective: populations have objectives of shape (n, 1).
     """
 
-    settings: GaSettings
+    settings: GeneticSettings
     single = True
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:

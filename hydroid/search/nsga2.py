@@ -10,7 +10,7 @@ from hydroid.search.algorithm import Population
 from hydroid.search.coding import Genes
 from hydroid.search.operators import GeneticAlgorithm
 from hydroid.search.pareto import crowding, ranks
-from hydroid.settings.search import Nsga2Settings
+from hydroid.settings.search import GeneticSettings
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -23,7 +23,7 @@ class Nsga2(GeneticAlgorithm):
     Minimises m objectives at once: populations have objectives of shape (n, m).
     """
 
-    settings: Nsga2Settings
+    settings: GeneticSettings
     single = False
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:

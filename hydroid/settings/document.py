@@ -16,10 +16,6 @@ Lines = dict[tuple[str, ...], int]
 """line [1-based] of each key or item, by its path"""
 
 MAX_BYTES = 2**18
-MAX_NODES = 20_000
-"""aliases count as often as they are used, so that a few lines cannot expand to billions of values"""
-MAX_DEPTH = 40
-_TAG = "tag:yaml.org,2002:"
 _PLAIN = {
     "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
     "\\t": "a line is indented by a tab; use spaces",
@@ -27,24 +23,15 @@ _PLAIN = {
     "expected ',' or '}'": "a mapping {a: 1} is not closed with '}'",
 }
 """what the YAML reader stumbled over, by a part of its message"""
-_TYPES = {_TAG + name for name in ("map", "seq", "str", "int", "float", "bool", "null")}
-
-
-class _Loader(yaml.SafeLoader):
-    """A safe loader without the extras of YAML 1.1: merge keys, dates, base 60, octal numbers, yes and no."""
-
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  # PyYAML's own name and type
-
-
-for _name, _pattern, _first in (
-    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
-    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
-    ("int", r"[-+]?[0-9]{1,300}", list("-+0123456789")),  # longer ones are beyond any float
-    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?", list("-+.0123456789")),
-    ("float", r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)", list("-+.")),
-):
-    _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
-_Loader.add_constructor(_TAG + "int", lambda _, node: int(str(node.value)))
+_WORDS = {"": None, "~": None} | {
+    spelling: value
+    for word, value in (("null", None), ("true", True), ("false", False))
+    for spelling in (word, word.title(), word.upper())
+}
+_INTEGER = re.compile(r"[-+]?[0-9]{1,300}")  # longer ones are beyond any float
+_NUMBER = re.compile(
+    r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+)
 
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
@@ -76,12 +63,8 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
     """
     lines: Lines = {}
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
-        if node is None:
-            return None, lines
-        _collect_lines(node, (), lines, source)
-        return loader.construct_document(node), lines
+        node = yaml.compose(text, Loader=yaml.BaseLoader)  # every scalar is text
+        return None if node is None else _value(node, (), lines, source), lines
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{source}, line {mark.line + 1}, column {mark.column + 1}" if mark else source
@@ -90,34 +73,47 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
         raise SettingsError(f"is not YAML: {plain}", where=where) from None
     except RecursionError:
         raise SettingsError("is not YAML: it is nested too deeply", where=source) from None
-    except (ValueError, KeyError):
+    except ValueError:
         raise SettingsError("is not YAML: a value does not fit its type", where=source) from None
 
 
-def _collect_lines(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> None:
-    """Check a node and what is in it, and note their lines."""
+def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> Any:
+    """The value of a node; the lines of all that is in it are noted."""
     where = f"{source}, line {node.start_mark.line + 1}"
-    if len(lines) >= MAX_NODES:
-        raise SettingsError(f"holds more than {MAX_NODES} values", where=source)
-    if len(path) > MAX_DEPTH:
-        raise SettingsError(f"is nested more than {MAX_DEPTH} deep", where=where)
-    if node.tag not in _TYPES:
-        raise SettingsError(f"a value of type {node.tag.removeprefix(_TAG)!r} is not allowed", where=where)
-    if isinstance(node, yaml.ScalarNode) and not all(c.isprintable() or c in "\t\n" for c in node.value):
-        raise SettingsError("a text contains characters that cannot be printed", where=where)
+    if len(lines) >= 20_000:  # aliases count whenever they are used: a few lines cannot expand to billions
+        raise SettingsError("holds more than 20000 values", where=source)
+    if len(path) > 40:
+        raise SettingsError("is nested more than 40 deep", where=where)
+    kind = node.tag.removeprefix("tag:yaml.org,2002:")
+    if kind not in ("str", "seq", "map"):
+        raise SettingsError(f"a value of type {kind!r} is not allowed", where=where)
     lines.setdefault(path, node.start_mark.line + 1)
-    items: list[tuple[str, yaml.Node]] = []
+    if isinstance(node, yaml.ScalarNode):
+        return _scalar(node, where)
     if isinstance(node, yaml.SequenceNode):
-        items = [(str(index), value) for index, value in enumerate(node.value)]
-    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+        return [_value(item, (*path, str(index)), lines, source) for index, item in enumerate(node.value)]
+    values: dict[Any, Any] = {}
+    for key, item in node.value:
+        where = f"{source}, line {key.start_mark.line + 1}"
         if not isinstance(key, yaml.ScalarNode):
             raise SettingsError("a key must be plain text or a number", where=where)
-        # 02 and 2 are the same joint
-        name = str(int(key.value)) if key.tag == f"{_TAG}int" else str(key.value)
-        line = key.start_mark.line + 1
-        if (*path, name) in lines:
-            raise SettingsError(f"{'.'.join((*path, name))} occurs twice", where=f"{source}, line {line}")
-        lines[*path, name] = line
-        items.append((name, value))
-    for name, value in items:
-        _collect_lines(value, (*path, name), lines, source)
+        name = _scalar(key, where)
+        place = (*path, str(name))  # 02 and 2 are the same joint
+        if place in lines:
+            raise SettingsError(f"{'.'.join(place)} occurs twice", where=where)
+        lines[place] = key.start_mark.line + 1
+        values[name] = _value(item, place, lines, source)
+    return values
+
+
+def _scalar(node: yaml.ScalarNode, where: str) -> Any:
+    text = str(node.value)
+    if not all(c.isprintable() or c in "\t\n" for c in text):
+        raise SettingsError("a text contains characters that cannot be printed", where=where)
+    if node.style is not None:  # quoted, or a block of text
+        return text
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    return float(re.sub(r"\.(?=[iInN])", "", text)) if _NUMBER.fullmatch(text) else text

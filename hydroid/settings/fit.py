@@ -1,6 +1,7 @@
 """A fit's settings: one YAML file per job, from the log's columns to the search."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -13,18 +14,17 @@ from pydantic import (
     model_validator,
 )
 
-from hydroid.errors import SettingsError
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, ArmFile, load_arm, make_arm
 from hydroid.settings.experiment import DesignSettings
-from hydroid.settings.hydraulics import OF_THE_PIVOTS, HydraulicSettings
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings, validate
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import expanded, parameter, prior
+from hydroid.settings.parameters import expanded, make_parameter, nominal_value
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SegmentSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
-from hydroid.settings.simulation import ClusterSettings, SimulationSettings
+from hydroid.settings.simulation import SimulationSettings
 
 
 def _read_arm(value: Any, info: ValidationInfo) -> Any:
@@ -79,7 +79,6 @@ class FitSettings(Settings):
     joint_refinement: bool = False
     """at the end, refine the parameters of both stages together: all that have bounds, fixed ones included"""
     design: DesignSettings = DesignSettings()
-    cluster: ClusterSettings = ClusterSettings()
 
     @model_validator(mode="before")
     @classmethod
@@ -110,28 +109,25 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
-            if own.quantity in ("mass", *OF_THE_PIVOTS):
-                continue  # their nominal values need the compiled model: `parameter_set` looks at them
             try:
-                prior(self, own)
+                self._parameter(name, own)
             except ValueError as error:
                 raise ValueError(f"parameters.{name}: {error}") from None
         return self
 
     def parameter_set(self) -> ParameterSet:
-        """Return the parameters with units, bounds, priors and fixed values, in the order of theta.
-
-        Raises:
-            SettingsError: a prior of a mass or a pivot that its nominal value contradicts.
-        """
-        starts = any(p.states_start for p in self.parameters.values() if p.fixed is None)
-        found: list[Parameter] = []
-        for name, own in self.parameters.items():
-            try:
-                found.append(parameter(self, name, own, self.scale == "log", starts))
-            except ValueError as error:
-                raise SettingsError(f"parameters.{name}: {error}") from None
+        """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
+        found = [self._parameter(name, own) for name, own in self.parameters.items()]
+        if not any(own.states_start for own in self.parameters.values() if own.fixed is None):
+            found = [replace(one, start=None) for one in found]
         return ParameterSet(tuple(found))
+
+    def nominal(self, own: ParameterSettings) -> float | None:
+        """Return the nominal value of a parameter; None: the settings and the arm's file have none."""
+        return nominal_value(self.arm, self.hydraulics, own)
+
+    def _parameter(self, name: str, own: ParameterSettings) -> Parameter:
+        return make_parameter(name, own, self.arm, self.nominal(own), log=self.scale == "log")
 
     def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
         """Return the settings with parameters changed, or further ones behind their own."""

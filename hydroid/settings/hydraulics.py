@@ -4,35 +4,31 @@ Each setting holds for every actuator of the arm; a parameter of a fit sets or f
 openings and pivots differ by joint: they stand in the arm's file.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import Field, create_model, model_validator
+from pydantic import ConfigDict, Field, create_model, model_validator
 
 from hydroid.quantity_table import QUANTITIES, TARGETS, Quantity
-from hydroid.settings.linkage import Cylinder, LinearActuator, RotaryActuator
+from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.settings.load import Positive, Settings
-
-OF_THE_PIVOTS = ("pivot_distance_1", "pivot_distance_2", "pivot_angle")
-"""quantities whose nominal values are the model's"""
 
 
 def _field(quantity: Quantity) -> Any:
     number: Any = Annotated[float, *quantity.limits] if quantity.limits else float
-    extra: Any = {"unit": quantity.unit, "source": quantity.source}
-    default: Any = quantity.default
-    kind = number | None if quantity.optional else number
-    return kind, Field(default, description=quantity.meaning, json_schema_extra=extra)
+    return number | None if quantity.optional else number, quantity.default
 
 
-_Chain: type[Settings] = create_model(
-    "_Chain",
-    __base__=Settings,
-    **{q.name: _field(q) for q in QUANTITIES.values() if q.source in ("ours", "article")},
-)
+ROWS = {q.name: q for q in QUANTITIES.values() if q.source in ("ours", "article")}
+"""the quantities of the table that hold for all joints"""
+_Rows: type[Settings] = create_model("_Rows", __base__=Settings, **{n: _field(q) for n, q in ROWS.items()})
 
 
-class HydraulicSettings(_Chain):
-    """All numbers of the actuator chain but areas, openings and pivots, which the arm's file gives."""
+class HydraulicSettings(Settings):
+    """Values of quantities by name, for all joints; a name without _a or _b sets both sides."""
+
+    model_config = ConfigDict(extra="allow")
+    more: ClassVar[Iterable[str]] = ROWS
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
@@ -42,12 +38,11 @@ class HydraulicSettings(_Chain):
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """A quantity, by its name in `QUANTITIES`."""
+            """A quantity, by its name in `ROWS`."""
 
     @model_validator(mode="before")
     @classmethod
-    def _both_sides(cls, values: Any) -> Any:
-        """Let a name without _a or _b set both sides."""
+    def _of_the_table(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
         spread: dict[Any, Any] = {}
@@ -56,26 +51,26 @@ class HydraulicSettings(_Chain):
                 if name in spread:
                     raise ValueError(f"{name} is given twice")
                 spread[name] = value
-        return spread
+        others = {name: spread.pop(name) for name in cls.model_fields if name in spread}
+        return others | _Rows.model_validate(spread).model_dump()
 
 
 def actuator_values(
-    actuator: LinearActuator | Cylinder | RotaryActuator | None, settings: HydraulicSettings
+    actuator: LinearActuator | RotaryActuator | None, settings: HydraulicSettings
 ) -> dict[str, float | None]:
     """Return the value of every quantity of a joint in the units of QUANTITIES; None: no limit.
 
     Mechanical quantities are 0: only a fit states them. A joint without an actuator has the defaults, which
-    nothing uses: it is never driven in stage 2. Of a cylinder's settings alone the pivots are not known.
+    nothing uses: it is never driven in stage 2.
     """
     values: dict[str, Any] = {name: q.default for name, q in QUANTITIES.items()} | settings.model_dump()
     if isinstance(actuator, LinearActuator):
-        sides, actuator = actuator.triangle, actuator.settings
-        values |= zip(OF_THE_PIVOTS, (sides.a, sides.b, sides.theta0), strict=True)
-    if actuator is not None:
-        values["opening_a"] = values["opening_b"] = actuator.max_opening
-    if isinstance(actuator, Cylinder):
-        values["area_a"], values["area_b"] = actuator.area_a, actuator.area_b
+        one, sides = actuator.settings, actuator.triangle
+        values |= {"opening_a": one.max_opening, "opening_b": one.max_opening}
+        values |= {"area_a": one.area_a, "area_b": one.area_b, "pivot_angle": sides.theta0}
+        values |= {"pivot_distance_1": sides.a, "pivot_distance_2": sides.b}
     elif actuator is not None:
-        values["area_a"] = values["area_b"] = actuator.displacement
+        values |= dict.fromkeys(("opening_a", "opening_b"), actuator.max_opening)
+        values |= dict.fromkeys(("area_a", "area_b"), actuator.displacement)
         values["dead_volume"] = settings.rotary_volume
     return {name: values[name] for name in QUANTITIES}

@@ -8,22 +8,22 @@ its numbers are ours.)
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
-from hydroid.settings.arm_outline import DIGITS
 from hydroid.settings.load import Positive, Settings
+
+if TYPE_CHECKING:
+    import mujoco
 
 Vector = tuple[float, float, float]
 Array = NDArray[np.float64]
 
-PIVOT_SKEW = 0.1
-"""part of a cylinder's length by which its pivots may lie apart along the joint's axis: the triangle is flat,
-and errs by half the square of it"""
-STROKE_TOLERANCE = 0.02
-"""part of the travel that a stroke may lack, since catalogues round: the cylinder then stops first"""
+DIGITS = 9
+"""of lengths in m and angles in deg that are read off a model: what is finer is its rounding"""
 
 
 def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:
@@ -135,6 +135,14 @@ class Cylinder(Settings):
     max_opening: Positive
     """largest valve opening [mm²]"""
 
+    @model_validator(mode="after")
+    def _one_geometry(self) -> "Cylinder":
+        if self.pivots is not None and self.triangle is not None:
+            raise ValueError("pivots take the place of triangle: give one")
+        if self.four_bar is not None and self.triangle is None:
+            raise ValueError("four_bar needs a triangle")
+        return self
+
 
 class RotaryActuator(Settings):
     """A rotary vane or piston actuator on the joint's axis."""
@@ -184,15 +192,46 @@ class LinearActuator:
         return length, arm * first
 
 
+def sides_of(
+    settings: Cylinder, data: "mujoco.MjData", joint: str
+) -> tuple[Triangle, tuple[Vector, Vector] | None]:
+    """Return a cylinder's triangle, and its pivots in the frames of the parent and of the moved body [m].
+
+    `data` has all joints of the arm at 0. A cylinder whose triangle is given has no pivots.
+
+    Raises:
+        ValueError: pivots that are not stated, or that make no triangle.
+    """
+    if settings.triangle is not None:
+        return settings.triangle, None
+    if settings.pivots is not None:
+        ends = np.array([settings.pivots.parent, settings.pivots.child])
+    else:
+        try:
+            ends = np.array([data.site(f"{joint}_pivot_{end}").xpos for end in ("parent", "child")])
+        except KeyError as error:
+            name = str(error).split("'")[1]
+            raise ValueError(f"the model has no site {name}; add it, or give pivots") from None
+    axis, child = data.joint(joint), int(data.model.joint(joint).bodyid[0])
+    bodies = int(data.model.body_parentid[child]), child
+    local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
+    parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
+    near, far = ends - axis.xanchor
+    return triangle_of(near, far, axis.xaxis), (parent, moved)
+
+
 def make_cylinder(
-    settings: Cylinder, found: Triangle, limits: tuple[float, float], pivots: tuple[Vector, Vector] | None
+    settings: Cylinder,
+    sides: Triangle,
+    limits: tuple[float, float],
+    pivots: tuple[Vector, Vector] | None = None,
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [deg].
 
     Raises:
         ValueError: a dead centre in the range, a linkage that does not reach, or a stroke that is too short.
     """
-    sides = found.model_copy(update={"a": max(found.a, found.b), "b": min(found.a, found.b)})
+    sides = sides.model_copy(update={"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
     angles = np.radians(np.linspace(*limits, 181))
     with np.errstate(all="ignore"):
@@ -204,9 +243,8 @@ def make_cylinder(
         raise ValueError(f"its {'four-bar linkage' if settings.four_bar else 'cylinder'} {what}")
     needed = 1e3 * float(np.ptp(cylinder.length(np.radians(limits))))
     stroke = settings.stroke or round(needed, 3)
-    if stroke < (1 - STROKE_TOLERANCE) * needed:
-        what = f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm"
-        raise ValueError(what)
+    if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
+        raise ValueError(f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm")
     return replace(cylinder, stroke=stroke)
 
 
@@ -223,7 +261,7 @@ def triangle_of(parent: Array, child: Array, axis: Array) -> Triangle:
         which = "parent" if a < 1e-6 else "child"
         raise ValueError(f"the pivot on the {which} lies on the joint's axis, so it has no moment arm")
     length, skew = float(np.linalg.norm(near - far)), abs(heights[0] - heights[1])
-    if skew > PIVOT_SKEW * length:
+    if skew > 0.1 * length:  # the triangle is flat, and errs by half the square of this part
         raise ValueError(
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
             "a cylinder must lie across the axis"

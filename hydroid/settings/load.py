@@ -1,9 +1,9 @@
 """YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -46,6 +46,8 @@ class Settings(BaseModel):
     """Base of all settings: frozen; an unknown key is an error, and so is true for a number or "3" for 3."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+    more: ClassVar[Iterable[str]] = ()
+    """names besides the fields'"""
 
     @model_validator(mode="before")
     @classmethod
@@ -162,7 +164,7 @@ def _line(key: str, lines: Lines) -> str:
     return f", line {place}" if place else ""
 
 
-def _explained(fault: Any, kind: type[BaseModel]) -> tuple[str, str]:
+def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
     """The dotted key of a setting, and what is wrong with it, from one of pydantic's faults."""
     key = ".".join(str(part) for part in fault["loc"]).removesuffix(".[key]")
     if fault["type"] == "missing":
@@ -191,12 +193,12 @@ def _shown(value: object) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
 
 
-def _allowed(kind: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
+def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:
     """Names of the settings at `loc`, if the path can be followed through nested classes."""
     for part in loc:
         field = kind.model_fields.get(str(part))
         inner = field.annotation if field else None
-        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+        if not (isinstance(inner, type) and issubclass(inner, Settings)):
             return []
         kind = inner
-    return [field.alias or name for name, field in kind.model_fields.items()]
+    return [*kind.model_fields, *kind.more]

@@ -146,6 +146,28 @@ class LogSettings(Settings):
         names = tuple(name.replace(JOINT, str(joint)) for name in given["column"])
         return ColumnMap(names, given["unit"], given["scale"], given["offset"])
 
+    def of_arm(self, side: str) -> "LogSettings":
+        """Return the columns of one of two arms: their names begin with its own; the time's is common."""
+
+        def named(columns: Columns | None, default: tuple[str, ...] = ()) -> Columns | None:
+            names = columns and (columns.column or default)
+            return columns and columns.model_copy(
+                update={"column": tuple(f"{side}_{name}" for name in names or ()) or None}
+            )
+
+        common = {kind: named(getattr(self, kind), default.column) for kind, default in DEFAULTS.items()}
+        joints = {
+            joint: own and own.model_copy(update={kind: named(getattr(own, kind)) for kind in DEFAULTS})
+            for joint, own in self.joints.items()
+        }
+        return self.model_copy(update=common | {"joints": joints})
+
+    def angles_only(self) -> "LogSettings":
+        """Return the columns of a trajectory: whatever commands and pressures it holds are not read."""
+        nothing = {"command": None, "pressure": None}
+        joints = {joint: own and own.model_copy(update=nothing) for joint, own in self.joints.items()}
+        return self.model_copy(update=nothing | {"joints": joints})
+
 
 def _given(columns: Columns) -> dict[str, Any]:
     return {name: value for name, value in columns if value is not None}

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from hydroid.parameters import Parameter, Prior
 from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
 from hydroid.settings.arm import Arm
-from hydroid.settings.hydraulics import OF_THE_PIVOTS, HydraulicSettings, actuator_values
+from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
 
@@ -17,22 +17,6 @@ BOUND_SD = 4.0
 """standard deviations of its prior that a parameter without bounds may be away"""
 SMALLEST = 0.01
 """part of the nominal value below which a quantity that must be above 0 is not searched by default"""
-ROTARY_UNITS = {"mm²": "cm³/rad", "N": "N·m"}
-"""of the areas and the dry friction of a rotary actuator"""
-
-
-class Machine(Protocol):
-    """What a fit's settings say of the machine, where nominal values come from."""
-
-    @property
-    def arm(self) -> Arm:
-        """The arm."""
-        ...
-
-    @property
-    def hydraulics(self) -> HydraulicSettings:
-        """The hydraulics of all joints."""
-        ...
 
 
 def expanded(
@@ -73,76 +57,72 @@ def expanded(
     return result
 
 
-def nominal_value(machine: Machine, parameter: ParameterSettings) -> float | None:
+def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if parameter.nominal is not None:
-        return parameter.nominal
-    arm = machine.arm
-    if parameter.link is not None:
-        return dict(zip(arm.link_names, arm.masses.tolist(), strict=True)).get(parameter.link)
-    if parameter.quantity in MECHANICAL:
+    if own.nominal is not None:
+        return own.nominal
+    if own.link is not None:
+        return arm.mass_of.get(own.link)
+    if own.quantity in MECHANICAL:
         return None
-    among = arm.actuators
-    if parameter.quantity in OF_THE_PIVOTS:
-        among = tuple(joint.actuator for joint in arm.joints)
-    actuators = (
-        among if parameter.joints is None else [among[j - 1] for j in parameter.joints if j <= len(among)]
-    )
-    tables = [actuator_values(a, machine.hydraulics) for a in actuators if a is not None]
-    values = {table[side] for table in tables for side in TARGETS[parameter.quantity]}
+    actuators = [arm.joints[j - 1].actuator for j in _places(arm, own)]
+    tables = [actuator_values(a, hydraulics) for a in actuators if a is not None]
+    values = {table[side] for table in tables for side in TARGETS[own.quantity]}
     return values.pop() if len(values) == 1 else None
 
 
-def prior(machine: Machine, parameter: ParameterSettings) -> Prior | None:
-    """Return the prior of a parameter; None: it has none.
+def make_parameter(
+    name: str, own: ParameterSettings, arm: Arm, nominal: float | None, *, log: bool
+) -> Parameter:
+    """Return one parameter with its bounds, prior and start; `nominal` is as `nominal_value` has it.
+
+    `log`: on a log scale where it is positive, as one with a log-normal prior always is.
 
     Raises:
-        ValueError: no nominal value, or one that does not fit.
+        ValueError: a prior without a nominal value, or one that does not fit.
     """
-    if not parameter.has_prior:
+    prior = _prior(own, nominal)
+    lower, upper = own.bounds or _default_bounds(own, prior)
+    start = own.start if own.start is not None else nominal
+    start = None if start is None else min(max(start, lower), upper)
+    on_log = lower > 0 and (log or (prior is not None and prior.log))
+    return Parameter(name, _unit(arm, own), lower, upper, own.fixed, on_log, start, prior)
+
+
+def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
+    if not own.has_prior:
         return None
-    nominal = nominal_value(machine, parameter)
     if nominal is None:
-        word = "sd" if parameter.within is None else "within"
+        word = "sd" if own.within is None else "within"
         raise ValueError(
             f"{word}: needs a nominal value; the settings and the arm's file have none for this "
-            f"{parameter.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
+            f"{own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
         )
-    if parameter.bounds is not None and not parameter.bounds[0] <= nominal <= parameter.bounds[1]:
-        raise ValueError(f"the nominal value {nominal:g} {parameter.unit} lies outside the bounds")
-    if parameter.sd is not None:
-        return Prior(nominal, parameter.sd)
-    assert parameter.within is not None
+    if own.bounds is not None and not own.bounds[0] <= nominal <= own.bounds[1]:
+        raise ValueError(f"the nominal value {nominal:g} {own.unit} lies outside the bounds")
+    if own.within is None:
+        return Prior(nominal, own.sd or math.inf)
     if nominal <= 0:
         raise ValueError("within: factor needs a nominal value above 0; give sd: instead")
-    return Prior(nominal, math.log(parameter.within) / QUANTILE, log=True)
+    return Prior(nominal, math.log(own.within) / QUANTILE, log=True)
 
 
-def parameter(machine: Machine, name: str, own: ParameterSettings, log: bool, starts: bool) -> Parameter:
-    """Return one parameter with its bounds and prior.
-
-    `log`: on a log scale where it is positive, as one with a log-normal prior always is. `starts`: with a
-    start value where the settings or the machine give one.
-    """
-    known = prior(machine, own)
-    lower, upper = own.bounds or _default_bounds(own, known)
-    start = own.start if own.start is not None else nominal_value(machine, own)
-    start = min(max(start, lower), upper) if starts and start is not None else None
-    on_log = lower > 0 and (log or (known is not None and known.log))
-    return Parameter(name, _unit(machine.arm, own), lower, upper, own.fixed, on_log, start, known)
+def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
+    if prior is None:
+        return own.fixed or 0.0, own.fixed or 0.0
+    least = SMALLEST * prior.nominal if CHOICES[own.quantity].positive else 0.0
+    return max(prior.value(-BOUND_SD), least), prior.value(BOUND_SD)
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
     """The unit of a parameter; areas and dry friction of rotary actuators have their own."""
-    actuators = [arm.actuators[j - 1] for j in own.joints or () if j <= len(arm.joint_names)]
+    actuators = [arm.joints[j - 1].actuator for j in _places(arm, own)] if own.joints else []
     rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
-    return ROTARY_UNITS[own.unit] if rotary and sized else own.unit
+    return {"mm²": "cm³/rad", "N": "N·m"}[own.unit] if rotary and sized else own.unit
 
 
-def _default_bounds(own: ParameterSettings, known: Prior | None) -> tuple[float, float]:
-    if known is None:
-        return own.fixed or 0.0, own.fixed or 0.0
-    least = SMALLEST * known.nominal if CHOICES[own.quantity].positive else 0.0
-    upper = known.value(BOUND_SD)
-    return max(known.value(-BOUND_SD), least), upper
+def _places(arm: Arm, own: ParameterSettings) -> list[int]:
+    """Numbers of the joints that a parameter acts on; those that the arm lacks are refused elsewhere."""
+    every = range(1, len(arm.joints) + 1)
+    return [j for j in (every if own.joints is None else own.joints) if j in every]

@@ -178,8 +178,6 @@ class ObjectiveSettings(Settings):
     relative: bool = False
     """divide by the norm of the measured output of the same segment, equation (19)"""
     segments: SegmentSettings = SegmentSettings(equal=8)
-    count: Literal["samples", "logs"] = "samples"
-    """samples: every sample counts the same; logs: every log counts the same, however long"""
     weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
     pressure_weight: NotNegative = 0.0
@@ -187,5 +185,3 @@ class ObjectiveSettings(Settings):
     noise_deg: Positive | dict[JointNumber, Positive] | None = None
     """standard deviation of the white noise of measured angles, for all joints or by joint [deg]; null: it is
     estimated from the residuals, with its autocorrelation"""
-    noise_bar: Positive | None = None
-    """standard deviation of the white noise of measured chamber pressures [bar]; null: it is estimated"""

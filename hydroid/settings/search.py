@@ -1,31 +1,34 @@
 """Settings of the searches; the defaults are the article's table 5, and ours where it is silent."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hydroid.settings.load import Settings
 
 Rate = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
-Generations = Annotated[int, Field(ge=0)]
 
 
 class PopulationSettings(Settings):
-    """Settings that all searches by populations share."""
+    """A search by populations."""
 
-    population: Annotated[int, Field(ge=2, le=100_000)]
+    population: Annotated[int, Field(ge=4, le=100_000)] = 20
     """number of candidates in a population"""
-    generations: Generations
+    generations: Annotated[int, Field(ge=0)] = 140
     """number of populations after the first one"""
 
 
 class GeneticSettings(PopulationSettings):
-    """Settings that both genetic algorithms share: coding and operators."""
+    """A genetic algorithm of the article.
 
-    crossover_rate: Rate
+    For NSGA-II table 5 says "proportional" parent selection too. With several objectives there is no one
+    fitness to be proportional to, and the article names NSGA-II: parents come from its crowded tournament.
+    """
+
+    crossover_rate: Rate = 0.8
     """probability P_c that a pair of parents is crossed; otherwise its children are copies"""
-    mutation_rate: Rate
+    mutation_rate: Rate = 0.05
     """probability P_m that an element (one parameter) of a child changes"""
     coding: Literal["binary", "integer"] = "binary"
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
@@ -33,43 +36,11 @@ class GeneticSettings(PopulationSettings):
     """pointwise: cut parents at two places; uniform: choose each element from either parent"""
 
 
-class GaSettings(GeneticSettings):
-    """The simple genetic algorithm, article 4.1."""
-
-    population: Annotated[int, Field(ge=2, le=100_000)] = 70
-    generations: Generations = 40
-    crossover_rate: Rate = 0.8
-    mutation_rate: Rate = 0.05
-
-
-class Nsga2Settings(GeneticSettings):
-    """The multi-objective genetic algorithm, article 4.2.
-
-    Table 5 says "proportional" parent selection here too. With several objectives there is no one
-    fitness to be proportional to, and the article names NSGA-II: parents come from its crowded tournament.
-    """
-
-    population: Annotated[int, Field(ge=2, le=100_000)] = 20
-    generations: Generations = 140
-    crossover_rate: Rate = 0.4
-    mutation_rate: Rate = 0.2
-
-
-class CmaesSettings(PopulationSettings):
-    """CMA-ES (Hansen) of the library cma; its objective is the error over the whole log."""
-
-    population: Annotated[int, Field(ge=6, le=100_000)] = 20
-    generations: Generations = 140
-    """number of populations after the first one; fewer if the search converges earlier"""
-
-
 class PymooSettings(PopulationSettings):
     """An algorithm of the library pymoo."""
 
     algorithm: Literal["NSGA3", "MOEAD", "RVEA", "AGEMOEA", "SMSEMOA", "DE", "PSO"] = "NSGA3"
     """its name there; DE and PSO minimise the error over the whole log, the others that of every segment"""
-    population: Annotated[int, Field(ge=4, le=100_000)] = 40
-    generations: Generations = 70
 
 
 class MultistartSettings(Settings):
@@ -112,11 +83,28 @@ class SearchSettings(Settings):
     compromise: Literal["average", "utopia", "best"] = "average"
     """average: mean of the best candidates of all segments, the article's; utopia: candidate nearest to
     the utopia point; best: candidate of the lowest norm"""
-    ga: GaSettings = GaSettings()
-    nsga2: Nsga2Settings = Nsga2Settings()
-    cmaes: CmaesSettings = CmaesSettings()
-    pymoo: PymooSettings = PymooSettings()
+    ga: GeneticSettings = GeneticSettings(population=70, generations=40)
+    """the simple genetic algorithm, article 4.1"""
+    nsga2: GeneticSettings = GeneticSettings(crossover_rate=0.4, mutation_rate=0.2)
+    """the multi-objective genetic algorithm NSGA-II, article 4.2"""
+    cmaes: PopulationSettings = PopulationSettings()
+    """CMA-ES (Hansen) of the library cma; its objective is the error over the whole log. It ends
+    earlier where it converges"""
+    pymoo: PymooSettings = PymooSettings(population=40, generations=70)
     multistart: MultistartSettings = MultistartSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete(cls, values: Any) -> Any:
+        """Give an algorithm what its section leaves out: defaults differ, though a class may be shared."""
+        if not isinstance(values, dict):
+            return values
+        sections = ((name, values.get(name)) for name in ("ga", "nsga2", "pymoo"))
+        return values | {
+            name: cls.model_fields[name].default.model_dump() | section
+            for name, section in sections
+            if isinstance(section, dict)
+        }
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""How logs are simulated, and the Slurm jobs that may do it."""
+"""How logs are simulated."""
 
 from typing import Annotated, Literal
 
@@ -21,18 +21,3 @@ class SimulationSettings(Settings):
     measured_cutoff_hz: Annotated[float, Field(gt=0, le=50)] = 4.0
     """cutoff of the low-pass filter on motion that joints follow [Hz]; its second derivative becomes a
     torque"""
-
-
-class ClusterSettings(Settings):
-    """Slurm jobs of `--dask slurm`, with one worker per core; no result depends on them."""
-
-    jobs: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """number of jobs"""
-    cores: Annotated[int, Field(ge=1, le=1024)] = 4
-    """cores of each job"""
-    memory: Annotated[str, Field(pattern=r"^[0-9]+ ?[KMGT]i?B$")] = "4GiB"
-    """memory of each job, such as 4GiB"""
-    walltime: Annotated[str, Field(pattern=r"^([0-9]+-)?[0-9]{1,2}:[0-9]{2}:[0-9]{2}$")] = "01:00:00"
-    """time limit of each job, [days-]hours:minutes:seconds; a new job replaces one that ends"""
-    queue: str | None = None
-    """Slurm's partition; null: the site's default"""

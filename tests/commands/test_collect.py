@@ -186,8 +186,8 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, fi
     begun("log.csv")
     change(Path("seed-3/run.json"), hydroid="0.0")
     assert refused().startswith("seed-3: was made by hydroid 0.0, not ")
-    # threads and jobs change no bit
-    begun("log.csv", **{"simulation.threads": 1, "cluster.jobs": 7})
+    # threads change no bit
+    begun("log.csv", **{"simulation.threads": 1})
     assert collected(caplog, "seed-*") == ([1, 2, 3], [])
 
 

@@ -16,7 +16,6 @@ from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
-from hydroid.settings.two_arms import columns_of
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
@@ -105,7 +104,7 @@ def test_each_arm_has_its_own_columns(model: IdentifiedModel, tmp_path: Path):
 
 def test_columns_of_single_joints_are_named_too():
     changed = load_settings("fit-mech", {"log.joints": {2: {"command": {"column": ["up", "down"]}}, 4: None}})
-    left = columns_of(changed.log, "left")
+    left = changed.log.of_arm("left")
     command, angle, none = left.columns("command", 2), left.columns("angle", 3), left.columns("command", 4)
     assert command is not None
     assert command.column == ("left_up", "left_down")

@@ -7,11 +7,10 @@ import pytest
 from hydraulic_reference import changed, simulate, wheel
 from recovery import assert_recovered, duties, recover, settings_of
 
-from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, linkages, nominal_joints
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.linkage import FourBar, Triangle, four_bar
+from hydroid.settings.linkage import FourBar, Triangle, four_bar, make_cylinder
 
 SETTINGS = HydraulicSettings()
 SHOULDER = 1
@@ -20,19 +19,18 @@ SHOULDER = 1
 def with_cylinder(arm: Arm, **changes) -> Arm:
     """The arm with other settings of the shoulder's cylinder; its triangle is given, not its pivots."""
     joint = arm.joints[SHOULDER]
-    cylinder = joint.actuator
+    cylinder, limits = joint.actuator, changes.pop("range", joint.range)
     changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
-    actuators = arm.file.actuators | {joint.name: cylinder.settings.model_copy(update=changes)}
-    return replace(arm, file=arm.file.model_copy(update={"actuators": actuators}))
+    settings = cylinder.settings.model_copy(update=changes)
+    moved = replace(joint, range=limits, actuator=make_cylinder(settings, settings.triangle, limits))
+    return replace(arm, joints=(*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :]))
 
 
 def mirrored(arm: Arm) -> Arm:
     """The same with the shoulder's angle counted the other way: its cylinder extends to negative angles."""
-    low, high = arm.ranges[SHOULDER]
+    low, high = arm.joints[SHOULDER].range
     triangle = arm.joints[SHOULDER].actuator.triangle.model_copy(update={"extends": "negative"})
-    turned = with_cylinder(arm, triangle=triangle)
-    ranges = (*arm.ranges[:SHOULDER], (-high, -low), *arm.ranges[SHOULDER + 1 :])
-    return replace(turned, outline=replace(arm.outline, ranges=ranges))
+    return with_cylinder(arm, triangle=triangle, range=(-high, -low))
 
 
 def shoulder(arm: Arm, **values: float) -> Records:
@@ -98,8 +96,8 @@ def test_a_bucket_turns_by_flow_over_area_and_moment_arm(arm: Arm):
 
 
 def test_a_linkage_that_does_not_reach_is_refused(arm: Arm):
-    with pytest.raises(SettingsError, match="four-bar linkage does not reach all of its range"):
-        bucket(arm, coupler=0.05).joints  # noqa: B018
+    with pytest.raises(ValueError, match="four-bar linkage does not reach all of its range"):
+        bucket(arm, coupler=0.05)
 
 
 def test_pivots_are_recovered():

@@ -23,7 +23,6 @@ from hydroid.parallel import cluster
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
-from hydroid.settings.simulation import ClusterSettings
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
@@ -54,7 +53,7 @@ def two() -> Iterator[DaskWorkers]:
     # a chunk that kills is tried once more and not three times: each death costs seconds
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1, **IMPATIENT}),
-        open_workers("local:2", ClusterSettings()) as opened,
+        open_workers("local:2") as opened,
     ):
         assert opened is not None
         yield opened
@@ -177,7 +176,7 @@ def test_a_scheduler_of_a_script_refuses_foreigners(site: Site, monkeypatch: pyt
     for given in (site.address, site.address.replace("tls", "tcp"), str(site.file)):
         with (
             pytest.raises(RunError, match="no Dask scheduler answers"),
-            open_workers(given, ClusterSettings()),
+            open_workers(given),
         ):
             pass
     with pytest.raises(OSError, match=r"[Tt]imed out|TLS|SSL"):
@@ -189,7 +188,7 @@ def test_one_two_and_four_workers_and_one_killed_change_no_bit(site: Site, tmp_p
     theta = random_candidates(plain, 9)
     with (
         dask.config.set(site.credentials),
-        open_workers(str(site.file), ClusterSettings()) as workers,
+        open_workers(str(site.file)) as workers,
     ):
         assert workers is not None
         spread = Problem(*arguments(), workers)
@@ -210,7 +209,7 @@ def test_a_lost_scheduler_is_one_error(site: Site):
     with (
         dask.config.set(site.credentials),
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
-        open_workers(str(site.file), ClusterSettings()) as workers,
+        open_workers(str(site.file)) as workers,
     ):
         assert workers is not None
         rows = Rows()
@@ -239,9 +238,10 @@ def test_slurm_jobs_become_workers_with_credentials(tmp_path: Path, monkeypatch:
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     monkeypatch.chdir(tmp_path)
-    settings = ClusterSettings(jobs=1, cores=2, memory="1GiB", walltime="00:10:00", queue="debug")
+    job = {"cores": 2, "memory": "1GiB", "walltime": "00:10:00", "queue": "debug"}
+    configuration = {f"jobqueue.slurm.{key}": value for key, value in job.items()}
     try:
-        with open_workers("slurm", settings) as workers:
+        with dask.config.set(configuration), open_workers("slurm") as workers:
             assert workers is not None
             np.testing.assert_array_equal(workers(Rows(), "squares", NINE, 2), NINE**2)
             wait_for(lambda: workers.count == 2)

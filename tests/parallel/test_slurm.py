@@ -13,12 +13,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import dask
 import numpy as np
 import pytest
 from worker_targets import Rows
 
 from hydroid.parallel.cluster import open_workers
-from hydroid.settings.simulation import ClusterSettings
 
 pytestmark = [
     pytest.mark.slow,
@@ -158,10 +158,11 @@ def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(
     site: Path, monkeypatch: pytest.MonkeyPatch
 ):
     pytest.importorskip("dask_jobqueue")
-    settings = ClusterSettings(jobs=2, cores=1, memory="1GiB", walltime="00:10:00")
+    job = {"cores": 1, "memory": "1GiB", "walltime": "00:10:00"}
+    configuration = {f"jobqueue.slurm.{key}": value for key, value in job.items()}
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     theta = np.arange(6.0)[:, None]
-    with open_workers("slurm", settings) as workers:
+    with dask.config.set(configuration), open_workers("slurm:2") as workers:
         assert workers is not None
 
         def works() -> bool:

@@ -20,7 +20,6 @@ from hydroid.parallel import cluster, workers
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
-from hydroid.settings.simulation import ClusterSettings
 
 distributed = pytest.importorskip("distributed")
 NINE = np.arange(18.0).reshape(9, 2)
@@ -28,13 +27,13 @@ NINE = np.arange(18.0).reshape(9, 2)
 
 @pytest.fixture(scope="module")
 def two() -> Iterator[DaskWorkers]:
-    with open_workers("local:2", ClusterSettings()) as opened:
+    with open_workers("local:2") as opened:
         assert opened is not None
         yield opened
 
 
 def opened(dask: str | None, **options: bool) -> None:
-    with open_workers(dask, ClusterSettings(), **options):
+    with open_workers(dask, **options):
         pass
 
 
@@ -173,7 +172,7 @@ def test_what_is_no_scheduler_is_said_so(dask: str, tmp_path: Path, monkeypatch:
 
 
 def test_no_workers_no_slurm_and_no_dask(monkeypatch: pytest.MonkeyPatch):
-    with open_workers(None, ClusterSettings()) as nothing:
+    with open_workers(None) as nothing:
         assert nothing is None
     monkeypatch.setenv("PATH", "")
     with pytest.raises(SettingsError, match="no sbatch"):

@@ -6,7 +6,7 @@ from hydroid.errors import SettingsError
 from hydroid.search.algorithm import Population
 from hydroid.search.ga import SimpleGa
 from hydroid.settings.load import validate
-from hydroid.settings.search import GaSettings
+from hydroid.settings.search import GeneticSettings
 
 
 def sphere(points):
@@ -24,14 +24,14 @@ def with_failures(points):
 @pytest.mark.parametrize("cross", ["pointwise", "uniform"])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_finds_the_bottom_of_a_sphere(coding, cross, seed):
-    ga = SimpleGa(GaSettings(coding=coding, crossover=cross), 9)
+    ga = SimpleGa(GeneticSettings(coding=coding, crossover=cross), 9)
     population = advance(ga, sphere, None, np.random.default_rng(seed), 200)
     random = sphere(np.random.default_rng(seed).random((201 * 70, 9))).min()
     assert population.objectives.min() < random / 5  # random search with the same number of evaluations
 
 
 def test_solves_one_max():
-    ga = SimpleGa(GaSettings(mutation_rate=0.03), 9)
+    ga = SimpleGa(GeneticSettings(mutation_rate=0.03), 9)
 
     def count(points):
         return -ga.coding.encode(points).sum(axis=1, dtype=float)[:, None]
@@ -45,7 +45,7 @@ def test_solves_one_max():
 
 
 def test_the_best_one_is_kept_and_not_evaluated_again():
-    ga = SimpleGa(GaSettings(population=11), 3)
+    ga = SimpleGa(GeneticSettings(population=11), 3)
     rng = np.random.default_rng(0)
     population = advance(ga, with_failures, None, rng, 0)
     for _ in range(30):
@@ -60,7 +60,7 @@ def test_the_best_one_is_kept_and_not_evaluated_again():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_infeasible_candidates_have_no_children(bad):
-    ga = SimpleGa(GaSettings(crossover_rate=0, mutation_rate=0), 2)
+    ga = SimpleGa(GeneticSettings(crossover_rate=0, mutation_rate=0), 2)
     rng = np.random.default_rng(0)
     chromosomes = ga.ask(None, rng)
     objectives = sphere(ga.decode(chromosomes))
@@ -73,14 +73,14 @@ def test_infeasible_candidates_have_no_children(bad):
 
 
 def test_survives_a_population_without_a_feasible_candidate():
-    ga = SimpleGa(GaSettings(), 3)
+    ga = SimpleGa(GeneticSettings(population=70), 3)
     population = advance(ga, lambda x: np.full((len(x), 1), np.nan), None, np.random.default_rng(0), 3)
     assert len(population) == 70
     assert not population.feasible.any()
 
 
 def test_more_than_one_objective_is_a_mistake():
-    ga = SimpleGa(GaSettings(), 2)
+    ga = SimpleGa(GeneticSettings(population=70), 2)
     with pytest.raises(ValueError, match="one objective, not 2"):
         ga.ask(Population(ga.ask(None, np.random.default_rng(0)), np.ones((70, 2))), np.random.default_rng(0))
 
@@ -96,4 +96,4 @@ def test_objectives_that_do_not_belong_to_the_chromosomes_are_a_mistake():
 )
 def test_settings_out_of_range_are_refused(values):
     with pytest.raises(SettingsError, match=next(iter(values))):
-        validate(values, GaSettings, "fit.yaml")
+        validate(values, GeneticSettings, "fit.yaml")

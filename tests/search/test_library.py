@@ -15,7 +15,7 @@ from hydroid.search.library import UNSCALED, LibraryAlgorithm
 from hydroid.search.moo import ALGORITHMS, directions, pymoo
 from hydroid.search.nsga2 import crowded_order
 from hydroid.settings.load import validate
-from hydroid.settings.search import CmaesSettings, PymooSettings
+from hydroid.settings.search import PopulationSettings, PymooSettings
 
 ENDS = np.array([[0.2, 0.5, 0.3], [0.7, 0.4, 0.6]])
 """Two points: least distances to both lie on the straight line between them."""
@@ -27,7 +27,7 @@ SEVERAL = [name for name in ALGORITHMS if name not in SINGLE]
 
 def build(name: str, population: int = 20, generations: int = 30, parameters: int = 3) -> LibraryAlgorithm:
     if name == "cmaes":
-        return cmaes(CmaesSettings(population=population, generations=generations), parameters)
+        return cmaes(PopulationSettings(population=population, generations=generations), parameters)
     settings = PymooSettings(algorithm=name, population=population, generations=generations)
     return pymoo(settings, parameters, 2)
 

@@ -10,7 +10,7 @@ from hydroid.search.algorithm import Population
 from hydroid.search.ga import SimpleGa
 from hydroid.search.nsga2 import Nsga2, crowded_order, tournament
 from hydroid.search.pareto import crowding, ranks
-from hydroid.settings.search import GaSettings, Nsga2Settings
+from hydroid.settings.search import GeneticSettings
 
 
 def two_goals(points):
@@ -29,7 +29,7 @@ def with_failures(points):
 )
 def test_reaches_what_pymoo_reaches_with_the_same_budget(name, size, reference):
     problem, volume = get_problem(name, **size), HV(ref_point=np.array(reference))
-    settings = Nsga2Settings(population=40, crossover_rate=0.9, mutation_rate=1 / problem.n_var)
+    settings = GeneticSettings(population=40, crossover_rate=0.9, mutation_rate=1 / problem.n_var)
     search, ours, theirs, start = Nsga2(settings, problem.n_var), [], [], []
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -42,7 +42,7 @@ def test_reaches_what_pymoo_reaches_with_the_same_budget(name, size, reference):
 
 
 def test_survivors_are_never_dominated_by_the_dropped():
-    search = Nsga2(Nsga2Settings(population=12), 3)
+    search = Nsga2(GeneticSettings(population=12), 3)
     rng = np.random.default_rng(0)
     parents = advance(search, two_goals, None, rng, 0)
     offspring = evaluate(search, search.ask(parents, rng), two_goals)
@@ -56,7 +56,7 @@ def test_survivors_are_never_dominated_by_the_dropped():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_there(bad):
-    search = Nsga2(Nsga2Settings(population=20), 2)
+    search = Nsga2(GeneticSettings(population=20), 2)
     rng = np.random.default_rng(0)
     chromosomes = search.ask(None, rng)
     objectives = two_goals(search.decode(chromosomes))
@@ -97,7 +97,7 @@ def test_roomier_candidates_win_among_equals():
 @pytest.mark.parametrize("coding", ["binary", "integer"])
 @pytest.mark.parametrize("kind", [SimpleGa, Nsga2])
 def test_the_seed_alone_decides_every_bit(kind, coding):
-    settings = (GaSettings if kind is SimpleGa else Nsga2Settings)(coding=coding, population=13)
+    settings = GeneticSettings(coding=coding, population=13)
     search = kind(settings, 5)
 
     def function(points):

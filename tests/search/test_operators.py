@@ -12,7 +12,7 @@ from hydroid.search.operators import (
     roulette,
     uniform_swaps,
 )
-from hydroid.settings.search import GaSettings
+from hydroid.settings.search import GeneticSettings
 
 INF, NAN = np.inf, np.nan
 
@@ -88,7 +88,7 @@ def test_crossover_only_exchanges_the_genes_of_a_pair(kind, cross, rate, seed):
     rng = np.random.default_rng(seed)
     parents = kind(4).random(10, rng)
     parents.flags.writeable = False
-    children = crossover(parents, GaSettings(crossover=cross, crossover_rate=rate), rng)
+    children = crossover(parents, GeneticSettings(crossover=cross, crossover_rate=rate), rng)
     assert children.dtype == parents.dtype
     pair = np.sort(parents.reshape(5, 2, -1), axis=1)
     assert (np.sort(children.reshape(5, 2, -1), axis=1) == pair).all()
@@ -98,11 +98,11 @@ def test_the_crossover_rate_is_the_share_of_pairs_that_cross():
     coding = IntegerCoding(200)
     rng = np.random.default_rng(0)
     parents = coding.random(4000, rng)
-    children = crossover(parents, GaSettings(crossover="uniform", crossover_rate=0.8), rng)
+    children = crossover(parents, GeneticSettings(crossover="uniform", crossover_rate=0.8), rng)
     crossed = (children != parents).any(axis=1).reshape(-1, 2)
     assert (crossed[:, 0] == crossed[:, 1]).all()
     assert abs(crossed.mean() - 0.8) < 5 * np.sqrt(0.16 / 2000)
-    assert (crossover(parents, GaSettings(crossover_rate=0), rng) == parents).all()
+    assert (crossover(parents, GeneticSettings(crossover_rate=0), rng) == parents).all()
 
 
 @pytest.mark.parametrize("kind", [GrayCoding, IntegerCoding])
@@ -121,6 +121,6 @@ def test_the_mutation_rate_is_per_element(kind):
 
 @pytest.mark.parametrize("count", [7, 8])
 def test_breeding_without_operators_is_cloning(count):
-    algorithm = GeneticAlgorithm(GaSettings(crossover_rate=0, mutation_rate=0), 3)
+    algorithm = GeneticAlgorithm(GeneticSettings(crossover_rate=0, mutation_rate=0), 3)
     parents = algorithm.coding.random(8, np.random.default_rng(0))
     assert (algorithm.breed(parents, count, np.random.default_rng(0)) == parents[:count]).all()

@@ -19,8 +19,7 @@ from hydroid.advice.commands import (
     repaired,
     violation,
 )
-from hydroid.arm.machine import load_machine
-from hydroid.arm.model import load_model
+from hydroid.arm.model import load_machine, load_model
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.noise import Noise

@@ -9,7 +9,7 @@ Most distances need no computing. When the joints turn by dq, no point of a body
 (conservative advancement: B. Mirtich, 1996).
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import mujoco
@@ -84,6 +84,8 @@ class CollisionChecker:
             hint = "give bodies geoms with contype and conaffinity 1"
             raise ModelError("no two of its bodies can collide", where=source, hint=hint)
         self._sweep = _sweep(model, self._pairs)
+        self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs.tolist()]
+        """of the bodies of each pair of shapes"""
 
     @property
     def excluded(self) -> tuple[tuple[str, str], ...]:
@@ -100,18 +102,19 @@ class CollisionChecker:
             time: [s], shape (T,).
             angle: of all joints in the model's order [rad], shape (T, nq).
         """
-        distance, nearest, inside = np.empty(len(time)), list[int](), dict[int, list[tuple[int, float]]]()
+        distance, nearest = np.empty(len(time)), list[tuple[str, str]]()
+        depths: dict[tuple[str, str], Array] = {}
         for sample, (near, least, which) in enumerate(self._walk(angle, FARTHEST)):
+            distance[sample] = least
+            nearest.append(self.names[which])
             for pair, here in near:
                 if here < 0:
-                    inside.setdefault(pair, []).append((sample, here))
-            distance[sample] = least
-            nearest.append(which)
-        names = [self._names(pair) for pair in range(len(self._pairs))]
-        meetings = _meetings(time, [(names[pair], samples) for pair, samples in inside.items()])
-        bodies = {tuple(sorted(pair)) for pair in names}
-        pairs = tuple(names[pair] for pair in nearest)
-        return Clearance(time, distance, pairs, meetings, len(bodies), self.excluded)
+                    depth = depths.setdefault(self.names[pair], np.zeros(len(time)))
+                    depth[sample] = max(depth[sample], -here)
+        meetings = [meeting for names, depth in depths.items() for meeting in _meetings(names, time, depth)]
+        meetings.sort(key=lambda meeting: meeting.begins)
+        checked = len({tuple(sorted(pair)) for pair in self.names})
+        return Clearance(time, distance, tuple(nearest), tuple(meetings), checked, self.excluded)
 
     def first_below(self, angle: Array, margin: float) -> tuple[int, tuple[str, str]] | None:
         """Return the first sample of a trajectory [rad], (T, nq), with two bodies nearer than a margin [m].
@@ -121,7 +124,7 @@ class CollisionChecker:
         """
         for sample, (_, least, which) in enumerate(self._walk(angle, margin)):
             if least < margin:
-                return sample, self._names(which)
+                return sample, self.names[which]
         return None
 
     def _walk(self, angle: Array, within: float) -> Generator[tuple[list[tuple[int, float]], float, int]]:
@@ -141,19 +144,13 @@ class CollisionChecker:
             for pair in np.argsort(known).tolist():
                 if known[pair] >= max(least, 0.0):
                     break
-                known[pair] = here = self._distance(pair)
+                first, second = self._pairs[pair].tolist()
+                here = mujoco.mj_geomDistance(self._model, self._data, first, second, FARTHEST, None)
+                known[pair] = here
                 near.append((pair, here))
                 if here < least:
                     least, which = here, pair
             yield near, least, which
-
-    def _distance(self, pair: int) -> float:
-        first, second = self._pairs[pair].tolist()
-        return mujoco.mj_geomDistance(self._model, self._data, first, second, FARTHEST, None)
-
-    def _names(self, pair: int) -> tuple[str, str]:
-        first, second = self._pairs[pair].tolist()
-        return _name(self._model, first), _name(self._model, second)
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
@@ -196,25 +193,10 @@ def _sweep(model: mujoco.MjModel, pairs: NDArray[np.intp]) -> Array:
     return np.where((first > 0) & (second > 0), 0.0, first + second)
 
 
-def _meetings(
-    time: Array, inside: Sequence[tuple[tuple[str, str], list[tuple[int, float]]]]
-) -> tuple[Meeting, ...]:
-    """Join the samples at which shapes are inside each other to meetings of their bodies."""
-    deepest: dict[tuple[str, str], dict[int, float]] = {}
-    for names, samples in inside:
-        depths = deepest.setdefault(names, {})
-        for sample, distance in samples:
-            depths[sample] = max(depths.get(sample, 0.0), -distance)
-    found = [
-        Meeting(*names, float(time[run[0]]), float(time[run[-1]]), depths[worst], float(time[worst]))
-        for names, depths in deepest.items()
-        for run in _runs(sorted(depths))
-        for worst in [max(run, key=depths.__getitem__)]
-    ]
-    return tuple(sorted(found, key=lambda meeting: meeting.begins))
-
-
-def _runs(samples: list[int]) -> Generator[list[int]]:
-    """Split sorted samples where one is missing."""
-    for part in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
-        yield part.tolist()
+def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Meeting]:
+    """Yield every time that two bodies met from how deep they were inside each other [m], shape (T,)."""
+    samples = np.flatnonzero(depth)
+    for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
+        begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
+        when = (float(time[sample]) for sample in (begins, ends))
+        yield Meeting(*names, *when, float(depth[worst]), float(time[worst]))

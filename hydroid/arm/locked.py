@@ -8,7 +8,6 @@ moving nothing but the fixed parts is fused, and the result is the whole arm wit
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -46,17 +45,6 @@ class _Part:
     """[m], shape (3,)"""
     inertia: Array
     """about its centre, for 1 kg [m²], shape (3, 3)"""
-
-
-class _Frame(NamedTuple):
-    """Where a body of the whole arm is in the locked arm."""
-
-    body: int
-    """the body of the locked arm that it is part of"""
-    position: Array
-    """of its frame in that body, or in the parent of the body that it names [m], shape (3,)"""
-    turn: Array
-    """of the same, a quaternion (w, x, y, z)"""
 
 
 @dataclass(frozen=True)
@@ -109,7 +97,7 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
         pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
 
     Raises:
-        ModelError: nothing to move, a name that is no joint, or a body without mass.
+        ModelError: nothing to move, or a name that is no joint.
     """
     joints = tuple(name for name in arm.joint_names if name in moving)
     if not joints or len(joints) < len(set(moving)):
@@ -120,19 +108,14 @@ def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> L
     with quiet_mujoco():
         full = spec.compile()
     data = mujoco.MjData(full)
-    for name, angle in zip(arm.joint_names, pose, strict=True):
-        if name not in joints:
-            data.joint(name).qpos[0] = angle
+    fixed = [name for name in arm.joint_names if name not in joints]
+    for name in fixed:
+        data.joint(name).qpos[0] = pose[arm.joint_names.index(name)]
     mujoco.mj_kinematics(full, data)
-    held = {
-        full.body(full.joint(name).bodyid[0]).name: _place(data, int(full.joint(name).bodyid[0]))
-        for name in arm.joint_names
-        if name not in joints
-    }
-    kept = [0, *(int(full.joint(name).bodyid[0]) for name in joints)]
-    frames = _frames(full, data, kept)
-    model = _skeleton(full, joints, kept, frames)
-    locked = LockedArm(model, joints, columns, pose[columns], _parts(full, data, arm, kept, frames), held)
+    held = [int(full.joint(name).bodyid[0]) for name in fixed]
+    places = {full.body(b).name: _place(data, b, int(full.body_parentid[b])) for b in held}
+    model, parts = _fused(full, data, arm, joints)
+    locked = LockedArm(model, joints, columns, pose[columns], parts, places)
     masses = np.array([full.body(name).mass[0] for name in arm.link_names])
     for name, value in locked.inertials(masses[None]).items():
         getattr(model, name)[:] = value[0]
@@ -150,73 +133,54 @@ def copy_joints(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
         setattr(target.opt, name, getattr(source.opt, name))
 
 
-def _place(data: mujoco.MjData, body: int, above: int | None = None) -> tuple[Array, Array]:
-    """Position and quaternion of a body in another, its parent by default."""
-    above = int(data.model.body_parentid[body]) if above is None else above
+def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
+    """Position and quaternion of a body in another."""
     turn = np.empty(4)
     mujoco.mju_mulQuat(turn, data.xquat[above] * [1, -1, -1, -1], data.xquat[body])
     return data.xmat[above].reshape(3, 3).T @ (data.xpos[body] - data.xpos[above]), turn
 
 
-def _frames(full: mujoco.MjModel, data: mujoco.MjData, kept: list[int]) -> tuple[_Frame, ...]:
-    frames: list[_Frame] = []
-    for body, parent in enumerate(full.body_parentid):
-        above = kept[frames[parent].body] if body else 0  # its carrier, or its parent's
-        frames.append(_Frame(kept.index(body if body in kept else above), *_place(data, body, above)))
-    return tuple(frames)
-
-
-def _parts(
-    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, kept: list[int], frames: tuple[_Frame, ...]
-) -> tuple[_Part, ...]:
-    """Every body that moves and has mass, seen from the body that it is part of."""
-    column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
-    parts: list[_Part] = []
-    for body, (frame, mass) in enumerate(zip(frames, full.body_mass.tolist(), strict=True)):
-        if frame.body == 0 or (mass == 0 and body not in column):
-            continue
-        if mass == 0:
-            raise ModelError(f"body {full.body(body).name!r} has no mass", where=arm.name)
-        carrier = kept[frame.body]
-        inverse = data.xmat[carrier].reshape(3, 3).T
-        axes = inverse @ data.ximat[body].reshape(3, 3)
-        centre = inverse @ (data.xipos[body] - data.xpos[carrier])
-        inertia = (axes * (full.body_inertia[body] / mass)) @ axes.T
-        parts.append(_Part(frame.body, column.get(body), mass, centre, inertia))
-    for place, body in enumerate(kept[1:], start=1):
-        if all(part.body != place for part in parts):
-            raise ModelError(f"body {full.body(body).name!r} moves and has no mass", where=arm.name)
-    return tuple(parts)
-
-
-def _skeleton(
-    full: mujoco.MjModel, joints: tuple[str, ...], kept: list[int], frames: tuple[_Frame, ...]
-) -> mujoco.MjModel:
-    """The chain of kept bodies with the joints' properties; what it weighs is still to be written."""
-    spec = mujoco.MjSpec()
+def _fused(
+    full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, joints: Sequence[str]
+) -> tuple[mujoco.MjModel, tuple[_Part, ...]]:
+    """The chain of bodies that joints move, without what they weigh, and every body that is part of them."""
+    spec, kept, carriers, parts = mujoco.MjSpec(), [0], list[int](), list[_Part]()
     bodies = [spec.worldbody]
-    for name, number in zip(joints, kept[1:], strict=True):
-        parent = bodies[frames[full.body_parentid[number]].body]
-        body = parent.add_body(
-            name=full.body(number).name,
-            pos=frames[number].position,
-            quat=frames[number].turn,
-            simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
-            explicitinertial=True,
-            mass=1.0,
-            inertia=[1.0, 1.0, 1.0],
-        )
-        joint = full.joint(name)
-        body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
-        bodies.append(body)
+    column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
+    moved = {int(full.joint(name).bodyid[0]): full.joint(name) for name in joints}
+    for number, parent in enumerate(full.body_parentid):
+        above = carriers[parent] if number else 0
+        if number in moved:
+            position, turn = _place(data, number, kept[above])
+            body = bodies[above].add_body(
+                name=full.body(number).name,
+                pos=position,
+                quat=turn,
+                simple=False,  # MuJoCo's short cut for aligned inertias, which other masses would break
+                explicitinertial=True,
+                mass=1.0,
+                inertia=[1.0, 1.0, 1.0],
+            )
+            joint = moved[number]
+            body.add_joint(name=joint.name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
+            bodies.append(body)
+            kept.append(number)
+            above = len(kept) - 1
+        carriers.append(above)
+        if mass := above and float(full.body_mass[number]):
+            inverse = data.xmat[kept[above]].reshape(3, 3).T
+            axes = inverse @ data.ximat[number].reshape(3, 3)
+            centre = inverse @ (data.xipos[number] - data.xpos[kept[above]])
+            inertia = (axes * (full.body_inertia[number] / mass)) @ axes.T
+            parts.append(_Part(above, column.get(number), mass, centre, inertia))
     with quiet_mujoco():
         model = spec.compile()
     copy_joints(full, model)
     off = mujoco.mjtDisableBit
-    # looking for what the skeleton lacks takes a tenth of a step; a diverged candidate must stay diverged
+    # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay diverged
     idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY | off.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
-    return model
+    return model, tuple(parts)
 
 
 def _steiner(away: Array) -> Array:

@@ -1,11 +1,24 @@
-"""An arm's model, with a payload where a log has one."""
+"""An arm's compiled model: with a payload where a log has one, or beside its mirror image on one carrier."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
-from hydroid.errors import SettingsError
+from hydroid.arm.collision import CollisionChecker
+from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
 from hydroid.settings.arm import Arm
 
+Array = NDArray[np.float64]
+
+ALONE = "alone"
+"""the name of the arm that is not one of two"""
+SIDES = ("right", "left")
+"""the arms of a pair in the order of its joints; the names of their parts begin with these and `_`"""
 PAYLOAD_RADIUS = 0.05
 """of the ball that a payload is taken for [m] (ours): its inertia is small beside what its distance makes"""
 
@@ -32,15 +45,64 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
         raise SettingsError(f"{arm.name} has no place for a payload", where="payloads", hint=hint)
     loaded = spec.copy()
-    site = loaded.site(arm.payload)
-    body = site.parent.add_body(
-        name="payload",
-        pos=site.pos,
-        ipos=[0.0, 0.0, 0.0],
-        explicitinertial=True,
-        mass=mass,
-        inertia=[0.4 * mass * PAYLOAD_RADIUS**2] * 3,
-    )
+    site, moment = loaded.site(arm.payload), 0.4 * mass * PAYLOAD_RADIUS**2
+    ball = {"explicitinertial": True, "mass": mass, "ipos": [0.0] * 3, "inertia": [moment] * 3}
+    body = site.parent.add_body(name="payload", pos=site.pos, **ball)
     if site.frame is not None:
         body.set_frame(site.frame)
     return loaded
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A whole machine, all joints free, to be put into poses.
+
+    Attributes:
+        arm: the settings of each of its arms.
+        model: compiled; its joints are those of `sides`, arm by arm.
+        sides: names of its arms, `ALONE` or right and left.
+    """
+
+    arm: Arm
+    model: mujoco.MjModel
+    sides: tuple[str, ...]
+
+    @cached_property
+    def checker(self) -> CollisionChecker:
+        """Which of its bodies meet.
+
+        Raises:
+            ModelError: none can.
+        """
+        return CollisionChecker(self.model, self.arm.name)
+
+    def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
+        """Return the angles of all joints [rad], shape (T, nq).
+
+        Args:
+            angle: of the arms that move, by their names [rad], shape (T, J).
+            rest: pose of the others [rad], shape (J,).
+        """
+        still = np.tile(rest, (max(map(len, angle.values())), 1))
+        return np.hstack([angle.get(side, still) for side in self.sides])
+
+
+def load_machine(arm: Arm, *, pair: bool) -> Machine:
+    """Read the model of an arm alone, or that of two of them.
+
+    Raises:
+        SettingsError: a pair that the arm's file does not name.
+        ModelError: as `read_mjcf`, or a pair whose joints are not those of two of the arm.
+    """
+    if not pair:
+        return Machine(arm, load_model(arm).compile(), (ALONE,))
+    if arm.pair is None:
+        hint = "name its MJCF in the arm's file, pair: MODEL.xml"
+        raise SettingsError(f"{arm.name} stands alone", where="--arm", hint=hint)
+    spec = read_mjcf(arm.pair)
+    wanted = [f"{side}_{name}" for side in SIDES for name in arm.joint_names]
+    if [joint.name for joint in spec.joints] != wanted:
+        hint = f"the joints of two arms are {', '.join(wanted)}"
+        raise ModelError("is not the model of two of the arm", where=str(arm.pair), hint=hint)
+    with mujoco_errors(str(arm.pair)):
+        return Machine(arm, spec.compile(), SIDES)

@@ -93,7 +93,7 @@ def read_arms(
         LogError: a fault that keeps the log from being used.
         SettingsError: no such arm or pose.
     """
-    from hydroid.arm.machine import ALONE, SIDES
+    from hydroid.arm.model import ALONE, SIDES
     from hydroid.log import open_table
 
     if arm not in (None, *SIDES, "both"):

@@ -181,7 +181,7 @@ def _fit(
     if str(out) == NAMED:
         out = f"runs/{Path(read[0].source).stem}-{settings.stage}-{settings.search.name}"
     results: list[FitResult] = []
-    with _workers(settings, options) as workers:
+    with _workers(options) as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):
             search = settings.search.model_copy(update={"seed": seed})
             seeded, folder = (
@@ -230,7 +230,7 @@ def _stored(stage: str, changes: dict[str, Any], out: "Source | None") -> FitSet
     return settings
 
 
-def _workers(settings: FitSettings, options: FitOptions) -> Any:
+def _workers(options: FitOptions) -> Any:
     """Open the workers that are asked for; a fit without them imports no Dask."""
     if (dask := options.get("dask")) is None:
         return nullcontext()

@@ -137,7 +137,7 @@ def view(
 
 def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | None") -> "Result[Clearance]":
     """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
-    from hydroid.arm.machine import ALONE, load_machine
+    from hydroid.arm.model import ALONE, load_machine
     from hydroid.reporting.collision_report import collision_page
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.arm.machine import ALONE, Machine, load_machine
+from hydroid.arm.model import ALONE, Machine, load_machine
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log

@@ -7,7 +7,7 @@ from hydroid import load_settings
 from hydroid.advice.commands import limited, violation
 from hydroid.advice.design import Design, design
 from hydroid.advice.information import forecast, measured, sensor_noise
-from hydroid.arm.machine import load_machine
+from hydroid.arm.model import load_machine
 from hydroid.errors import SettingsError
 from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import simulate_log

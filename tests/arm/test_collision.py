@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hydroid.arm.collision import CollisionChecker
-from hydroid.arm.machine import Machine, load_machine
+from hydroid.arm.model import Machine, load_machine
 from hydroid.errors import ModelError
 from hydroid.settings.arm import Arm
 

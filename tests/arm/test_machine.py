@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hydroid.arm.machine import SIDES, Machine, load_machine
+from hydroid.arm.model import SIDES, Machine, load_machine
 from hydroid.errors import ModelError, SettingsError
 from hydroid.settings.arm import Arm
 

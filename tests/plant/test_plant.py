@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hydroid import fit, load_settings, read_logs
-from hydroid.arm.machine import load_machine
-from hydroid.arm.model import load_model
+from hydroid.arm.model import load_machine, load_model
 from hydroid.errors import RunError, SettingsError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log

@@ -14,7 +14,7 @@ from hydroid.commands.app import COMMANDS, GROUPS, app, click_command
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
-HEAVY = ("mujoco", "numba", "scipy", "matplotlib", "trimesh", "rich", "jinja2", "PIL", "distributed")
+HEAVY = ("numba", "scipy", "matplotlib", "trimesh", "rich", "jinja2", "PIL", "distributed")
 PRINTED = {"json", "quiet", "verbose"}
 """options of the command line alone"""
 

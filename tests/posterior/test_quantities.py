@@ -15,6 +15,7 @@ from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.posterior.statics import actuator
 from hydroid.problem.bindings import Bindings
+from hydroid.settings.arm import make_arm
 from hydroid.simulation import Candidates
 
 TRUE = {"A_A": 1000, "A_B": 750, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2, "F2": 0.7, "x2": 12}
@@ -170,7 +171,7 @@ def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(s
         "stroke": None,
     }  # fmt: skip
     actuators = arm.file.actuators | {"shoulder": cylinder.settings.model_copy(update=turned)}
-    arm = replace(arm, file=arm.file.model_copy(update={"actuators": actuators}))
+    arm = make_arm(arm.file.model_copy(update={"actuators": actuators}), "here")
     settings = one.settings.model_copy(update={"arm": arm})
     found = measured(*shoulder_bench(replace(one, settings=settings)))
     assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)

@@ -100,7 +100,7 @@ def test_errors_agree_with_each_other_and_a_check_is_the_fitted_log_s_own_error(
     ("change", "message"),
     [
         ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml, line \d+: .*objective.nrm.*'norm'"),
-        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be at least 2"),
+        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be at least 4"),
         ({"axes": {"objective.norm": []}}, r"axes give 0 cells"),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
         ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),

@@ -8,7 +8,7 @@ import numpy as np
 from hydroid.fitting.validation import Prediction
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array
-from hydroid.reporting.page import Page, Section, Verdict, short_name
+from hydroid.reporting.page import Page, Section, Verdict, short_name, unique
 from hydroid.reporting.parameters_report import parameter_section, status
 from hydroid.reporting.predictions import motion, prediction_section, response_data
 from hydroid.reporting.table import Cell, Table
@@ -74,7 +74,9 @@ def side_by_side(models: Mapping[str, tuple[FitSettings, Mapping[str, float]]]) 
     }
 
     def row(name: str, unit: str) -> dict[str, Cell]:
-        cells = {short_name(model): values.get(name) for model, (_, values) in models.items()}
+        cells: dict[str, float | None] = {}
+        for model, (_, values) in models.items():
+            cells[unique(short_name(model), cells)] = values.get(name)
         known = np.array([value for value in cells.values() if value is not None])
         spread = 100 * float(known.std(ddof=1) / known.mean()) if len(known) > 1 and known.any() else None
         return {"name": name, "unit": unit, **cells, "spread [%]": spread}

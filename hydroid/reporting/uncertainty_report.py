@@ -22,7 +22,7 @@ from hydroid.run.record import ChannelNoise, channel_noise
 
 _PROFILES = (
     "The error, in units of the noise, with one parameter held and the others fitted again. The interval is "
-    "where it stays below the threshold; dashed: the linear approximation."
+    "where it stays below the threshold."
 )
 
 
@@ -146,16 +146,16 @@ def draw_profiles(study: UncertaintyStudy) -> Chart:
     units = {p.name: p.unit for p in study.problem.parameters.parameters}
     panels: list[Panel] = []
     for profile in study.profiles:
-        own, values = study.summary.estimate[profile.name], profile.values
-        low, high = np.clip(profile.interval, values[0], values[-1])
+        own, values, limit = study.summary.estimate[profile.name], profile.values, np.array([THRESHOLD])
+        low, high = np.clip(profile.interval, values[0], values[-1]).tolist()
         margin = 0.3 * (high - low)  # drawn beyond each end
-        ends = float(max(low - margin, values[0])), float(min(high + margin, values[-1]))
-        fine = np.union1d(np.linspace(*ends, 201), values)
+        fine = np.union1d(np.linspace(low - margin, high + margin, 201), values)
+        fine = fine[(fine >= values[0]) & (fine <= values[-1])]
         # between its points the square root is taken for linear, as in the interval
         root = np.sqrt(np.maximum(profile.deviance, 0.0)) * np.sign(values - own.value)
-        start, end, limit = (np.array([at]) for at in (low, high, THRESHOLD))
+        ends = np.array([[low], [high]])
         marks = [
-            Mark("spans", start, end=end, color="sky", label="95 % interval", alpha=0.2),
+            Mark("spans", ends[0], end=ends[1], color="sky", label="95 % interval", alpha=0.2),
             Mark("line", fine, np.interp(fine, values, root) ** 2, color="blue", label="profile"),
             Mark("points", values, profile.deviance, color="blue", width=6),
             Mark("rule", y=limit, color="orange", label="threshold of 95 %", width=1),
@@ -163,7 +163,8 @@ def draw_profiles(study: UncertaintyStudy) -> Chart:
         if own.sd:
             line, label = ((fine - own.value) / own.sd) ** 2, "linear approximation"
             marks.append(Mark("line", fine, line, color="grey", label=label, width=1, look="dashed"))
+        across = f"{profile.name} [{units[profile.name]}]"
         limits = min(-0.2, 1.2 * float(profile.deviance.min())), 2.5 * THRESHOLD
-        across = f"{profile.name} [{units[profile.name]}]" if units[profile.name] else profile.name
-        panels.append(Panel(across, "deviance", tuple(marks), "", 240, ends, limits))
+        around = (low - margin, high + margin)
+        panels.append(Panel(across, "deviance", tuple(marks), "", 240, around, limits))
     return Chart(tuple(panels), columns=min(2, len(panels)))

@@ -13,7 +13,6 @@ from hydroid.fitting.validation import fitted
 from hydroid.posterior.directions import identifiability
 from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.posterior.sweep import Surface
-from hydroid.problem.problem import Evaluation
 from hydroid.reporting.analysis_report import landscape
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, rendered, style
@@ -105,22 +104,22 @@ def test_any_fit_can_be_drawn(shape: str):
 def test_what_is_not_finite_is_left_out():
     problem = make_problem()
     fit = make_fit(problem)
-    history = fit.history.copy()
-    history[:3, 4:] = np.inf
-    segments = fit.front[1].segments.copy()
-    segments[0] = np.inf
-    broken = replace(fit, history=history, front=(fit.front[0], Evaluation(segments, fit.front[1].overall)))
-    for drawn in draw_all(problem, broken):
+    fit.history[:3, 4:] = fit.front[1].segments[0] = np.inf
+    for drawn in draw_all(problem, fit):
         check(drawn)
-    check(learning(np.full((2, 6), np.inf), problem.settings.objective))
-    check(learning(np.empty((0, 6)), problem.settings.objective))
+    for history in (np.full((2, 6), np.inf), np.empty((0, 6))):
+        check(learning(history, problem.settings.objective))
 
 
-def test_the_response_shows_measured_angle_every_estimate_residual_and_command():
+def test_a_response_shows_measured_angle_every_estimate_residual_pressures_and_command():
     problem = make_problem()
     fit = make_fit(problem)
     (record,) = responses(problem, fit)
-    upper, middle, lower = draw(record).panels
+    log = record.of.log
+    pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
+    upper, middle, pressure, lower = draw(replace(record, of=replace(record.of, log=pressed))).panels
+    assert labelled(pressure)["chamber A"].y == pytest.approx(np.full(len(log.time), 50.0))
+    assert len(draw(record).panels) == 3  # pressures are drawn where they are logged
     measured = np.degrees(record.measured)
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     for name, estimate in fit.estimates.items():
@@ -133,17 +132,7 @@ def test_the_response_shows_measured_angle_every_estimate_residual_and_command()
     band = labelled(middle)["95 % band of refined"]
     assert np.all(band.end > 0)
     assert np.array_equal(band.y, -band.end)
-    assert np.array_equal(lower.marks[0].y, record.of.log.command[:, 1])
-
-
-def test_pressures_are_drawn_where_they_are_logged():
-    problem = make_problem()
-    (record,) = responses(problem, make_fit(problem))
-    pressure = np.tile([5e6, 2e6], (*record.of.log.angle.shape, 1))
-    pressed = replace(record, of=replace(record.of, log=replace(record.of.log, pressure=pressure)))
-    panels = draw(pressed).panels
-    assert [panel.y for panel in panels] == ["angle [deg]", "residual [deg]", "pressure [bar]", "command [%]"]
-    assert labelled(panels[2])["chamber A"].y == pytest.approx(np.full(len(record.measured), 50.0))
+    assert np.array_equal(lower.marks[0].y, log.command[:, 1])
 
 
 def test_a_response_that_runs_away_does_not_flatten_the_others():

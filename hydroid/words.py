@@ -81,6 +81,15 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     "experiment": ("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
     "fit the hydraulics": ("Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."),
     "predict unseen": ("Predict a log that this fit has not seen.", "Only such a log can test the model."),
+    "run the experiment": (
+        "Run commands.csv on the machine.",
+        "The limits were checked only in simulation, at the present estimate; the machine moves differently "
+        "as far as it differs from the model. Watch the first run with a hand on the emergency stop.",
+    ),
+    "fit it too": (
+        "Fit again with the new log beside the old ones.",
+        "The table predicts how precise it will be.",
+    ),
     # a profile
     "better optimum": (
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",

@@ -6,19 +6,17 @@ from functools import partial
 import numpy as np
 
 from hydroid.advice.design import Design
+from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.flags import WEAK_ABOVE, Flag, flag_of
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.page import Light, Page, Plot, Section, Step, Verdict
+from hydroid.reporting.page import Light, Page, Plot, Section, Verdict
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 
-_SAFETY = (
-    "The limits were checked only in simulation, at the present estimate; the machine moves differently as "
-    "far as it differs from the model. Watch the first run with a hand on the emergency stop."
-)
+_RUN, _FIT = (Finding(kind, "note") for kind in ("run the experiment", "fit it too"))
 
 
 def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mapping[str, float]) -> Page:
@@ -38,14 +36,10 @@ def design_page(arm: Arm, settings: DesignSettings, design: Design, theta: Mappi
         )
         collisions = Light("Collisions", "fair", f"{near}around the machine.")
     lights = Light("Range, speed and command", "fair", "Within their limits, in simulation only."), collisions
-    steps = (
-        Step("Run commands.csv on the machine, with a hand on the emergency stop.", _SAFETY),
-        Step("Fit again with the new log beside the old ones.", "The table predicts how precise it will be."),
-    )
     moving = "Commands and the motion that the present estimate predicts."
     motion = Plot("motion", moving, partial(motion_chart, design.best.log, arm.joint_names, limits), True)
     sections = (
-        Section("Do next", steps=steps),
+        Section("Do next", steps=(_RUN, _FIT)),
         Section("Motion", plots=(motion,)),
         Section("Precision", tables={"design": design_table(settings, design, theta)}),
     )
@@ -77,7 +71,7 @@ def design_table(settings: DesignSettings, design: Design, theta: Mapping[str, f
     note = (
         f"Noise: {noise}. before: every parameter ±100 % unless logs say more. random: median of "
         f"{len(design.random)} experiments of the same length and limits. "
-        f"The weakest combination: {parts}. {_SAFETY}"
+        f"The weakest combination: {parts}. {_RUN.hint}"
     )
     deviations = np.column_stack([design.known.deviations, design.random_deviations, design.after.deviations])
     rows = map(row, design.names, deviations)

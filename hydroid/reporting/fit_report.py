@@ -18,11 +18,11 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
-from hydroid.reporting.page import Light, Page, Plot, Section, Step, Tab, log_names
+from hydroid.reporting.page import Light, Page, Plot, Section, Tab, log_names
 from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.predictions import motion, prediction_section, response_data
 from hydroid.reporting.quantities_report import BEST_WITHIN, best_known, curves_csv, quantity_section
-from hydroid.reporting.suggestion_report import first_steps, suggestion_sections
+from hydroid.reporting.suggestion_report import MOST_STEPS, suggestion_sections
 from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.uncertainty_report import determined_sections, unknown_section, warnings
 from hydroid.reporting.verdict import verdict
@@ -76,7 +76,7 @@ def _known(summary: FitSummary) -> str:
     )
 
 
-def _steps(record: Record) -> tuple[Step, ...]:
+def _steps(record: Record) -> tuple[Finding, ...]:
     """Return what to do next, the first things first."""
     settings, run, findings = record.settings, shlex.quote(record.folder), list[Finding]()
     if settings.stage == "mech":
@@ -89,7 +89,7 @@ def _steps(record: Record) -> tuple[Step, ...]:
         content = record.result.advice.content
         findings += [f for f in missing_findings(content) if "command" in f.numbers]
         findings += action_findings(content, settings)
-    return first_steps(findings)
+    return tuple(findings[:MOST_STEPS])
 
 
 def _actuators(record: Record) -> Iterator[Section]:

@@ -6,6 +6,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.reporting.table import Table
 
@@ -64,19 +65,11 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Step:
-    """Something to do next, what it is predicted to bring, and the command that does it."""
-
-    what: str
-    gain: str
-    command: str = ""
-
-
-@dataclass(frozen=True)
 class Section:
     """A heading with text, points to note, facts, tables by file name, bars and figures.
 
-    `more` are tables that are shown on demand. All of a `folded` section is. `link` is a page that has more,
+    `steps` are findings that say what to do and what it would bring; their number `command` does it. `more`
+    are tables that are shown on demand. All of a `folded` section is. `link` is a page that has more,
     relative to this one.
     """
 
@@ -88,7 +81,7 @@ class Section:
     plots: tuple[Plot, ...] = ()
     tabs: tuple[Tab, ...] = ()
     bars: tuple[Bar, ...] = ()
-    steps: tuple[Step, ...] = ()
+    steps: tuple[Finding, ...] = ()
     more: Mapping[str, Table] = field(default_factory=dict[str, Table])
     folded: bool = False
     link: str = ""

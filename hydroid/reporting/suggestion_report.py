@@ -1,11 +1,10 @@
 """Suggestions: what the model lacks, what the residual shows, what actions would bring."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hydroid.advice.proposals import Advice, action_findings, missing_findings, residual_findings
-from hydroid.findings import Finding
-from hydroid.reporting.page import Page, Section, Step, Verdict
+from hydroid.reporting.page import Page, Section, Verdict
 from hydroid.reporting.residual_chart import residual_tabs
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.fit import FitSettings
@@ -17,6 +16,8 @@ _VERDICTS = {
     "invisible": "the logs cannot tell it from the free parameters",
 }
 
+MOST_STEPS = 3
+"""things to do that a page names first"""
 Content = Mapping[str, Any]
 
 
@@ -31,16 +32,10 @@ def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], 
         lead, found = f"{lead} {missing}", []
     else:
         found = [missing]
-    steps = first_steps([*found, *action_findings(advice.content, settings)])
+    steps = (*found, *action_findings(advice.content, settings))[:MOST_STEPS]
     sections = suggestion_sections(settings, advice, logs)
     sections = (Section("Do next", steps=steps), *sections) if steps else sections
     return Page("suggestions", "What to change next", lead, sections, verdict=Verdict(lead))
-
-
-def first_steps(findings: Iterable[Finding]) -> tuple[Step, ...]:
-    """Return the first three findings as things to do."""
-    steps = (Step(f.what, f.hint, str(f.numbers.get("command", ""))) for f in findings)
-    return tuple(steps)[:3]
 
 
 def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[str]) -> tuple[Section, ...]:

@@ -43,7 +43,6 @@ class Descent:
         fresh: whether the Jacobian is one of finite differences, not an updated one.
         cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
         damping: λ. growth: factor of λ after the next step that fails.
-        width: index into WIDTHS.
         slow: steps in a row with gains below the tolerance.
         evaluations: candidates simulated. iterations: steps that helped.
         ending: why it ended, or UNDER_WAY.
@@ -58,7 +57,6 @@ class Descent:
     cycle: Float | tuple[float, int] = (np.inf, 0)
     damping: float = DAMPING
     growth: float = 2.0
-    width: int = 0
     slow: int = 0
     evaluations: int = 1
     iterations: int = 0

@@ -17,8 +17,6 @@ What differs from a textbook:
   along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved
   valleys of problems whose parameters compensate each other.
 - A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `derivatives`.
-- Where no step helps, the Jacobian is taken over wider differences: a joint that meets its stop makes small
-  jumps in the response, and narrow differences see nothing but the jumps.
 - A candidate whose simulation fails is a step that does not help.
 """
 
@@ -35,8 +33,6 @@ from hydroid.settings.search import RefinementSettings
 
 Float = NDArray[np.float64]
 
-WIDTHS = (2.0**-26, 2.0**-20, 2.0**-14)
-"""finite differences in the unit box: the root of the rounding unit, and wider where that leads nowhere"""
 UNDAMPED = 1e-14
 """λ of the step that tells what a Jacobian promises at most"""
 PROBE = 0.1
@@ -76,7 +72,7 @@ def step(now: Descent, residuals: Function, settings: RefinementSettings) -> Des
 
 def _differentiate(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
     """Take the Jacobian; end where it promises no gain."""
-    columns = derivatives(residuals, now.point, now.residual, WIDTHS[now.width])
+    columns = derivatives(residuals, now.point, now.residual)
     if not np.isfinite(columns).all():
         return replace(now, ending=Ending.JACOBIAN_FAILED)
     after = replace(now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations))
@@ -151,7 +147,7 @@ def _updated(now: Descent, after: Descent) -> Float:
 
 
 def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> Descent:
-    """After a step that did not help: a new Jacobian, or a shorter step, or wider differences."""
+    """After a step that did not help: a new Jacobian, or a shorter step."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
     after = replace(now, damping=now.damping * 2 * now.growth, growth=2 * now.growth)
@@ -160,11 +156,10 @@ def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> D
 
 
 def _no_step(now: Descent) -> Descent:
-    """Where no step is left: take the Jacobian anew, over wider differences if it is new; or end."""
-    if now.fresh and now.width + 1 == len(WIDTHS):
+    """Where no step is left: end, or take a Jacobian that was updated anew."""
+    if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
-    width = now.width + now.fresh
-    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0, width=width)
+    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)
 
 
 def _corrected(model: LinearModel, s: Float, damping: float, residuals: Function) -> list[Float]:

@@ -50,18 +50,11 @@ def notched(share: Any, side: Any) -> Any:
 
     Where all four factors are 1, the result is the power law's, to the bit.
     """
-    low, middle, high, half = NOTCHES
-    first, second, third, fourth = (
-        side.notch_1 - 1.0,
-        side.notch_2 - 1.0,
-        side.notch_3 - 1.0,
-        side.notch_4 - 1.0,
-    )
-    more = first * np.minimum(share, low)
-    more = more + second * np.minimum(np.maximum(share - low, 0.0), middle - low)
-    more = more + third * np.minimum(np.maximum(share - middle, 0.0), high - middle)
-    more = more + fourth * np.minimum(np.maximum(share - high, 0.0), half - high)
-    whole = first * low + second * (middle - low) + third * (high - middle) + fourth * (half - high)
+    more, whole, low = 0.0, 0.0, 0.0
+    factors = side.notch_1, side.notch_2, side.notch_3, side.notch_4
+    for factor, high in zip(factors, NOTCHES):  # noqa: B905  # compiled code knows no strict=
+        more = more + (factor - 1.0) * np.minimum(np.maximum(share - low, 0.0), high - low)
+        whole, low = whole + (factor - 1.0) * (high - low), high
     return (share + more) / (1.0 + whole)
 
 

@@ -56,15 +56,13 @@ class Memo:
                 hint="use the versions that the run began with, or begin another with --out",
             )
         if unknown:
-            result = self.problem.evaluate(np.array([new[key] for key in unknown]))
-            rows = np.column_stack([result.segments, result.overall])
+            rows = self.problem.evaluate(np.array([new[key] for key in unknown])).values
             # a candidate with one infinite objective is infeasible: none of its objectives may win
             rows[~np.isfinite(rows).all(axis=1)] = np.inf
             values |= zip(unknown, rows, strict=True)
         self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
         self._values.update((key, values[key]) for key in new)
-        found = np.array([self._values[row.tobytes()] for row in theta])
-        return Evaluation(found[:, :-1].copy(), found[:, -1].copy())
+        return Evaluation(np.array([self._values[row.tobytes()] for row in theta]))
 
     def arrays(self) -> Arrays:
         """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""

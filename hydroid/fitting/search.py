@@ -86,7 +86,7 @@ def search(
             repeats = memo.replays
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(theta(chromosomes))
-            evaluations += len(result)
+            evaluations += len(chromosomes)
             objectives = result.overall[:, None] if algorithm.single else result.segments
             population = algorithm.tell(population, Population(chromosomes, objectives))
             overall = memo.evaluate(theta(population.chromosomes)).overall

@@ -89,13 +89,14 @@ def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> 
 @compilable
 def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
     """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own."""
-    to_a, to_b = 0.0, 0.0
     if displacement > 0.0:
-        to_a = _opening(c.a, displacement)
+        area = _opening(c.a, displacement)
+        _fill(c, w.a, supply, c.leakage + area, c.leakage)
+        _fill(c, w.b, supply, c.leakage, c.leakage + area * c.b.return_)
     else:
-        to_b = _opening(c.b, -displacement)
-    _fill(c, w.a, supply, c.leakage + to_a, c.leakage + to_b * c.a.return_)
-    _fill(c, w.b, supply, c.leakage + to_b, c.leakage + to_a * c.b.return_)
+        area = _opening(c.b, -displacement)
+        _fill(c, w.a, supply, c.leakage, c.leakage + area * c.a.return_)
+        _fill(c, w.b, supply, c.leakage + area, c.leakage)
 
 
 @compilable

@@ -36,16 +36,22 @@ OpenStart = Callable[[Array], None]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Objectives of n candidates: by segment, shape (n, S), and overall, shape (n,) [rad or relative].
+    """Objectives of n candidates [rad or relative]: by segment, and overall last, shape (n, S + 1).
 
     A candidate whose simulation diverged has inf throughout.
     """
 
-    segments: Array
-    overall: Array
+    values: Array
 
-    def __len__(self) -> int:
-        return len(self.overall)
+    @property
+    def segments(self) -> Array:
+        """Shape (n, S)."""
+        return self.values[:, :-1]
+
+    @property
+    def overall(self) -> Array:
+        """Shape (n,)."""
+        return self.values[:, -1]
 
 
 class Spread(Protocol):
@@ -137,7 +143,7 @@ class Problem:
         else:
             values = self._spread(self._on_worker, "objectives", theta, len(self.bounds) + 1)
             values[np.isnan(values)] = np.inf
-        return Evaluation(values[:, :-1], values[:, -1])
+        return Evaluation(values)
 
     def objectives(self, theta: Array) -> Array:
         """Objectives of theta, shape (n, P), simulated in this process: shape (n, S + 1), overall last."""

@@ -121,7 +121,7 @@ def fit_result(problem: Problem, fit: Fit, advice: Advice | None) -> FitResult:
     return FitResult(
         fitted(problem, fit),
         fit.history,
-        (theta, np.column_stack([evaluation.segments, evaluation.overall])),
+        (theta, evaluation.values),
         {name: estimate.segments for name, estimate in fit.estimates.items()},
         tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
         channel_noise(problem, fit.uncertainty),

@@ -82,8 +82,6 @@ class Chain:
 def mass_entries(model: mujoco.MjModel) -> NDArray[np.intp]:
     """Where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (V, V)."""
     entries = np.zeros((model.nv, model.nv), np.intp)
-    for i in range(model.nv):
-        for place in range(model.M_rowadr[i], model.M_rowadr[i] + model.M_rownnz[i]):
-            j = model.M_colind[place]
-            entries[i, j] = entries[j, i] = place
+    rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind
+    entries[rows, columns] = entries[columns, rows] = np.arange(model.nC)
     return entries

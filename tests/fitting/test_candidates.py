@@ -99,7 +99,7 @@ def test_a_member_that_is_infinite_somewhere_is_infeasible_throughout_the_memo()
         def evaluate(self, theta):
             found = np.arange(1.0, len(theta) + 1)
             found[::2] = [np.nan, np.inf, -np.inf][: len(found[::2])]
-            return Evaluation(np.tile(found[:, None], (1, 3)), found)
+            return Evaluation(np.tile(found[:, None], (1, 4)))
 
     memo = Memo(make(Blind))
     memo.evaluate(theta)

@@ -125,7 +125,7 @@ def make_fit(
         final,
         (
             parameters.from_unit(rng.uniform(0, 1, (front, free))),
-            Evaluation(segments, segments.max(axis=1, initial=0)),
+            Evaluation(np.column_stack([segments, segments.max(axis=1, initial=0)])),
         ),
         history,
         {"refined": refined} if "refined" in names else {},

@@ -4,6 +4,8 @@ The command line shows them as one line and ends with exit status 2. Any other e
 hydroid and keeps its traceback.
 """
 
+from functools import partial
+
 LONGEST = 1500
 """largest length of a message, in characters"""
 
@@ -24,17 +26,13 @@ class HydroidError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the three parts when an error crosses a process boundary."""
-        return _rebuild, (type(self), self.what, self.where, self.hint)
+        return partial(type(self), where=self.where, hint=self.hint), (self.what,)
 
 
 def _one_line(text: str) -> str:
     """Escape control characters, which may come from a file, and shorten the text."""
     plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} ... {plain[-LONGEST // 2 :]}"
-
-
-def _rebuild(kind: type[HydroidError], what: str, where: str, hint: str) -> HydroidError:
-    return kind(what, where=where, hint=hint)
 
 
 class LogError(HydroidError):

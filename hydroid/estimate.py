@@ -207,13 +207,9 @@ def estimate_file(source: Path) -> Path:
         return source
     if is_file(source / NAME):
         return source / NAME
-    if is_file(source / "run.json"):
-        raise RunError("has no estimate yet", where=str(source), hint="resume the fit")
-    raise RunError(
-        "holds no estimate",
-        where=str(source),
-        hint="name a run folder, a folder of Plant.save or a YAML file",
-    )
+    begun = is_file(source / "run.json")
+    hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
+    raise RunError("holds no estimate" + (" yet" if begun else ""), where=str(source), hint=hint)
 
 
 def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:

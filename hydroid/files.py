@@ -84,7 +84,8 @@ def _write(path: Path, data: bytes, keep: Path | None) -> None:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.umask(mask := os.umask(0))  # it can only be read by setting it
+        os.chmod(temporary, 0o666 & ~mask)
         if keep is not None and path.exists():
             os.replace(path, keep)
         os.replace(temporary, path)
@@ -93,19 +94,6 @@ def _write(path: Path, data: bytes, keep: Path | None) -> None:
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
-
-
-def copy_file(source: Path, target: Path) -> None:
-    """Copy a file, whole or not at all.
-
-    Raises:
-        RunError: it cannot be read, or the copy cannot be written.
-    """
-    try:
-        content = source.read_bytes()
-    except OSError as error:
-        raise RunError(f"cannot be read ({error.strerror})", where=str(source)) from None
-    write_atomic(target, content)
 
 
 def remove_parts(folder: Path) -> None:
@@ -121,10 +109,3 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
-
-
-def _umask() -> int:
-    """The process's umask, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

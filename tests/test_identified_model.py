@@ -68,7 +68,7 @@ def test_a_folder_without_an_estimate_is_refused(tmp_path: Path):
     with pytest.raises(RunError, match="holds no estimate"):
         load_identified(tmp_path)
     (tmp_path / "run.json").write_text("{}")
-    with pytest.raises(RunError, match="has no estimate yet"):
+    with pytest.raises(RunError, match="holds no estimate yet"):
         load_identified(tmp_path)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from hydroid.commands.check import plain_findings
-from hydroid.commands.inputs import load_settings, setting_changes
+from hydroid.commands.inputs import load_settings, refuse_overwriting, setting_changes
 from hydroid.commands.logs import joint_ranges
 from hydroid.commands.options import Repair, Set, command
 from hydroid.commands.result import Result
@@ -67,8 +67,7 @@ def convert(
     from hydroid.log import open_table, read_log, write_log
 
     path, target, changes = Path(log), Path(out), setting_changes(set)
-    if target.resolve() == path.resolve():
-        raise SettingsError("would overwrite the log", where=str(out), hint="name another file")
+    refuse_overwriting(path, target)
     settings = None if config is None else load_settings(config, changes)
     layout, guess, lines = settings.log if settings else LogSettings(), None, list[str]()
     table = open_table(path, layout)

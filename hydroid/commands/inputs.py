@@ -84,6 +84,12 @@ def require_hydraulics(model: IdentifiedModel) -> None:
         raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
 
 
+def refuse_overwriting(source: Any, out: Source | None) -> None:
+    """Refuse to write a log over the one that is read."""
+    if out is not None and isinstance(source, str | Path) and Path(out).resolve() == Path(source).resolve():
+        raise SettingsError("would overwrite the log", where=str(out), hint="name another file")
+
+
 def as_list(sources: Any) -> list[Any]:
     """Return one or several sources as a list; an empty one for none."""
     if sources is None:

@@ -70,10 +70,8 @@ def report(
 
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
     page, best = spread_page(collected), collected.best
-    table, line = (
-        page.tables["spread"],
-        f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)",
-    )
+    table = page.tables["spread"]
+    line = f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
     content = {
         "out": str(out),
         "best": str(best.path),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from hydroid.commands.inputs import open_model
+from hydroid.commands.inputs import open_model, refuse_overwriting
 from hydroid.commands.logs import read_arms
 from hydroid.commands.options import Arm, Fit, OwnConfig, Pose, Repair, Seed, Set, command
 from hydroid.commands.result import Result
@@ -73,8 +73,7 @@ def simulate(
         RunError: the simulation diverged, or a file cannot be written.
     """
     target, traced = (None if given is None else Path(given) for given in (out, trace))
-    if target and isinstance(commands, str | Path) and target.resolve() == Path(commands).resolve():
-        raise SettingsError("would overwrite the commands", where=f"--out {out}", hint="name another file")
+    refuse_overwriting(commands, target)
     model = open_model(fit, config, set)
     if traced and model.settings.stage != "hyd":
         raise SettingsError("stage mech has no pressures to trace", where=model.source, hint="set stage: hyd")

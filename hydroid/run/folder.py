@@ -150,12 +150,9 @@ class RunFolder:
         if not self.exists:
             return ""
         self.status("interrupted")
-        kept = (
-            "a checkpoint to resume from"
-            if self.checkpoints()
-            else "no checkpoint yet: resuming begins again"
-        )
-        return f"{self.path} holds {kept}"
+        if self.checkpoints():
+            return f"{self.path} holds a checkpoint to resume from"
+        return f"{self.path} holds no checkpoint yet, and resuming begins again"
 
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name.
@@ -175,6 +172,5 @@ class RunFolder:
         if not self.path.exists() or self.exists or (self.path / LOCK).exists():
             return
         if not self.path.is_dir() or any(self.path.iterdir()):
-            raise RunError(
-                "exists and holds no run", where=str(self.path), hint="choose another folder with --out"
-            )
+            hint = "choose another folder with --out"
+            raise RunError("exists and holds no run", where=str(self.path), hint=hint)

@@ -40,41 +40,38 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     files = [folder / RUNS / f"{task.key()}.json" for task in tasks]
     missing = {file: task for file, task in zip(files, tasks, strict=True) if not file.is_file()}
     results = {file: read_result(file) for file in files if file not in missing}
-    failed: dict[Path, Result] = {}
-    known, code = len(results), code_version()
+    known, total, code = len(results), len(results) + len(missing), code_version()
     if known and missing:
-        _log.log(NOTE, "%d of %d runs found, goes on", known, known + len(missing))
-    progress("runs", known, known + len(missing))
-    futures: dict[Future[Result], Path] = {
-        executor.submit(perform, task): file for file, task in missing.items()
-    }
+        _log.log(NOTE, "%d of %d runs found, goes on", known, total)
+    progress("runs", known, total)
+    futures = {executor.submit(perform, task): file for file, task in missing.items()}
     try:
-        for done, future in enumerate(as_completed(futures), 1):
+        for done, future in enumerate(as_completed(futures), known + 1):
             file = futures.pop(future)
-            results[file] = _outcome(future, missing[file], failed, file) | {"code": code}
-            if file not in failed:
+            result, lasting = _outcome(future, missing[file])
+            results[file] = result | {"code": code}
+            if lasting:
                 write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
-            progress("runs", known + done, known + len(missing))
+            progress("runs", done, total)
     finally:
         for future in futures:
             future.cancel()
     return [results[file] for file in files]
 
 
-def _outcome(future: Future[Result], task: Task, failed: dict[Path, Result], file: Path) -> Result:
-    """Return what a run came to. An error that is no fault of the input may pass: it is not kept."""
+def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
+    """Return what a run came to, and whether it lasts: an error that is no fault of the input may pass."""
     try:
-        return future.result()
+        return future.result(), True
     except BrokenProcessPool:
         hint = "the same command goes on from here; with less memory, use fewer processes"
         raise RunError("a process of the study was killed", hint=hint) from None
     except HydroidError as error:
-        words = str(error)
+        words, lasting = str(error), True
     except Exception as error:
-        words = f"{type(error).__name__}: {error}"
-        failed[file] = {}
+        words, lasting = f"{type(error).__name__}: {error}", False
     _log.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
-    return {"failed": words}
+    return {"failed": words}, lasting
 
 
 def read_result(file: Path) -> Result:

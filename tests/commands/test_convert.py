@@ -80,8 +80,3 @@ def test_a_guess_is_corrected_and_joints_go_by_the_arms_names(tmp_path: Path) ->
         hydroid.convert(tmp_path / "a.parquet", out=out, set={"search.seed": 3})
     with pytest.raises(SettingsError, match=r"unknown setting 'joints\.1\.command\.scal'"):
         hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scal": 3})
-
-
-def test_the_log_is_not_overwritten(tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="would overwrite the log"):
-        hydroid.convert(RIG, out=RIG)

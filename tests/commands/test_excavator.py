@@ -1,15 +1,12 @@
 """The shipped example of a real machine: its logs, arm and config work together."""
 
 import logging
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import hydroid
-from hydroid.commands.app import app
 from hydroid.fitting.multistart import lone_joints
 
 FOLDER = Path(__file__).parents[2] / "examples" / "excavator"
@@ -59,22 +56,3 @@ def test_a_short_fit_of_two_logs_needs_no_stage_1(tmp_path: Path):
         LOGS[6:7], out=tmp_path / "b", config=FOLDER / "fit.yaml", set=quick, start=tmp_path / "run"
     )
     np.testing.assert_allclose(again.results[0].problem.parameters.start, result.fit.best.theta, rtol=1e-4)
-
-
-def test_the_raw_logs_lead_through_init_to_a_first_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Their order of joints, their signs, their clock: each printed command runs."""
-    monkeypatch.chdir(tmp_path)
-    logs = [*LOGS[6:8], LOGS[0]]
-    joints = ["boom", "arm", "bucket", "swing"]
-    project = hydroid.init("dig", arm=FOLDER / "arm.yaml", log=logs, joints=joints).result
-    settings = hydroid.load_settings("dig/fit.yaml")
-    assert [settings.log.columns("command", j).scale for j in (1, 2, 3, 4)] == [1, -1, -1, -1]
-    assert [settings.log.columns("command", j).column for j in (1, 2)] == [("u4_pct",), ("u1_pct",)]
-    assert 0.04 < settings.log.period_s < 0.06
-    assert all(30 < (settings.parameters[f"dead_A_{name}"].nominal or 0.0) < 60 for name in joints)
-    short = ["--set", "search.multistart={starts: 1, horizons: [], iterations: 1}", "--no-refinement"]
-    for line in project.commands[:3]:
-        words = shlex.split(line)[1:]
-        done = CliRunner().invoke(app, [*words, *(short if words[0] == "fit-hyd" else [])])
-        assert done.exit_code == 0, done.output
-    assert (tmp_path / "dig/runs/validation/validation.html").is_file()

@@ -102,19 +102,7 @@ def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path:
     assert memo.infeasible == 1
     np.testing.assert_array_equal(result.segments[others], healthy.segments[others])
     assert len((tmp_path / "deaths").read_text()) == 4  # two tries in its chunk, two alone
-
-
-def test_residuals_leave_out_the_candidate_that_kills_after_an_evaluation(two: DaskWorkers, tmp_path: Path):
-    problem = Problem(*arguments())
-    theta = random_candidates(problem, 7)[:6]
-    theta[3, 0] = DEADLY
-
-    def spread(target: object, method: str, theta: np.ndarray, columns: int) -> np.ndarray:
-        return two(Deadly(target, tmp_path / "deaths"), method, theta, columns)
-
-    spread_problem = Problem(*arguments(), spread)
-    spread_problem.evaluate(theta)
-    residuals = spread_problem.residuals(theta[2:5])
+    residuals = memo.problem.residuals(theta[2:5])
     assert np.isnan(residuals[1]).all()
     np.testing.assert_array_equal(residuals[::2], problem.residuals(theta[2:5:2]))
 
@@ -274,37 +262,11 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_fit_with_workers_is_the_fit_without(short: Path, tmp_path: Path):
-    for name, more in (("alone", ["--threads", "1"]), ("spread", ["--dask", "local:2"])):
-        command = [sys.executable, "-m", "hydroid", "fit-mech", short, "--out", name, "--quiet", *QUICK]
-        done = subprocess.run(
-            [*command, "--set", "search.ga.generations=2", *more],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=240,
-        )
-        assert done.returncode == 0, done.stderr
-    for file in ("estimate.yaml", "history.csv"):
-        assert (tmp_path / "alone" / file).read_bytes() == (tmp_path / "spread" / file).read_bytes()
-
-
 @pytest.mark.parametrize("end", ["SIGTERM", "SIGINT to the group", "SIGKILL"])
 def test_a_stopped_fit_leaves_no_process(short: Path, tmp_path: Path, end: str):
-    command = [
-        sys.executable,
-        "-m",
-        "hydroid",
-        "fit-mech",
-        short,
-        "--out",
-        "run",
-        "--dask",
-        "local:2",
-        *QUICK,
-    ]
+    hydroid = [sys.executable, "-m", "hydroid", "fit-mech", short]
     run = subprocess.Popen(
-        [*command, "--set", "search.ga.generations=100000"],
+        [*hydroid, *QUICK, "--set", "search.ga.generations=100000", "--out", "run", "--dask", "local:2"],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,

@@ -138,37 +138,29 @@ def test_a_refused_client_leaves_nothing_to_close(two: DaskWorkers, monkeypatch:
     assert len(collected) == 2
 
 
-@pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json"])
-def test_an_address_without_tls_is_refused_where_others_reach_it(
-    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.chdir(tmp_path)
-    Path("file.json").write_text('{"address": "tcp://10.0.0.1:8786"}')
-    with pytest.raises(SettingsError, match=rf"--dask {address}: without TLS anyone .*--dask-insecure"):
-        opened(address)
+NO_TLS = (SettingsError, "without TLS anyone .*--dask-insecure")
+NONE = (SettingsError, "no Dask scheduler; give local")
+SILENT = (RunError, "no Dask scheduler answers")
 
 
 @pytest.mark.parametrize(
-    ("address", "insecure"),
+    ("address", "insecure", "refusal"),
     [
-        ("tcp://127.0.0.1:1", False),
-        ("localhost:1", False),
-        ("tcp://[::1]:1", False),
-        ("tcp://0.0.0.0:1", True),
+        *((a, False, NO_TLS) for a in ("tcp://10.0.0.1:8786", "node7:8786", "ws://node7:80", "file.json")),
+        *((a, False, NONE) for a in ("local:0", "local:many", "carrier-pigeon://somewhere", "log.csv")),
+        *((a, False, SILENT) for a in ("tcp://127.0.0.1:1", "localhost:1", "tcp://[::1]:1")),
+        ("tcp://0.0.0.0:1", True, SILENT),
     ],
 )
-def test_the_loopback_and_a_flag_are_enough(address: str, insecure: bool, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(cluster, "CONNECT", 0.5)
-    with pytest.raises(RunError, match="no Dask scheduler answers"):
-        opened(address, insecure=insecure)
-
-
-@pytest.mark.parametrize("dask", ["local:0", "local:many", "carrier-pigeon://somewhere", "log.csv"])
-def test_what_is_no_scheduler_is_said_so(dask: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_address_that_is_none_or_that_others_reach_is_refused(
+    address: str, insecure: bool, refusal: tuple[type[Exception], str], tmp_path: Path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    Path("file.json").write_text('{"address": "tcp://10.0.0.1:8786"}')
     Path("log.csv").write_text("t,u\n")
-    with pytest.raises(SettingsError, match="no Dask scheduler; give local"):
-        opened(dask)
+    with pytest.raises(refusal[0], match=refusal[1]):
+        opened(address, insecure=insecure)
 
 
 def test_no_workers_no_slurm_and_no_dask(monkeypatch: pytest.MonkeyPatch):

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from fuzz import KINDS, logs, run, run_kinds
+from fuzz import KINDS, logs, run_kinds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -160,13 +160,3 @@ def test_true_is_no_number(change: dict[str, object]) -> None:
     whole = {"parameters": {"K": {"quantity": "gain", "fixed": 1.0}}} | change
     with pytest.raises(SettingsError, match=r"f\.yaml: "):
         validate(whole, FitSettings, "f.yaml")
-
-
-def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
-    for arguments in (
-        ("check", "none.csv"),
-        ("validate", "a.csv", "--fit", "none"),
-        ("init", "mine", "--arm", "x.xml"),
-    ):
-        refusal = run(arguments)
-        assert refusal is not None

@@ -12,19 +12,8 @@ from small_studies import written
 
 
 def start(file: Path, out: Path, *options: str) -> "subprocess.Popen[str]":
-    command = [
-        sys.executable,
-        "-m",
-        "hydroid",
-        "study",
-        str(file),
-        "--out",
-        str(out),
-        "--processes",
-        "2",
-        *options,
-    ]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    hydroid = [sys.executable, "-m", "hydroid", "study", str(file), "--out", str(out), *options]
+    return subprocess.Popen(hydroid, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def content(out: Path) -> dict[str, object]:
@@ -44,8 +33,8 @@ def children(process: "subprocess.Popen[str]") -> list[int]:
 @pytest.mark.slow
 def test_a_killed_study_ends_the_same(tmp_path: Path):
     file = written(tmp_path, seeds=6)
-    whole = start(file, tmp_path / "whole", "-q")
-    killed = start(file, tmp_path / "killed", "-q")
+    whole = start(file, tmp_path / "whole", "-q", "--processes", "2")
+    killed = start(file, tmp_path / "killed", "-q", "--processes", "2")
     while not list((tmp_path / "killed").glob("runs/*.json")) and killed.poll() is None:
         time.sleep(0.01)
     workers = children(killed)
@@ -70,6 +59,5 @@ def test_a_killed_study_ends_the_same(tmp_path: Path):
 def test_dask_and_processes_come_to_the_same(tmp_path: Path):
     file = written(tmp_path, seeds=1)
     assert start(file, tmp_path / "here", "-q").wait(timeout=300) == 0
-    command = [sys.executable, "-m", "hydroid", "study", str(file), "--out", str(tmp_path / "there"), "-q"]
-    subprocess.run([*command, "--dask", "local:2"], check=True, timeout=300)
+    assert start(file, tmp_path / "there", "-q", "--dask", "local:2").wait(timeout=300) == 0
     assert content(tmp_path / "there") == content(tmp_path / "here")

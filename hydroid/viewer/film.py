@@ -1,7 +1,7 @@
 """A motion as pictures: the simulated machine, the measured one as its ghost, and the signals beside them."""
 
 import io
-from collections.abc import Generator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +11,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from hydroid.errors import RunError, SettingsError
+from hydroid.parameters import Array
 from hydroid.progress import Progress, no_progress
+from hydroid.reporting.outlines import body_poses, shapes, sight
 from hydroid.viewer.motion import Motion
 from hydroid.viewer.opengl import make_renderer
 from hydroid.viewer.panel import SignalPanel
 
 Picture = NDArray[np.uint8]
-Direction = NDArray[np.float64]
 
-KINDS = (".mp4", ".gif", ".png")
-SIZE = {".mp4": (1920, 1080), ".gif": (960, 540), ".png": (1920, 1080)}
-"""width and height of a file's pictures [px]"""
-RATE = {".mp4": 20.0, ".gif": 10.0}
-"""pictures in a second"""
+KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
+"""width and height of a file's pictures [px], and pictures in a second"""
 MOMENTS = 4
 """pictures of a motion in a png"""
 SCENE = 0.62
@@ -34,8 +32,6 @@ BEHIND = 0.004
 """distance of the ghost behind where it was measured [m]"""
 AZIMUTH, ELEVATION, FIELD = 125.0, -18.0, 40.0
 """where the camera looks to, and how high its picture is [deg]"""
-FILLED, ROOM = 0.7, 1.08
-"""part of the ball around a body that the body fills, about; and room around the machine in the picture"""
 
 
 class Stage:
@@ -60,7 +56,6 @@ class Stage:
         self._renderer = make_renderer(self._model, wide, height)
         self._data = mujoco.MjData(self._model), mujoco.MjData(self._model)
         self._camera = _camera(motion, wide / height)
-        self._seen = mujoco.MjvOption(), mujoco.MjvPerturb()
         self._panel = SignalPanel(motion, (width - wide, height), height / 1080) if wide < width else None
 
     def __enter__(self) -> "Stage":
@@ -76,14 +71,16 @@ class Stage:
         self._renderer.update_scene(data, self._camera)
         if self._motion.measured is not None:
             place(self._model, ghost, self._motion.measured[sample])
-            add_ghost(self._model, ghost, self._renderer.scene, self._seen, sight(AZIMUTH, ELEVATION))
+            add_ghost(self._model, ghost, self._renderer.scene, (AZIMUTH, ELEVATION))
         return self._renderer.render().copy()
 
     def picture(self, times: Sequence[float]) -> Picture:
-        """Return the machine at one time, or a strip of several, with the signals beside it."""
+        """Return the machine at one time, or in two columns at several, with the signals beside it."""
         shown = [self.machine(time) for time in times]
-        left = shown[0] if len(shown) == 1 else _tiles(shown)
-        return left if self._panel is None else np.hstack([left, self._panel.at(times)])
+        if len(shown) > 1:
+            small = [np.asarray(Image.fromarray(one).reduce(2)) for one in shown]
+            shown = [np.vstack([np.hstack(small[k : k + 2]) for k in range(0, len(small), 2)])]
+        return np.hstack(shown if self._panel is None else [*shown, self._panel.at(times)])
 
 
 def render_motion(
@@ -108,13 +105,20 @@ def render_motion(
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
         raise SettingsError(what, where="--span", hint="write FROM:TO in seconds")
-    with Stage(motion, SIZE[kind]) as stage:
+    size, rate = KINDS[kind]
+    with Stage(motion, size) as stage:
         if kind == ".png":
-            times = np.linspace(begin, end, MOMENTS).tolist()
-            return _png(stage.picture(times))
-        times = np.arange(begin, end, 1 / RATE[kind]).tolist()
-        pictures = _counted(stage, times, progress)
-        return _gif(pictures) if kind == ".gif" else _mp4(pictures)
+            content = io.BytesIO()
+            strip = stage.picture(np.linspace(begin, end, MOMENTS).tolist())
+            Image.fromarray(strip).save(content, "PNG", optimize=True)
+            return content.getvalue()
+
+        def picture(k: int) -> Picture:
+            progress("pictures", k, count)
+            return stage.picture([begin + k / rate])
+
+        count = int(np.ceil((end - begin) * rate - 1e-9))
+        return (_gif if kind == ".gif" else _mp4)(map(picture, range(count)))
 
 
 def check_kind(file: Path) -> str:
@@ -130,101 +134,61 @@ def check_kind(file: Path) -> str:
 
 
 def add_ghost(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    scene: mujoco.MjvScene,
-    seen: tuple[mujoco.MjvOption, mujoco.MjvPerturb],
-    away: Direction,
+    model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene, view: tuple[float, float]
 ) -> None:
     """Add what moves of a machine to a scene, translucent.
 
-    It stands BEHIND farther along `away`, the direction of sight, shape (3,): where both machines agree only
-    the simulated one is seen, and their surfaces do not flicker.
+    It stands BEHIND farther away in a view of these angles [deg]: where both machines agree only the
+    simulated one is seen, and their surfaces do not flicker.
     """
-    first = scene.ngeom
+    first, seen = scene.ngeom, (mujoco.MjvOption(), mujoco.MjvPerturb())
     mujoco.mjv_addGeoms(model, data, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
     for geom in scene.geoms[first : scene.ngeom]:
         geom.rgba[:], geom.matid, geom.transparent = GHOST, -1, 1
-        geom.pos[:] += BEHIND * away
+        geom.pos[:] += BEHIND * sight(*view)[2]
 
 
-def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Direction) -> None:
+def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
     """Bring all that is drawn of a machine to joint angles [rad], shape (nq,)."""
     data.qpos[:] = angle
     for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
         update(model, data)
 
 
-def sight(azimuth: float, elevation: float) -> Direction:
-    """Return the direction in which a camera looks, from its angles [deg], shape (3,)."""
-    turn, rise = np.radians([azimuth, elevation])
-    return np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-
-
 def _camera(motion: Motion, aspect: float) -> mujoco.MjvCamera:
     """Return a camera that has the machine and its ghost in its picture all the time."""
-    model, data = motion.machine.model, mujoco.MjData(motion.machine.model)
-    solid = np.flatnonzero((model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_rbound > 0))
     every = max(1, len(motion.time) // 40)
     moves = [angle[::every] for angle in (motion.simulated, motion.measured) if angle is not None]
-    points: list[NDArray[np.float64]] = []
-    for angle in np.vstack(moves):
-        data.qpos[:] = angle
-        mujoco.mj_kinematics(model, data)
-        points.append(data.geom_xpos[solid].copy())
-    ahead = sight(AZIMUTH, ELEVATION)
-    right = sight(AZIMUTH - 90.0, 0.0)
-    axes = np.array([right, np.cross(right, ahead), ahead])
-    seen = np.concatenate(points) @ axes.T  # to the right, up, and away from the camera
-    half = np.tile(FILLED * model.geom_rbound[solid], len(points))[:, None]
-    middle = 0.5 * ((seen - half).min(axis=0) + (seen + half).max(axis=0))
+    poses, axes = body_poses(motion.machine.model, np.vstack(moves)), sight(AZIMUTH, ELEVATION)
+    corners = [shape.placed(poses).reshape(-1, 3) for shape in shapes(motion.machine.model)]
+    seen = np.concatenate(corners) @ axes.T
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     slope = np.tan(0.5 * np.radians(FIELD)) * np.array([aspect, 1.0])
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation, camera.lookat[:] = AZIMUTH, ELEVATION, middle @ axes
-    away = np.abs(seen - middle)[:, :2] + half
-    camera.distance = ROOM * float((away / slope - (seen - middle)[:, 2:]).max())
+    across, ahead = np.abs(seen - middle)[:, :2], (seen - middle)[:, 2:]
+    camera.distance = 1.1 * float((across / slope - ahead).max())  # with some room around it
     return camera
 
 
-def _tiles(pictures: Sequence[Picture]) -> Picture:
-    """Lay pictures out in two columns, at half their size."""
-    small = [np.asarray(Image.fromarray(p).reduce(2)) for p in pictures]
-    rows = [np.hstack(small[k : k + 2]) for k in range(0, len(small), 2)]
-    return np.vstack(rows)
-
-
-def _counted(stage: Stage, times: Sequence[float], progress: Progress) -> Generator[Picture]:
-    for k, time in enumerate(times):
-        progress("pictures", k, len(times))
-        yield stage.picture([time])
-
-
-def _png(picture: Picture) -> bytes:
-    content = io.BytesIO()
-    Image.fromarray(picture).save(content, "PNG", optimize=True)
+def _gif(pictures: Iterable[Picture]) -> bytes:
+    first, *rest = (Image.fromarray(one).quantize(96, dither=Image.Dither.NONE) for one in pictures)
+    content, pause = io.BytesIO(), round(1e3 / KINDS[".gif"][1])  # [ms]
+    first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     return content.getvalue()
 
 
-def _gif(pictures: Generator[Picture]) -> bytes:
-    frames = [Image.fromarray(picture).quantize(96, dither=Image.Dither.NONE) for picture in pictures]
-    content, pause = io.BytesIO(), round(1e3 / RATE[".gif"])  # [ms]
-    frames[0].save(
-        content, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=True
-    )
-    return content.getvalue()
-
-
-def _mp4(pictures: Generator[Picture]) -> bytes:
+def _mp4(pictures: Iterable[Picture]) -> bytes:
     try:
         import av
     except ImportError:
         hint = "pip install 'hydroid[film]', or write a .gif"
         raise RunError("an mp4 needs the package av", hint=hint) from None
-    content = io.BytesIO()
+    content, ((width, height), rate) = io.BytesIO(), KINDS[".mp4"]
     with av.open(content, "w", format="mp4") as file:
-        stream: Any = file.add_stream("libx264", rate=round(RATE[".mp4"]))
-        stream.width, stream.height = SIZE[".mp4"]
-        stream.pix_fmt, stream.options = "yuv420p", {"crf": "20", "preset": "fast"}
+        stream: Any = file.add_stream("libx264", rate=round(rate))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.options = {"crf": "20", "preset": "fast"}
         for picture in pictures:
             file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         file.mux(stream.encode())

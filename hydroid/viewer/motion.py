@@ -15,19 +15,19 @@ from hydroid.prediction import predict_log
 
 @dataclass(frozen=True, eq=False)
 class JointSignals:
-    """What is drawn of one joint, T samples; what was not measured or not simulated is None."""
+    """What is drawn of one joint, T samples.
+
+    Attributes:
+        name: of the joint, and of its arm where there are two.
+        command: [%], shape (T,).
+        angle: `measured`, where it moved, and `simulated` [deg], shape (T,).
+        pressure: of chambers A and B [bar], shape (T, 2), as far as it was measured and simulated.
+    """
 
     name: str
     command: Array
-    """[%], shape (T,)"""
-    simulated: Array
-    """angle [deg], shape (T,)"""
-    measured: Array | None
-    """angle [deg], shape (T,)"""
-    pressure: Array | None
-    """simulated, of chambers A and B [bar], shape (T, 2)"""
-    measured_pressure: Array | None
-    """[bar], shape (T, 2)"""
+    angle: Mapping[str, Array]
+    pressure: Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +57,9 @@ class Motion:
     @property
     def error(self) -> float:
         """The rms difference of measured and simulated angles, as drawn [deg]; NaN: none was measured."""
-        found = [s.measured - s.simulated for s in self.signals if s.measured is not None]
-        return float(np.sqrt(np.mean(np.square(found)))) if found else np.nan
+        angles = (signals.angle for signals in self.signals)
+        errors = [angle["measured"] - angle["simulated"] for angle in angles if "measured" in angle]
+        return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
@@ -68,54 +69,39 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
         SettingsError: a log commands nothing.
         RunError: the simulation diverged.
     """
-    settings = model.settings
-    for log in logs.values():
-        if not log.driven.any():
-            raise SettingsError("commands nothing", where=log.source, hint="name a log with commands")
-    machine = load_machine(settings.arm, pair=ALONE not in logs)
+    arm, first = model.settings.arm, next(iter(logs.values()))
+    machine = load_machine(arm, pair=ALONE not in logs)
+    mirrored = len(logs) > 1 and all(log is first for log in logs.values())
     predicted: dict[str, Log] = {}
     signals: list[JointSignals] = []
-    mirrored = len(logs) > len({id(log) for log in logs.values()})
-    for side, log in logs.items():
-        if mirrored and predicted:
-            predicted[side] = next(iter(predicted.values()))
-            continue
+    for side, log in {"both": first}.items() if mirrored else logs.items():
+        if not log.driven.any():
+            raise SettingsError("commands nothing", where=log.source, hint="name a log with commands")
         predicted[side] = predict_log(model, log, all_pressures=True)
-        label = "" if side == ALONE else "both " if mirrored else f"{side} "
-        signals += _signals(label, settings.arm.joint_names, log, predicted[side])
-    rest = settings.arm.pose(settings.start_pose)
-    measured = None
-    if any(_moves(log) for log in logs.values()):
-        shown = {side: log.angle if _moves(log) else predicted[side].angle for side, log in logs.items()}
-        measured = machine.joined(shown, rest)
-    first = next(iter(logs.values()))
-    return Motion(
-        f"{model.name}, {first.source}",
-        machine,
-        first.time,
-        machine.joined({side: log.angle for side, log in predicted.items()}, rest),
-        measured,
-        tuple(signals),
-    )
+        for joint in np.flatnonzero(log.driven).tolist():
+            name = arm.joint_names[joint] if side == ALONE else f"{side} {arm.joint_names[joint]}"
+            signals.append(_signals(name, joint, {"measured": log, "simulated": predicted[side]}))
+    if mirrored:
+        predicted = dict.fromkeys(logs, predicted["both"])
+    rest, simulated = arm.pose(model.settings.start_pose), {s: log.angle for s, log in predicted.items()}
+    shown = simulated | {side: log.angle for side, log in logs.items() if _moves(log.angle)}
+    measured = machine.joined(shown, rest) if any(_moves(log.angle) for log in logs.values()) else None
+    name, angles = f"{model.name}, {first.source}", machine.joined(simulated, rest)
+    return Motion(name, machine, first.time, angles, measured, tuple(signals))
 
 
-def _moves(log: Log) -> bool:
-    """Whether a log holds motion; a log of commands stands in its start pose."""
-    return bool(np.nan_to_num(np.ptp(log.angle, axis=0)).any())
+def _moves(angle: Array) -> bool:
+    """Whether angles, shape (T, ...), are of a motion; a log of commands stands in its start pose."""
+    return bool(np.nan_to_num(np.ptp(angle, axis=0)).any())
 
 
-def _signals(label: str, names: tuple[str, ...], log: Log, predicted: Log) -> list[JointSignals]:
-    found: list[JointSignals] = []
-    for joint in np.flatnonzero(log.driven).tolist():
-        measured = np.degrees(log.angle[:, joint]) if np.ptp(log.angle[:, joint]) > 0 else None
-        simulated, logged = (
-            None
-            if one.pressure is None or np.isnan(one.pressure[:, joint]).all()
-            else 1e-5 * one.pressure[:, joint]
-            for one in (predicted, log)
-        )
-        angle = np.degrees(predicted.angle[:, joint])
-        found.append(
-            JointSignals(label + names[joint], log.command[:, joint], angle, measured, simulated, logged)
-        )
-    return found
+def _signals(name: str, joint: int, both: Mapping[str, Log]) -> JointSignals:
+    angles = {kind: np.degrees(log.angle[:, joint]) for kind, log in both.items()}
+    if not _moves(angles["measured"]):
+        del angles["measured"]
+    pressures = {
+        kind: 1e-5 * log.pressure[:, joint]
+        for kind, log in both.items()
+        if log.pressure is not None and not np.isnan(log.pressure[:, joint]).all()
+    }
+    return JointSignals(name, both["measured"].command[:, joint], angles, pressures)

@@ -18,7 +18,6 @@ MOST_JOINTS = 7
 """joints that are drawn; the others move in the picture only"""
 FEW = 2
 """joints up to which the panels stand below each other, with more of them side by side"""
-NOW = (200, 30, 30)
 
 
 class SignalPanel:
@@ -31,9 +30,13 @@ class SignalPanel:
     """
 
     def __init__(self, motion: Motion, size: tuple[int, int], scale: float = 1.0) -> None:
-        self._motion, self._scale = motion, scale
+        self._error, self._scale = motion.error, scale
+        rows = [_joint(joint, motion.time) for joint in motion.signals[:MOST_JOINTS]]
+        columns = 1 if len(rows) <= FEW else max(map(len, rows))
+        blank = Panel("", "", ())
+        panels = [panel for row in rows for panel in (*row, *[blank] * (columns - len(row)))]
         with style():
-            drawing = figure(_signals(motion.signals[:MOST_JOINTS], motion.time), "\n")
+            drawing = figure(Chart(tuple(panels), columns, linked=True), "\n")
             drawing.set_size_inches(size[0] / (100 * scale), size[1] / (100 * scale))
             drawing.set_dpi(100 * scale)
             canvas = FigureCanvasAgg(drawing)
@@ -51,40 +54,31 @@ class SignalPanel:
             box = axes.get_window_extent()
             for time in times:
                 x = axes.transData.transform((time, 0.0))[0]
-                pen.line([(x, picture.height - box.y1), (x, picture.height - box.y0)], NOW, thick)
+                pen.line([(x, picture.height - box.y1), (x, picture.height - box.y0)], (200, 30, 30), thick)
         words = ", ".join(f"{time:.1f}" for time in times) if len(times) > 1 else f"{times[0]:.2f}"
-        error = f", rms error {self._motion.error:.2f} deg" if np.isfinite(self._motion.error) else ""
+        error = f", rms error {self._error:.2f} deg" if np.isfinite(self._error) else ""
         pen.text((18 * self._scale, 12 * self._scale), f"{words} s{error}", "black", self._font)
         return np.asarray(picture)
 
 
-def _signals(signals: Sequence[JointSignals], time: Array) -> Chart:
-    """Draw commands, angles and pressures, a row for each of many joints."""
-    rows = [_joint(joint, time) for joint in signals]
-    few = len(rows) <= FEW
-    most = max(map(len, rows))
-    panels = [
-        panel for row in rows for panel in (*row, *([] if few else [Panel("", "", ())] * (most - len(row))))
-    ]
-    return Chart(tuple(panels), 1 if few else most, linked=True)
-
-
 def _joint(joint: JointSignals, time: Array) -> list[Panel]:
+    """Return panels of the command, the angles and, where there are any, the pressures."""
+    width = {"measured": 2.6, "simulated": 1.3}
+    color, alpha = {"measured": "blue", "simulated": "orange"}, {"measured": 0.35, "simulated": 1.0}
     command = Mark("step", time, joint.command, color="grey")
-    angles = [Mark("line", time, joint.simulated, color="orange", label="simulated")]
-    if joint.measured is not None:
-        measured = Mark("line", time, joint.measured, label="measured", width=2.6, alpha=0.75)
-        angles.insert(0, measured)
-    pressures: list[Mark] = []
-    for bar, width, alpha in ((joint.measured_pressure, 2.6, 0.35), (joint.pressure, 1.1, 1.0)):
-        for chamber, color in enumerate(("green", "pink") if bar is not None else ()):
-            assert bar is not None
-            at, label = bar[:, chamber], f"chamber {'AB'[chamber]}"
-            pressures.append(Mark("line", time, at, color=color, label=label, width=width, alpha=alpha))
+    angles = tuple(
+        Mark("line", time, angle, color=color[kind], label=kind, width=width[kind])
+        for kind, angle in joint.angle.items()
+    )
+    pressures = tuple(
+        Mark("line", time, bar, color=shade, label=label, width=width[kind], alpha=alpha[kind])
+        for kind, pressure in joint.pressure.items()
+        for bar, shade, label in zip(pressure.T, ("green", "pink"), ("chamber A", "chamber B"), strict=True)
+    )
     ends = float(time[0]), float(time[-1])
     panels = [
         Panel("", "", (command,), f"{joint.name}: command [%]", 130, ends, (-108.0, 108.0)),
-        Panel("", "", tuple(angles), f"{joint.name}: angle [deg]", 220, ends),
-        Panel("", "", tuple(pressures), f"{joint.name}: pressure [bar]", 220, ends),
+        Panel("", "", angles, f"{joint.name}: angle [deg]", 220, ends),
+        Panel("", "", pressures, f"{joint.name}: pressure [bar]", 220, ends),
     ]
     return panels if pressures else panels[:2]

@@ -1,64 +1,19 @@
-"""What the window shows: a plant under its sliders, or a simulated motion beside the measured one."""
+"""What the window shows: a plant under its sliders, or a simulated motion beside the measured one.
 
-from abc import ABC, abstractmethod
+Both have what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is shown
+and the `duration` after which all stands still [s], `advance`, `restart` and `captions`.
+"""
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.identified_model import IdentifiedModel
 from hydroid.plant import Plant
-from hydroid.viewer.film import add_ghost, place
+from hydroid.viewer.film import place
 from hydroid.viewer.motion import Motion
 
 
-class Playback(ABC):
-    """Something that moves in a window.
-
-    Args:
-        model: in MuJoCo.
-        data: its state, drawn as it is.
-        ghost: the state of what was measured, drawn behind it; None: nothing was measured.
-    """
-
-    duration = np.inf
-    """time after which it stands still [s]"""
-
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, ghost: mujoco.MjData | None = None
-    ) -> None:
-        self.model, self.data, self._ghost = model, data, ghost
-        self._seen = mujoco.MjvOption(), mujoco.MjvPerturb()
-        self.restart()
-
-    @property
-    @abstractmethod
-    def time(self) -> float:
-        """Since the start [s]."""
-
-    @abstractmethod
-    def advance(self, until: float) -> None:
-        """Go on to the sample before `until` [s].
-
-        Raises:
-            RunError: the simulation diverged.
-        """
-
-    @abstractmethod
-    def captions(self) -> tuple[str, str]:
-        """Return two columns of text: what moves, and how."""
-
-    def restart(self) -> None:
-        """Go back to the start."""
-        self.advance(0.0)
-
-    def draw_ghost(self, scene: mujoco.MjvScene, away: NDArray[np.float64]) -> None:
-        """Add what was measured to a scene; `away` is the direction of sight, shape (3,)."""
-        if self._ghost is not None:
-            add_ghost(self.model, self._ghost, scene, self._seen, away)
-
-
-class Sliders(Playback):
+class Sliders:
     """A plant with all joints on the viewer's sliders; its physics can be pushed about.
 
     Args:
@@ -66,10 +21,12 @@ class Sliders(Playback):
         pose: where it begins, a pose of the arm's file; by default the settings' start pose.
     """
 
+    duration, ghost = np.inf, None
+
     def __init__(self, plant: Plant, pose: str | None = None) -> None:
         self.plant, self._start = plant, pose
-        plant.reset(pose)  # it builds another model where it holds other joints in place
-        super().__init__(plant.model, plant.data)
+        self.restart()
+        self.model, self.data = plant.model, plant.data  # of the plant in its pose, where it locks joints
 
     @property
     def time(self) -> float:
@@ -79,7 +36,7 @@ class Sliders(Playback):
     def restart(self) -> None:
         """Go back to the start."""
         self.plant.reset(self._start)
-        self._refresh()
+        self.advance(0.0)
 
     def advance(self, until: float) -> None:
         """Step to the period before `until` [s].
@@ -90,7 +47,7 @@ class Sliders(Playback):
         plant = self.plant
         while plant.time + plant.period <= until + 1e-9:
             plant.step(plant.command)
-        self._refresh()
+        place(plant.model, plant.data, plant.data.qpos)  # `mj_step` leaves what is drawn a step behind
 
     def captions(self) -> tuple[str, str]:
         """Return the joints, and their commands and angles."""
@@ -100,12 +57,8 @@ class Sliders(Playback):
         first = ["time", *(names[j - 1] for j in plant.joints)]
         return "\n".join(first), "\n".join([f"{plant.time:.1f} s", *lines])
 
-    def _refresh(self) -> None:
-        """Bring what is drawn up to the angles: `mj_step` leaves it a step behind."""
-        place(self.plant.model, self.plant.data, self.plant.data.qpos)
 
-
-class Replay(Playback):
+class Replay:
     """A simulated motion from its start to its end.
 
     Args:
@@ -113,15 +66,19 @@ class Replay(Playback):
     """
 
     def __init__(self, motion: Motion) -> None:
-        model, self._motion = motion.machine.model, motion
-        self.duration = float(motion.time[-1])
-        ghost = None if motion.measured is None else mujoco.MjData(model)
-        super().__init__(model, mujoco.MjData(model), ghost)
+        self.model, self._motion = motion.machine.model, motion
+        self.data, self.duration = mujoco.MjData(self.model), float(motion.time[-1])
+        self.ghost = None if motion.measured is None else mujoco.MjData(self.model)
+        self.restart()
 
     @property
     def time(self) -> float:
         """Since the start [s]."""
         return float(self._motion.time[self._sample])
+
+    def restart(self) -> None:
+        """Go back to the start."""
+        self.advance(0.0)
 
     def advance(self, until: float) -> None:
         """Go on to the sample before `until` [s]."""
@@ -129,21 +86,24 @@ class Replay(Playback):
         self._sample = motion.sample(until)
         place(self.model, self.data, motion.simulated[self._sample])
         self.data.time = self.time
-        if self._ghost is not None and motion.measured is not None:
-            place(self.model, self._ghost, motion.measured[self._sample])
+        if self.ghost is not None and motion.measured is not None:
+            place(self.model, self.ghost, motion.measured[self._sample])
 
     def captions(self) -> tuple[str, str]:
         """Return the driven joints, and their commands, angles and pressures."""
         first, second, k = ["time"], [f"{self.time:.1f} s"], self._sample
         for signals in self._motion.signals:
-            line = f"{signals.command[k]:4.0f} %  {signals.simulated[k]:7.2f} deg"
-            if signals.measured is not None:
-                line += f"  (log {signals.measured[k]:.2f})"
-            if signals.pressure is not None:
-                line += "  {:.0f} / {:.0f} bar".format(*signals.pressure[k])
+            line = f"{signals.command[k]:4.0f} %  {signals.angle['simulated'][k]:7.2f} deg"
+            if "measured" in signals.angle:
+                line += f"  (log {signals.angle['measured'][k]:.2f})"
+            if "simulated" in signals.pressure:
+                line += "  {:.0f} / {:.0f} bar".format(*signals.pressure["simulated"][k])
             first.append(signals.name)
             second.append(line)
         return "\n".join(first), "\n".join(second)
+
+
+Playback = Sliders | Replay
 
 
 def make_sliders(model: IdentifiedModel, pose: str | None = None) -> Sliders:

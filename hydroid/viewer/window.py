@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from hydroid.errors import RunError
-from hydroid.viewer.film import sight
+from hydroid.viewer.film import add_ghost
 from hydroid.viewer.playback import Playback
 
 FRAME = 1 / 60  # between two pictures of the viewer [s]
@@ -48,7 +48,9 @@ def play(
         playback.advance(frame - begun)
         viewer.set_texts((None, None, *playback.captions()))
         viewer.user_scn.ngeom = 0
-        playback.draw_ghost(viewer.user_scn, sight(viewer.cam.azimuth, viewer.cam.elevation))
+        if playback.ghost is not None:
+            view = viewer.cam.azimuth, viewer.cam.elevation
+            add_ghost(playback.model, playback.ghost, viewer.user_scn, view)
         before = playback.data.time
         viewer.sync()
         if playback.data.time < before:

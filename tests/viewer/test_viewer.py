@@ -201,19 +201,20 @@ def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log,
         pytest.importorskip("av")
     motion = simulated_motion(nominal, {"alone": study_log})
     renderable(motion).__exit__()
-    monkeypatch.setitem(film.SIZE, kind, (480, 270))
+    _, rate = film.KINDS[kind]
+    monkeypatch.setitem(film.KINDS, kind, ((480, 270), rate))
     content = film.render_motion(motion, kind, (1.0, 1.5))
     if kind == ".mp4":
         import av
 
         with av.open(io.BytesIO(content)) as file:
             frames = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
-        assert len(frames) == round(0.5 * film.RATE[kind])
+        assert len(frames) == round(0.5 * rate)
         assert frames[0].shape == (270, 480, 3)
         return
     with Image.open(io.BytesIO(content)) as picture:
         assert picture.format == kind[1:].upper()
-        assert kind == ".png" or picture.n_frames == round(0.5 * film.RATE[kind])
+        assert kind == ".png" or picture.n_frames == round(0.5 * rate)
 
 
 def test_a_span_without_time_and_another_kind_of_file_are_refused(nominal: IdentifiedModel, study_log: Log):
@@ -231,8 +232,7 @@ def test_two_arms_move_as_mirror_images(nominal: IdentifiedModel, study_log: Log
     one = simulated_motion(nominal, {"left": study_log})
     assert np.ptp(one.simulated[:, :7], axis=0).max() == 0  # the other arm rests
     np.testing.assert_array_equal(one.simulated[:, 7:], both.simulated[:, 7:])
-    pressure = one.signals[0].pressure
-    assert pressure is not None
+    pressure = one.signals[0].pressure["simulated"]
     assert 1 < pressure.min() < pressure.max() < 400
 
 

@@ -63,8 +63,8 @@ def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Sec
     tabs: list[Tab] = []
     for i, (name, one) in enumerate(finite.items()):
         draw = partial(moving_arm, model, arm.joint_names, one, most)
-        tabs.append(Tab(name, (Plot(f"motion_{i + 1}", f"{name}. {_CAPTION}", draw),)))
-    return (Section("The arm in motion", tabs=tuple(tabs)),)
+        tabs.append(Tab(name, (Plot(f"motion_{i + 1}", name, draw),)))
+    return (Section("The arm in motion", _CAPTION, tabs=tuple(tabs)),)
 
 
 def moving_arm(

@@ -30,8 +30,8 @@ def parameter_section(
     `profiles` are further intervals by parameter, `others` further estimates; without these the fit's own.
     """
     text = (
-        "Bar: from bound to bound. Orange: the estimate and its 95 % interval, right only if the model is. "
-        "Grey: its prior. Blue: other estimates."
+        "Bar: from bound to bound. Orange: the estimate and its 95 % interval. Grey: its prior. Blue: other "
+        "estimates."
     )
     free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
     if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:

@@ -12,10 +12,7 @@ from hydroid.advice.residuals import Regressor, ResidualCheck
 from hydroid.reporting.chart import ZERO, Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Tab
 
-_CAPTION = (
-    "Measured minus simulated angle over time, and its mean over angle, velocity and command with two "
-    "standard errors. Shaded: the joint stands at its stop."
-)
+_CAPTION = "Measured minus simulated angle, and its mean with two standard errors. Shaded: at a stop."
 
 
 def residual_tabs(checks: Sequence[ResidualCheck], places: Sequence[str]) -> tuple[Tab, ...]:

@@ -39,11 +39,8 @@ class Experiment:
 
     def log(self, settings: FitSettings) -> Log:
         """Return commands without motion: every angle stays in the start pose."""
-        samples, period, slew = (
-            experiment_samples(settings),
-            settings.log.period_s,
-            settings.design.slew_pct_s,
-        )
+        period, slew = settings.log.period_s, settings.design.slew_pct_s
+        samples = experiment_samples(settings)
         command = np.zeros((samples, len(self.pose)))
         for joint, signal in self.inputs.items():
             held = np.diff(np.append(signal.start, samples))
@@ -53,20 +50,9 @@ class Experiment:
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
-    def with_level(self, joint: int, segment: int, level: float) -> "Experiment":
-        """Return the experiment with one level [%] of one joint replaced."""
-        levels = self.inputs[joint].level.copy()
-        levels[segment] = round(level, 1)
-        return self.with_input(joint, replace(self.inputs[joint], level=levels))
-
     def with_input(self, joint: int, signal: Input) -> "Experiment":
         """Return the experiment with another input of one joint."""
         return replace(self, inputs={**self.inputs, joint: signal})
-
-    def scaled(self, factor: float) -> "Experiment":
-        """Return the experiment with all commands times a factor."""
-        inputs = {j: replace(i, level=np.round(factor * i.level, 1)) for j, i in self.inputs.items()}
-        return replace(self, inputs=inputs)
 
 
 def limited(command: Array, start: Ints, step: float) -> Array:
@@ -220,15 +206,6 @@ def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> 
     return Violation(sample, joint, not out[sample, joint])
 
 
-def meeting(angle: Array, sample: int) -> Violation:
-    """Return the violation of bodies that come too near at a sample: of the joint that turned most lately.
-
-    `angle` is the motion [rad], shape (T, J); joint angles far out on the arm count as much as the others.
-    """
-    turned = np.ptp(angle[max(0, sample - 20) : sample + 1], axis=0)
-    return Violation(sample, int(np.argmax(turned)), False)
-
-
 def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[int, int]]) -> Experiment:
     """Change the level before a violation, or an earlier one where all factors of it have been tried."""
     signal = experiment.inputs.get(first.joint)
@@ -242,5 +219,8 @@ def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[in
                 # factors are of the level as drawn: undo the one before
                 factor = factors[tries] / (factors[tries - 1] if tries else 1.0)
                 changes[first.joint, segment] += 1
-                return experiment.with_level(first.joint, segment, factor * signal.level[segment])
-    return experiment.scaled(0.7)
+                level = signal.level.copy()
+                level[segment] = round(factor * level[segment], 1)
+                return experiment.with_input(first.joint, replace(signal, level=level))
+    inputs = {j: replace(one, level=np.round(0.7 * one.level, 1)) for j, one in experiment.inputs.items()}
+    return replace(experiment, inputs=inputs)

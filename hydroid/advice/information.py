@@ -15,7 +15,6 @@ from hydroid.advice.commands import (
     Experiment,
     Violation,
     experiment_samples,
-    meeting,
     repaired,
     violation,
 )
@@ -49,12 +48,8 @@ def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
     Args:
         signals: derivatives per relative change, (p, T), and the noise.
     """
-    bread, scatter = (
-        np.sum(parts, axis=0)
-        for parts in zip(
-            *((slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals), strict=True
-        )
-    )
+    parts = [(slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals]
+    bread, scatter = np.sum(parts, axis=0)
     floor = 1e-12 * np.trace(scatter) + np.finfo(float).tiny
     lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
     return np.asarray(solve_triangular(lower, bread, lower=True), dtype=float)
@@ -129,7 +124,11 @@ class ExperimentSimulator:
             return None
         rest = self._settings.arm.pose(self._settings.start_pose)
         found = machine.checker.first_below(machine.joined({machine.sides[0]: angle}, rest), margin)
-        return None if found is None else meeting(angle, found[0])
+        if found is None:
+            return None
+        # the cause is the joint that turned most lately; joints far out on the arm count as the others do
+        turned = np.ptp(angle[max(0, found[0] - 20) : found[0] + 1], axis=0)
+        return Violation(found[0], int(np.argmax(turned)), False)
 
     def information(self, experiment: Experiment, angle: Array) -> Array | None:
         """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""

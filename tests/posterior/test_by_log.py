@@ -1,4 +1,4 @@
-"""Covariance by log, and noise that is not white, against statsmodels and arch on linear problems."""
+"""Covariance by log, and noise that is not white, against statsmodels on linear problems."""
 
 import numpy as np
 import pytest

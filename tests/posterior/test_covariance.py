@@ -68,6 +68,7 @@ def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():
     found = uncertainty(problem, theta)
     assert flags(found) == [Flag.UNIDENTIFIABLE, Flag.UNIDENTIFIABLE, Flag.NO_EFFECT, Flag.IDENTIFIABLE]
     assert np.isinf(found.interval[:3]).all()
+    assert profile(problem, found, "a").interval == (-np.inf, np.inf)
     pair = columns[[0, 3]]
     expected = 0.1 * DEG * np.sqrt(np.linalg.inv(pair @ pair.T)[1, 1])
     assert found.standard_deviation[3] == pytest.approx(expected, rel=1e-6)

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import dask
 import numpy as np
 import pytest
 from worker_targets import Rows
@@ -157,6 +156,7 @@ def test_dask_workers_in_one_allocation_change_no_bit(site: Path):
 def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(
     site: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    dask = pytest.importorskip("dask")
     pytest.importorskip("dask_jobqueue")
     job = {"cores": 1, "memory": "1GiB", "walltime": "00:10:00"}
     configuration = {f"jobqueue.slurm.{key}": value for key, value in job.items()}

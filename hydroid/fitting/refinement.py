@@ -99,11 +99,10 @@ def refine(
 def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
     """Begin at a point of the unit box, (p,), with the noise there; `row`, (R,): its residuals, if known."""
     theta, weight = problem.parameters.from_unit(unit[None]), 0.0
-    if row is None:
-        row = with_open_start(problem, theta[0]).residuals(theta)[0]
+    here = with_open_start(problem, theta[0]).residuals(theta)[0] if row is None else row
     if len(problem.priors) or problem.leaves_start_open:
-        weight = prior_weight(problem.channels, row, problem.settings.objective)
-    return _Refinement(start(unit, np.append(row, weight * problem.priors.scores(theta))), weight, unit)
+        weight = prior_weight(problem.channels, here, problem.settings.objective)
+    return _Refinement(start(unit, np.append(here, weight * problem.priors.scores(theta))), weight, unit)
 
 
 def _following(problem: Problem, now: _Refinement) -> _Refinement:

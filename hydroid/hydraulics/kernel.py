@@ -223,17 +223,17 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, arm: Any, pa
 
 
 @compilable
-def take_over(plugin: Plugin, state: Any, arm: Any) -> None:
+def take_over(plugin: Plugin, state: Any, arm: Any, pad: Pad) -> None:
     """Take over one candidate's true new velocities from MuJoCo, and give it the new angles."""
-    order, entries, period = plugin.order, plugin.entries, plugin.period
+    order, entries, period, change = plugin.order, plugin.entries, plugin.period, pad.gain
     for a in range(order.size):
         z, place = state[order[a]], arm.columns[order[a]]
-        arm.angle[place] = z.angle + z.way + RAMP_WAY * period * (arm.velocity[place] - z.predicted)
+        velocity = arm.velocity[place]
+        arm.angle[place] = z.angle + z.way + RAMP_WAY * period * (velocity - z.predicted)
+        change[a], z.velocity = velocity - z.velocity, velocity
+    for a in range(order.size):
         # (M + h κ) q̈ − torque is what neither oil nor damping did; the bound M contains h κ
         momentum = 0.0
         for b in range(order.size):
-            change = arm.velocity[arm.columns[order[b]]] - state[order[b]].velocity
-            momentum += arm.mass[entries[a, b]] * change
-        z.external = momentum / period - z.torque
-    for j in range(order.size):
-        state[j].velocity = arm.velocity[arm.columns[j]]
+            momentum += arm.mass[entries[a, b]] * change[b]
+        state[order[a]].external = momentum / period - state[order[a]].torque

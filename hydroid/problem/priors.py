@@ -58,8 +58,8 @@ class Priors:
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
         self.searched = _within_reach(parameters)
-        free = zip(range(len(parameters.names)), parameters.parameters, parameters.free, strict=True)
-        self._own = [(column, p.prior) for column, p, is_free in free if is_free and p.prior is not None]
+        each = enumerate(parameters.parameters)
+        self._own = [(column, p.prior) for column, p in each if p.fixed is None and p.prior is not None]
         self._combinations = [
             combination
             for name, prior in settings.items()

@@ -156,7 +156,7 @@ def roll(arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source:
         _mj_step(arm.model, arm.data)
         if arm.warnings.any():
             return
-        take_over(plugin, state, arm)
+        take_over(plugin, state, arm, pad)
         if (k + 1) % arm.steps == 0:
             record.angle[k // arm.steps] = arm.angle
             if record.states.size:

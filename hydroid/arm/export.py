@@ -17,8 +17,6 @@ from hydroid.arm.locked import LockedArm, copy_joints
 from hydroid.files import write_atomic
 from hydroid.mjcf import quiet_mujoco
 
-FITTED, MECHANICS, ACTUATORS, README = "fitted.xml", "mechanics.xml", "actuators.yaml", "README.txt"
-
 _MECHANICAL_README = """\
 fitted.xml is the fitted arm for MuJoCo alone. Set ctrl to the commands [%] and call mj_step once per
 {timestep:g} s: it moves as the fit does, within 1e-6 rad.
@@ -152,9 +150,10 @@ def write_fitted(
     Raises:
         RunError: the folder cannot be written.
     """
-    write_atomic(folder / (FITTED if actuators is None else MECHANICS), mjcf)
+    name, words = "fitted.xml", _MECHANICAL_README
     if actuators is not None:
+        name, words = "mechanics.xml", _HYDRAULIC_README
         text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
-        write_atomic(folder / ACTUATORS, text)
-    words = _MECHANICAL_README if actuators is None else _HYDRAULIC_README
-    write_atomic(folder / README, words.format(timestep=timestep, joints=joints))
+        write_atomic(folder / "actuators.yaml", text)
+    write_atomic(folder / name, mjcf)
+    write_atomic(folder / "README.txt", words.format(timestep=timestep, joints=joints))

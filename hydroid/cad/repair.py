@@ -4,17 +4,13 @@ import mujoco
 import numpy as np
 import trimesh
 
-from hydroid.cad.shapes import SHOWN, Array, ball, geom_mesh, joined, solid_properties
+from hydroid.cad.shapes import SHOWN, Array, ball, geom_mesh, solid_properties
 from hydroid.mjcf import mujoco_errors
 
 DENSITY = 1000.0
 """of a body without a mass [kg/m³], MuJoCo's; steel links are hollow"""
 MASSLESS = 1e-6
 """mass up to which a body counts as a frame without mass [kg]"""
-LEAST_MASS = 1e-9
-"""bound that lets MuJoCo compile bodies without mass [kg]"""
-INERTIA_SLACK = 1e-6
-"""part of the largest moment by which two others may miss it, since exports round"""
 NO_INERTIAL = "it has no inertial"
 
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
@@ -32,7 +28,7 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: list[str]) -> None:
     """
     faults = {body.name: fault for body in spec.bodies[1:] if (fault := _stated_fault(body, urdf))}
     compiler = spec.compiler
-    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = True, LEAST_MASS, LEAST_MASS
+    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = True, 1e-9, 1e-9  # or it refuses
     with mujoco_errors(spec.modelname):
         model = spec.compile()
     compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = False, 0.0, 0.0
@@ -89,7 +85,7 @@ def inertia_fault(tensor: Array) -> str:
     a, b, c = np.linalg.eigvalsh(tensor).tolist()
     if a <= 0:
         return f"its smallest moment of inertia is {a:.3g} kg·m², and must be above 0"
-    if a + b < c * (1 - INERTIA_SLACK):
+    if a + b < c * (1 - 1e-6):  # exports round
         return f"its moments of inertia {a:.3g}, {b:.3g} and {c:.3g} kg·m² break A + B ≥ C"
     return ""
 
@@ -104,7 +100,8 @@ def _look(model: mujoco.MjModel, body: int) -> trimesh.Trimesh | None:
             mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
             pose[:3, :3], pose[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
             parts.append(mesh.apply_transform(pose))
-    return joined(parts)
+    whole = trimesh.util.concatenate(parts) if parts else None  # overlaps and all
+    return whole if isinstance(whole, trimesh.Trimesh) else None
 
 
 def _of_the_shape(

@@ -1,6 +1,5 @@
 """Mesh files and MuJoCo's shapes -> triangles in m, and the mass properties of what they enclose."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import mujoco
@@ -14,9 +13,6 @@ from hydroid.mjcf import mujoco_errors
 Array = NDArray[np.float64]
 SHOWN, HIDDEN = 2, 3
 """groups of shapes that are seen, and of those that only collide"""
-STEEL = 7850.0  # [kg/m³]
-SMALLEST_VOLUME = 1e-9
-"""of a solid [m³]: one cubic millimetre"""
 
 
 def read_mesh(path: Path, notes: list[str]) -> trimesh.Trimesh | None:
@@ -76,13 +72,6 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
             return None
 
 
-def joined(meshes: Iterable[trimesh.Trimesh]) -> trimesh.Trimesh | None:
-    """Return several meshes as one, overlaps and all; None of none."""
-    parts = list(meshes)
-    whole = trimesh.util.concatenate(parts) if parts else None
-    return whole if isinstance(whole, trimesh.Trimesh) else None
-
-
 def solid_properties(mesh: trimesh.Trimesh) -> tuple[float, Array, Array, str] | None:
     """Return volume [m³], centre [m], inertia for 1 kg [m²], and what was taken for the solid.
 
@@ -93,7 +82,7 @@ def solid_properties(mesh: trimesh.Trimesh) -> tuple[float, Array, Array, str] |
         solid = mesh if closed else mesh.convex_hull
     except Exception:  # qhull's own error for flat points
         return None
-    if not np.isfinite(solid.volume) or solid.volume < SMALLEST_VOLUME:
+    if not np.isfinite(solid.volume) or solid.volume < 1e-9:  # one cubic millimetre
         return None
     inertia = np.asarray(solid.moment_inertia) / solid.mass
     return float(solid.volume), np.asarray(solid.center_mass), inertia, "mesh" if closed else "mesh's hull"
@@ -101,5 +90,5 @@ def solid_properties(mesh: trimesh.Trimesh) -> tuple[float, Array, Array, str] |
 
 def ball(mass: float) -> Array:
     """Return the inertia of a steel ball about its centre [kg·m²], shape (3, 3)."""
-    radius = (mass / STEEL / (4 / 3 * np.pi)) ** (1 / 3)
+    radius = (mass / 7850.0 / (4 / 3 * np.pi)) ** (1 / 3)
     return 0.4 * mass * radius**2 * np.eye(3)

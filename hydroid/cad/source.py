@@ -13,10 +13,6 @@ from hydroid.mjcf import mujoco_errors
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
-PARENTS = 4
-"""folders above the file's own in which package:// paths are looked up"""
-SEARCHED = 20_000
-"""files below the file's folder among which a mesh is looked up by its name"""
 HELD = {"prismatic": "slides", "floating": "floats freely", "planar": "moves in a plane"}
 """kinds of a URDF's joints that hydroid does not move, and what they do"""
 HELD_IN_MJCF = {
@@ -131,12 +127,12 @@ def _find(given: str, folder: Path) -> tuple[Path | None, str]:
     tried: list[Path] = []
     if scheme in ("package", "model") and len(parts) > 1:
         inside = Path(*parts[1:])
-        for place in [folder, *islice(folder.parents, PARENTS)]:
+        for place in [folder, *islice(folder.parents, 4)]:
             tried += [place / rest, place / inside]
     else:
         tried = [folder / rest, Path(rest)]
     last = parts[-1] if parts else given
-    alike = (path for path in islice(folder.rglob("*"), SEARCHED) if parts and path.name == last)
+    alike = (path for path in islice(folder.rglob("*"), 20_000) if parts and path.name == last)
     found = next((path for path in tried if is_file(path)), None) or next(alike, None)
     return found, f"{tried[0]}, {tried[-1]} and {last} below {folder}"
 

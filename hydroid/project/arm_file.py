@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from hydroid.cad import ImportedArm
+from hydroid.cad.importer import ImportedArm
 from hydroid.cad.scene import SCENE
 from hydroid.project.sizes import LIFT, JointSize
 

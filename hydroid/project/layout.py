@@ -111,9 +111,9 @@ def turned(command: dict[str, Any]) -> dict[str, Any]:
 
 
 def _outside(log: Log, joint: int, arm: Arm, margin: float) -> list[str]:
-    angle, limits = np.degrees(log.angle[:, joint - 1]), arm.ranges[joint - 1]
-    low, high = float(angle.min()), float(angle.max())
-    if limits is None or (low >= limits[0] - margin and high <= limits[1] + margin):
+    angle, own = np.degrees(log.angle[:, joint - 1]), arm.joints[joint - 1]
+    low, high, limits = float(angle.min()), float(angle.max()), own.range
+    if own.continuous or (low >= limits[0] - margin and high <= limits[1] + margin):
         return []
     return [
         f"{arm.joint_names[joint - 1]}: the angles in the log run from {low:.1f} to {high:.1f} deg, but the "

@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hydroid.cad import ImportedArm, import_arm
-from hydroid.cad.importer import MESHES
+from hydroid.cad.importer import MESHES, ImportedArm, import_arm
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table

@@ -15,7 +15,6 @@ from hydroid.errors import SettingsError
 Lines = dict[tuple[str, ...], int]
 """line [1-based] of each key or item, by its path"""
 
-MAX_BYTES = 2**18
 _PLAIN = {
     "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
     "\\t": "a line is indented by a tab; use spaces",
@@ -40,15 +39,16 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
     Raises:
         SettingsError: unreadable, not UTF-8, too large, not a mapping, or as `read_document`.
     """
+    most = 2**18
     try:
         with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(most + 1)
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise SettingsError(f"cannot be read ({reason})", where=str(path)) from None
-    if len(data) > MAX_BYTES:
-        raise SettingsError(f"is larger than {MAX_BYTES >> 10} KiB, too large for settings", where=str(path))
+    if len(data) > most:
+        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", where=str(path))
     values, lines = read_document(text, str(path))
     if not isinstance(values, dict):
         raise SettingsError("must be a mapping of settings", where=str(path), hint="write `key: value` lines")

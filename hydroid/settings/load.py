@@ -18,9 +18,6 @@ from pydantic import (
 from hydroid.errors import SettingsError
 from hydroid.settings.document import Lines, read_document, read_yaml
 
-LONGEST = 60
-"""characters of a value in a message"""
-
 _PLAIN = {
     "bool": "must be true or false",
     "dict": "must be a mapping of settings",
@@ -190,7 +187,7 @@ def _shown(value: object) -> str:
         text = f"[{', '.join(map(_shown, value))}]"
     else:
         text = {"None": "null", "True": "true", "False": "false"}.get(repr(value), repr(value))
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
+    return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
 
 
 def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:

@@ -13,8 +13,6 @@ from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 
-MOST_CELLS = 1000
-
 Changes = dict[str, Any]
 """settings to replace, by dotted key, as `--set` has them"""
 
@@ -51,8 +49,8 @@ class StudySettings(Settings):
     @model_validator(mode="after")
     def _few_cells(self) -> "StudySettings":
         count = prod(len(axis) for axis in self.axes.values())
-        if not 0 < count <= MOST_CELLS:
-            raise ValueError(f"axes give {count} cells; 1 to {MOST_CELLS} are allowed")
+        if not 0 < count <= 1000:
+            raise ValueError(f"axes give {count} cells; 1 to 1000 are allowed")
         return self
 
     def changes(self) -> dict[str, Changes]:

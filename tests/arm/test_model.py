@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from hydroid.arm.model import load_model
+from hydroid.arm.model import load_machine, load_model
 from hydroid.assets import assets
+from hydroid.errors import ModelError, SettingsError
 from hydroid.settings.arm import load_arm
 
 ARM = load_arm("hydrolek")
@@ -105,3 +107,27 @@ def test_no_pose_starts_in_contact_but_an_arm_in_the_floor_is_felt(pose):
     assert posed(ARM.pose(pose)).ncon == 0
     data = posed([0, np.radians(-30), np.radians(-50), 0, 0, 0, 0])
     assert MODEL.geom("floor").id in data.contact.geom
+
+
+def test_each_arm_of_a_pair_is_the_one_that_stands_alone():
+    """Its gravity and inertia, on both sides."""
+    machine = load_machine(ARM, pair=True)
+    one, data = mujoco.MjData(MODEL), mujoco.MjData(machine.model)
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        pose = rng.uniform(np.maximum(ARM.lower, -3), np.minimum(ARM.upper, 3))
+        one.qpos[:], data.qpos[:] = pose, np.tile(pose, 2)
+        mujoco.mj_forward(MODEL, one)
+        mujoco.mj_forward(machine.model, data)
+        np.testing.assert_allclose(data.qfrc_bias, np.tile(one.qfrc_bias, 2), atol=1e-9)
+        full, single = np.zeros((14, 14)), np.zeros((7, 7))
+        mujoco.mj_fullM(machine.model, data, full)
+        mujoco.mj_fullM(MODEL, one, single)
+        np.testing.assert_allclose(full, np.kron(np.eye(2), single), atol=1e-9)
+
+
+def test_an_arm_that_names_no_pair_or_another_model_says_how():
+    with pytest.raises(SettingsError, match=r"stands alone.*pair: MODEL"):
+        load_machine(replace(ARM, file=ARM.file.model_copy(update={"pair": None})), pair=True)
+    with pytest.raises(ModelError, match=r"not the model of two of the arm; the joints .* right_azimuth"):
+        load_machine(replace(ARM, file=ARM.file.model_copy(update={"pair": ARM.model})), pair=True)

@@ -7,7 +7,7 @@ import robots
 import trimesh
 from robots import LIMIT, joint, link, write_robot
 
-from hydroid.cad import import_arm
+from hydroid.cad.importer import import_arm
 from hydroid.cad.shapes import SHOWN, geom_mesh, solid_properties
 from hydroid.cad.source import HELD
 from hydroid.errors import ModelError

@@ -35,7 +35,6 @@ class Motion:
     """A machine under the commands of logs.
 
     Attributes:
-        name: of the model and the log.
         machine: what moves.
         time: [s], shape (T,).
         simulated: angles of all joints of the machine [rad], shape (T, nq).
@@ -43,7 +42,6 @@ class Motion:
         signals: of the driven joints, the arms one after another.
     """
 
-    name: str
     machine: Machine
     time: Array
     simulated: Array
@@ -86,8 +84,7 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     rest, simulated = arm.pose(model.settings.start_pose), {s: log.angle for s, log in predicted.items()}
     shown = simulated | {side: log.angle for side, log in logs.items() if _moves(log.angle)}
     measured = machine.joined(shown, rest) if any(_moves(log.angle) for log in logs.values()) else None
-    name, angles = f"{model.name}, {first.source}", machine.joined(simulated, rest)
-    return Motion(name, machine, first.time, angles, measured, tuple(signals))
+    return Motion(machine, first.time, machine.joined(simulated, rest), measured, tuple(signals))
 
 
 def _moves(angle: Array) -> bool:

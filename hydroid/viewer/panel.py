@@ -31,12 +31,12 @@ class SignalPanel:
 
     def __init__(self, motion: Motion, size: tuple[int, int], scale: float = 1.0) -> None:
         self._error, self._scale = motion.error, scale
-        rows = [_joint(joint, motion.time) for joint in motion.signals[:MOST_JOINTS]]
-        columns = 1 if len(rows) <= FEW else max(map(len, rows))
-        blank = Panel("", "", ())
-        panels = [panel for row in rows for panel in (*row, *[blank] * (columns - len(row)))]
+        shown = motion.signals[:MOST_JOINTS]
+        kinds = 3 if any(joint.pressure for joint in shown) else 2
+        panels = [panel for joint in shown for panel in _joint(joint, motion.time)[:kinds]]
+        chart = Chart(tuple(panels), 1 if len(shown) <= FEW else kinds, linked=True)
         with style():
-            drawing = figure(Chart(tuple(panels), columns, linked=True), "\n")
+            drawing = figure(chart, "\n")
             drawing.set_size_inches(size[0] / (100 * scale), size[1] / (100 * scale))
             drawing.set_dpi(100 * scale)
             canvas = FigureCanvasAgg(drawing)
@@ -62,7 +62,7 @@ class SignalPanel:
 
 
 def _joint(joint: JointSignals, time: Array) -> list[Panel]:
-    """Return panels of the command, the angles and, where there are any, the pressures."""
+    """Return panels of the command, the angles and the pressures."""
     width = {"measured": 2.6, "simulated": 1.3}
     color, alpha = {"measured": "blue", "simulated": "orange"}, {"measured": 0.35, "simulated": 1.0}
     command = Mark("step", time, joint.command, color="grey")
@@ -76,9 +76,8 @@ def _joint(joint: JointSignals, time: Array) -> list[Panel]:
         for bar, shade, label in zip(pressure.T, ("green", "pink"), ("chamber A", "chamber B"), strict=True)
     )
     ends = float(time[0]), float(time[-1])
-    panels = [
+    return [
         Panel("", "", (command,), f"{joint.name}: command [%]", 130, ends, (-108.0, 108.0)),
         Panel("", "", angles, f"{joint.name}: angle [deg]", 220, ends),
         Panel("", "", pressures, f"{joint.name}: pressure [bar]", 220, ends),
     ]
-    return panels if pressures else panels[:2]

@@ -178,4 +178,4 @@ def test_all_suggestions_are_a_page_and_plain_values(late: tuple[Problem, Uncert
     content = advised.content
     assert content["missing"][0]["name"] == "delay"
     kinds = {action["action"] for action in content["actions"]}
-    assert kinds <= {kind for kind, words in WORDS.items() if words.hint == WORDS["state"].hint}
+    assert kinds <= {kind for kind, words in WORDS.items() if words[1] == WORDS["state"][1]}

@@ -188,7 +188,7 @@ def _with_varied(
         if not free[i]:
             status.append(ParameterStatus(Flag.FIXED))
             continue
-        bound = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
+        bound: Side | None = next((side for side, at in at_bounds(parameter, theta[i]) if at), None)
         if bound is not None and not unknown[i]:
             interval[i] = np.nan
         flag = Flag.NO_EFFECT if idle[i] else flag_of(float(widened[i]), shares[i])

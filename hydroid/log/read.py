@@ -128,33 +128,20 @@ def _in_si(recording: Recording) -> Recording:
 
 def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[LogFinding]]:
     """Bring a recording without faults to its period; also returns what is worth knowing about that."""
-    values = {
-        kind: np.full((len(recording.time), joints, 2), np.nan) for kind in ("command", "angle", "pressure")
-    }
+    cells, period = np.full((len(recording.time), joints, 5), np.nan), settings.period_s
     for signal, column in zip(recording.signals[1:], recording.values.T[1:], strict=True):
-        values[signal.kind][:, signal.joint - 1, signal.part] = column
-    command = np.nan_to_num(values["command"])
+        first = {"command": 0, "angle": 2}.get(signal.kind, 3)
+        cells[:, signal.joint - 1, first + signal.part] = column
+    command = np.nan_to_num(cells[..., :2])
     command = (0.0 + command[..., 0] - command[..., 1]).clip(-100, 100)
-    measured = np.concatenate([values["angle"][..., :1], values["pressure"]], axis=2).reshape(
-        len(command), -1
-    )
-    period = settings.period_s
+    measured = cells[..., 2:].reshape(len(cells), -1)
     time, command, measured = resample(recording.time, command, measured, period, settings.delay_s)
-    angle, pressure = np.split(measured.reshape(len(time), joints, 3), [1], axis=2)
-    kinds = {signal.kind for signal in recording.signals}
-    log = Log(
-        recording.table.source,
-        time,
-        command,
-        angle[..., 0],
-        period,
-        pressure if "pressure" in kinds else None,
-    )
-    findings = list[LogFinding]()
+    measured, kinds = measured.reshape(-1, joints, 3), {signal.kind for signal in recording.signals}
+    pressure = measured[..., 1:] if "pressure" in kinds else None
+    log = Log(recording.table.source, time, command, measured[..., 0], period, pressure)
+    findings, step = list[LogFinding](), sample_period(recording.time)
     if not is_on_grid(recording.time, period):
-        findings.append(
-            recording.finding("note", "resampled", step=sample_period(recording.time), period=period)
-        )
+        findings.append(recording.finding("note", "resampled", step=step, period=period))
     if "command" in kinds and not log.driven.any():
         findings.append(recording.finding("warning", "undriven"))
     return log, findings

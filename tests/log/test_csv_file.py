@@ -30,6 +30,7 @@ DIALECTS: dict[str, Callable[[], bytes]] = {
     "decimal comma, tab": lambda: text("\t", ",").encode(),
     "byte order mark": lambda: text().encode("utf-8-sig"),
     "utf-16": lambda: text("\t", ",").encode("utf-16"),
+    "utf-16 without its mark": lambda: text("\t", ",").encode("utf-16-be"),
     "latin-1": lambda: with_degree_sign(text()).encode("latin-1"),
     "utf-8 degree": lambda: with_degree_sign(text()).encode(),
     "windows": lambda: text(end="\r\n").encode(),

@@ -49,20 +49,6 @@ def test_an_early_command_is_mentioned_and_the_setting_cures_it(tmp_path: Path) 
     assert mentions(log, tmp_path, LogSettings(delay_s=delay)) == []
 
 
-def test_a_motion_before_its_command_is_a_warning(tmp_path: Path) -> None:
-    (warning,) = mentions(shifted(rig("rig_shoulder_1"), -0.2), tmp_path)
-    assert warning.level == "warning"
-    assert "angle of joint 2 moves 0.17 s before the command" in warning.what
-    assert "log.delay_s: -0.17" in warning.hint
-
-
-def test_a_joint_that_moves_against_its_command_is_a_warning(tmp_path: Path) -> None:
-    log = rig("rig_shoulder_2")
-    (warning,) = mentions(replace(log, command=-log.command), tmp_path)
-    assert warning.level == "warning"
-    assert "against the command" in warning.what
-
-
 def spring_arm(command: np.ndarray, delay: int = 0, noise_deg: float = 0.05) -> Log:
     """8 q̈ + 231.8 q̇ + 53.4 q = 0.2 u: the article's shoulder without gravity, as a log of one joint."""
     q = np.zeros(len(command))

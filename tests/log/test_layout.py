@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from log_files import cells, faults, lines, read, save
 
-from hydroid.log import open_table
-
 ROWS = lines(cells())
 HEAD, DATA = ROWS[0], ROWS[1:]
 
@@ -76,15 +74,6 @@ def test_a_faulty_cell_below_a_preamble_has_its_place(
 
 def test_a_torn_row_below_the_names_is_a_fault(tmp_path: Path) -> None:
     assert faults(save(tmp_path / "log.csv", rows(below=[["broken", "off"]])))[0].line == 2
-
-
-@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "latin-1", "utf-8-sig"])
-def test_the_format_is_said(encoding: str, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_bytes("\n".join("\t".join([*row, "°"]) for row in ROWS).encode(encoding))
-    said = {"utf-8-sig": "UTF-8"}.get(encoding, encoding.upper())
-    assert open_table(path).layout == f"CSV in {said} separated by tabs"
-    assert [f.what for f in read(path)[1]] == [f"read as CSV in {said} separated by tabs"]
 
 
 @pytest.mark.parametrize("above", [[], ["# a rig, at night"]])

@@ -1,5 +1,7 @@
 """What a log says of a joint's motion, on motions whose answer is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,3 +38,16 @@ def test_a_dead_band_is_found(dead):
 
 def test_the_speed_is_that_of_fast_motion():
     assert 0.4 < JointMotion(log_of(), 1).speed < 0.5
+
+
+def test_half_a_second_of_slow_motion_makes_no_dead_band():
+    """Nothing is commanded between rest and 30 %, and the joint barely has time to start there."""
+    log = log_of()
+    command = np.zeros_like(log.command)
+    large = np.abs(log.command) > 45
+    command[large] = log.command[large]
+    command[2000:2029] = 32.0
+    speed = 0.005 * command
+    speed[2000:2029] = 0.095 * 0.5
+    angle = PERIOD * np.cumsum(speed, axis=0)
+    assert JointMotion(replace(log, command=command, angle=angle), 1).dead_band <= 5

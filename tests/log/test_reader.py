@@ -3,10 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import NAMES, RANGES, RIG, RIG_RANGES, cells, faults, lines, read, save
+from log_files import NAMES, RIG, RIG_RANGES, cells, faults, lines, read, save
 
 from hydroid.errors import LogError
-from hydroid.log import check_log, read_log
+from hydroid.log import read_log
 from hydroid.settings.log import LogSettings
 
 
@@ -24,30 +24,79 @@ def test_a_shipped_log_reads_fast_and_without_a_finding(name: str) -> None:
     assert log.measured.all()
 
 
-@pytest.mark.parametrize(
-    ("column", "text", "fine"),
-    [
-        (3, "-29.6", True),  # the range is -28.65 to 85.94 deg, and the margin 1 deg
-        (3, "-29.7", False),
-        (3, "86.9", True),
-        (3, "87", False),
-        (1, "100", True),
-        (1, "100.01", False),
-        (1, "-100.01", False),
-        (2, "1_0", False),
-        (2, "1e1", True),
-        (2, "#N/A", False),
-        (2, "٣", True),
-        (2, "3,", False),
-        (2, "3,4", False),
-    ],
-)
-def test_the_edge_of_what_a_cell_may_hold(column: int, text: str, fine: bool, tmp_path: Path) -> None:
-    rows = lines(cells())
-    rows[40][column] = text
-    errors = faults(save(tmp_path / "log.csv", rows))
-    torn = "," in text
-    assert [(e.line, e.column) for e in errors] == ([] if fine else [(41, "" if torn else NAMES[column])])
+def cell(row: int, column: int, text: str):
+    """A file with another text in one cell."""
+    return lambda rows: rows[row].__setitem__(column, text)
+
+
+def values(change):
+    """A file of other numbers."""
+    return lambda rows: rows.__setitem__(slice(None), lines(change(cells())))
+
+
+def clock(rows: list[list[str]]) -> None:
+    for k, row in enumerate(rows[1:]):
+        row[0] = f"12:00:00.{k:02d}" if k != 7 else "2024-02-31T12:00:00"
+
+
+FINE = ((3, "-29.6"), (3, "86.9"), (1, "100"), (2, "1e1"), (2, "٣"))
+"""the range is -28.65 to 85.94 deg, and the margin 1 deg"""
+FAULTS = {
+    "below the range": (cell(40, 3, "-29.7"), 41, "q1_deg", "angle of joint 1 is -29.7 deg, allowed are"),
+    "above the range": (cell(40, 3, "87"), 41, "q1_deg", "of q1_deg in log.angle, or the joint's range"),
+    "command above": (cell(40, 1, "100.01"), 41, "u1_pct", "allowed are -100 to 100 %"),
+    "command below": (cell(40, 1, "-100.01"), 41, "u1_pct", "command of joint 1 is -100.01 %"),
+    "digit groups": (cell(40, 2, "1_0"), 41, "u2_pct", "'1_0' is not a number"),
+    "text": (cell(40, 2, "#N/A"), 41, "u2_pct", "is not a number"),
+    "a cell more": (cell(40, 2, "3,4"), 41, "", "should have 5 cells"),
+    "a jump": (cell(40, 4, "1000"), 41, "q2_deg", "jumps by"),
+    "no date": (clock, 9, "time_s", "12:30:05.25"),
+    "no time column": (lambda rows: [row.pop(0) for row in rows], 1, "time_s", "the header lacks 'time_s'"),
+    "other names": (cell(0, 2, "U2_pct"), 1, "u2_pct", "did you mean 'U2_pct'?"),
+    "a name twice": (lambda rows: [row.append(row[3]) for row in rows], 1, "q1_deg", "2 columns of this"),
+    "a short gap": (values(lambda t: np.delete(t, np.s_[30:34], axis=0)), 32, "time_s", "--repair"),
+    "a long gap": (values(lambda t: np.delete(t, np.s_[30:60], axis=0)), 32, "time_s", "cut the log into"),
+    "a time twice": (values(lambda t: np.insert(t, 30, t[29], axis=0)), 32, "time_s", "does not increase"),
+    "backwards": (values(lambda t: t[::-1]), 3, "time_s", "does not increase"),
+    "short": (values(lambda t: t[:20]), None, "", "at least 0.5 s is needed"),
+    "empty": (values(lambda t: t[:0]), None, "", "0 samples"),
+    "ms": (values(lambda t: t * [1000, 1, 1, 1, 1]), None, "time_s", "log.time.unit"),
+    "ks": (values(lambda t: t * [0.001, 1, 1, 1, 1]), None, "", "log.time.unit"),
+}  # fmt: skip
+"""change of a file, and line, column and words of its only fault"""
+WARNINGS = {
+    "an uneven period": (cell(41, 0, "0.403"), {"jitter": "time_s", "resampled": ""}),
+    "nothing driven": (
+        values(lambda t: t * [1, 0, 0, 1, 1]), {"undriven": "", "command is constant": "u1_pct"},
+    ),
+    "a dead sensor": (values(lambda t: t * [1, 1, 1, 1, 0]), {"angle is constant": "q2_deg"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_a_fault_has_its_place_and_its_words(case: str, tmp_path: Path) -> None:
+    change, line, column, said = FAULTS[case]
+    (fault,) = faults(edited(tmp_path, change))
+    assert (fault.line, fault.column) == (line, column)
+    assert said in str(fault)
+
+
+@pytest.mark.parametrize("case", WARNINGS)
+def test_what_is_odd_is_warned_of(case: str, tmp_path: Path) -> None:
+    change, kinds = WARNINGS[case]
+    _, findings = read(edited(tmp_path, change), outputs=[1])
+    assert {f.kind: f.column for f in findings} == kinds
+
+
+@pytest.mark.parametrize(("column", "text"), FINE)
+def test_the_edge_of_what_a_cell_may_hold(column: int, text: str, tmp_path: Path) -> None:
+    assert faults(edited(tmp_path, cell(40, column, text))) == []
+
+
+def test_one_column_is_one_signal(tmp_path: Path) -> None:
+    copied = LogSettings.model_validate({"joints": {2: {"angle": {"column": "q1_deg"}}}})
+    (fault,) = faults(edited(tmp_path, lambda rows: None), copied)
+    assert "angle of joint 1 and angle of joint 2" in fault.what
 
 
 def edited(tmp_path: Path, edit, rows: int = 80) -> Path:
@@ -80,25 +129,6 @@ def test_a_fault_in_many_rows_is_one_finding_that_counts_them(tmp_path: Path) ->
     (fault,) = faults(edited(tmp_path, spoil))
     assert (fault.line, fault.column) == (6, "u1_pct")
     assert "75 more rows, to line 81" in fault.what
-
-
-@pytest.mark.parametrize(
-    ("change", "line", "said"),
-    [
-        (lambda t: np.delete(t, np.s_[30:34], axis=0), 32, "--repair"),
-        (lambda t: np.delete(t, np.s_[30:60], axis=0), 32, "cut the log into two"),
-        (lambda t: np.insert(t, 30, t[29], axis=0), 32, "does not increase"),
-        (lambda t: t[::-1], 3, "does not increase"),
-        (lambda t: t[:20], None, "at least 0.5 s is needed"),
-        (lambda t: t[:0], None, "0 samples"),
-        (lambda t: t * [1000, 1, 1, 1, 1], None, "log.time.unit"),
-        (lambda t: t * [0.001, 1, 1, 1, 1], None, "log.time.unit"),
-    ],
-)
-def test_faults_of_time(change, line: int | None, said: str, tmp_path: Path) -> None:
-    (fault,) = faults(save(tmp_path / "log.csv", lines(change(cells()))))
-    assert fault.line == line
-    assert said in str(fault)
 
 
 def test_time_in_milliseconds_and_from_any_start(tmp_path: Path) -> None:
@@ -138,26 +168,6 @@ def test_dates_and_times_of_day_count_from_the_first(stamp, tmp_path: Path) -> N
         np.testing.assert_array_equal(log.angle, plain.angle)
 
 
-def test_a_faulty_time_of_day_is_a_fault_of_its_cell(tmp_path: Path) -> None:
-    def clock(rows: list[list[str]]) -> None:
-        for k, row in enumerate(rows[1:]):
-            row[0] = f"12:00:00.{k:02d}" if k != 7 else "2024-02-31T12:00:00"
-
-    (fault,) = faults(edited(tmp_path, clock))
-    assert (fault.line, fault.column) == (9, "time_s")
-    assert "12:30:05.25" in fault.hint
-
-
-def test_a_missing_column_names_what_there_is_and_the_nearest(tmp_path: Path) -> None:
-    def rename(rows: list[list[str]]) -> None:
-        rows[0][2], rows[0][3] = "U2_pct", "shoulder"
-
-    (fault,) = faults(edited(tmp_path, rename))
-    assert "'u2_pct' (command of joint 2, did you mean 'U2_pct'?)" in fault.what
-    assert "'q1_deg' (angle of joint 1)" in fault.what
-    assert "the columns are: time_s, u1_pct, U2_pct, shoulder and q2_deg" in fault.hint
-
-
 def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: Path) -> None:
     path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 4)) for row in rows])
     assert len(faults(path)) == 1
@@ -175,16 +185,6 @@ def test_commands_alone_are_enough_where_angles_are_not_required(tmp_path: Path)
     log, _ = read(path, angles_required=False)
     assert not log.measured.any()
     assert log.driven.all()
-
-
-def test_ambiguous_columns_are_refused(tmp_path: Path) -> None:
-    def twice(rows: list[list[str]]) -> None:
-        rows[0][2] = "u1_pct"
-
-    assert "2 columns of this name" in " ".join(f.what for f in faults(edited(tmp_path, twice)))
-    copied = LogSettings.model_validate({"joints": {2: {"angle": {"column": "q1_deg"}}}})
-    (fault,) = faults(edited(tmp_path, lambda rows: None), copied)
-    assert "angle of joint 1 and angle of joint 2" in fault.what
 
 
 def test_columns_that_are_not_mapped_may_hold_anything(tmp_path: Path) -> None:
@@ -217,31 +217,6 @@ def test_two_columns_scale_and_offset_make_one_command(tmp_path: Path) -> None:
     (fault,) = faults(save(tmp_path / "log.csv", table), LogSettings.model_validate({"joints": mapping}))
     assert (fault.line, fault.column) == (41, "u2_pct")
     assert "allowed are 0 to 100 %" in fault.what
-
-
-def test_without_a_time_column_only_that_is_said(tmp_path: Path) -> None:
-    (fault,) = faults(edited(tmp_path, lambda rows: [row.__delitem__(0) for row in rows]))
-    assert (fault.line, fault.column) == (1, "time_s")
-
-
-def test_an_uneven_sample_period_is_warned_of(tmp_path: Path) -> None:
-    values = cells()
-    values[40, 0] += 0.003
-    _, findings = read(save(tmp_path / "log.csv", lines(values)))
-    assert [(f.level, f.line, f.column) for f in findings] == [("warning", 42, "time_s"), ("note", None, "")]
-
-
-def test_a_log_that_drives_nothing_is_warned_of(tmp_path: Path) -> None:
-    _, findings = read(save(tmp_path / "log.csv", lines(cells() * [1, 0, 0, 1, 1])))
-    assert [(f.level, f.what) for f in findings] == [("warning", "no joint is driven")]
-
-
-def test_constant_channels_are_warned_of(tmp_path: Path) -> None:
-    values = cells()
-    values[:, 1], values[:, 4] = 40, 7
-    log, findings = check_log(save(tmp_path / "log.csv", lines(values)), LogSettings(), RANGES, outputs=[1])
-    assert log is not None
-    assert {(f.level, f.column) for f in findings} == {("warning", "u1_pct"), ("warning", "q2_deg")}
 
 
 def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:

@@ -6,8 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_files import cells, faults, lines, read, save
 
-from hydroid.log.repair import hold
-
 holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
 
@@ -87,15 +85,3 @@ def test_wrapped_angles_of_a_continuous_joint_are_joined(tmp_path: Path) -> None
     log, findings = read(save(tmp_path / "wrapped.csv", lines(values)))
     np.testing.assert_allclose(log.angle, true.angle, atol=1e-9)
     assert [(f.level, f.column) for f in findings] == [("note", "q2_deg")]
-
-
-def test_a_jump_that_is_no_turn_is_an_error(tmp_path: Path) -> None:
-    table = lines(cells())
-    table[40][4] = "1000"
-    (fault,) = faults(save(tmp_path / "log.csv", table))
-    assert (fault.line, fault.column) == (41, "q2_deg")
-
-
-def test_hold_before_the_first_sample_is_no_command() -> None:
-    held = hold(np.array([0.0, 0.1]), np.array([[5.0], [7.0]]), np.array([-0.01, 0.0, 0.05, 0.1, 9.0]), 0.01)
-    assert held[:, 0].tolist() == [0, 5, 5, 7, 7]

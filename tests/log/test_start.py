@@ -37,10 +37,3 @@ def test_a_log_without_commands_rests_two_seconds_at_most():
     sinking = log.angle.copy()
     sinking[300:, 1] -= 0.1
     assert replace(log, angle=sinking).start == pytest.approx(POSE, abs=1e-15)
-
-
-def test_what_is_not_measured_stays_so():
-    log = step_log(POSE, [0.0, 50.0])
-    angle = log.angle.copy()
-    angle[:, 3] = np.nan
-    assert np.isnan(replace(log, angle=angle).start[3])

@@ -26,12 +26,6 @@ def warned(tmp_path: Path, name: str, command: float = 1.0, angle: float = 1.0, 
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_fractions_and_radians_are_suspected(tmp_path: Path, name: str) -> None:
-    assert "set log.command.scale: 100" in warned(tmp_path, name, command=0.01)
-    assert "set log.angle.unit: rad" in warned(tmp_path, name, angle=np.pi / 180)
-
-
-@pytest.mark.parametrize("name", LOGS)
 def test_plain_logs_raise_no_suspicion(tmp_path: Path, name: str) -> None:
     for how in ({}, {"command": 0.1}, {"angle": 0.3}, {"command": 0.01, "angle": 0.01}):
         said = warned(tmp_path, name, **how)

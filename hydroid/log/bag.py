@@ -46,7 +46,8 @@ class BagTable(Table):
         if end - start < self.period * 1e9:
             hint = "record them together, with one clock"
             raise LogError("the channels have no common time", where=self.source, hint=hint)
-        grid = np.arange(int((end - start) / (1e9 * self.period) + 1e-6) + 1) * self.period
+        rows = int((end - start) / (1e9 * self.period) + 1e-6) + 1
+        grid = np.arange(rows, dtype=np.float64) * self.period
         series = {time: grid}
         for name, times in at.items():
             values = np.array([samples[name][key] for key in times.tolist()])

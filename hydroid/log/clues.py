@@ -126,8 +126,11 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
-    kinds = (kind for word in reversed(there) for known, kind in WORDS.items() if word in known.split())
-    return next(kinds, "")
+    for word in reversed(there):
+        for known, kind in WORDS.items():
+            if word in known.split():
+                return kind
+    return ""
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:

@@ -92,9 +92,9 @@ def _columns(table: Table) -> list[_Column]:
     kinds = {name: kind_of(name, units[name]) for name in names}
     read, clocks = dict[str, Floats](), set[str]()
     for group in (names, [name for name in names if kinds[name] != "other"], *([name] for name in names)):
-        held = {name: "command" if kinds[name] == "command" else "angle" for name in group}
         try:
-            recording = table.read([Signal(name, kind) for name, kind in held.items()])
+            held = [Signal(name, "command" if kinds[name] == "command" else "angle") for name in group]
+            recording = table.read(held)
         except LogError:
             continue  # text, or different lengths or clocks
         read |= dict(zip(group, recording.values.T, strict=True))
@@ -107,13 +107,15 @@ def _columns(table: Table) -> list[_Column]:
     for name, values in read.items():
         there = values[np.isfinite(values)]
         if len(values) == usual and len(there):
-            unit, kind = units[name], kinds[name]
+            unit = units[name]
             why = "by its unit" if unit else "by its name"
-            if kind == "" and np.ptp(there) > 0:
+            if kinds[name] == "" and np.ptp(there) > 0:
                 steps = np.abs(np.diff(there))
                 jumps = steps.max() > 0.2 * np.ptp(there) or (steps == 0).mean() > 0.5
-                kind, why = "command" if jumps else "angle", "by how its numbers change"
-            columns.append(_Column(name, kind, unit.name if unit else "", values, why, name in clocks))
+                kinds[name] = "command" if jumps else "angle"
+                why = "by how its numbers change"
+            unit_name = unit.name if unit else ""
+            columns.append(_Column(name, kinds[name], unit_name, values, why, name in clocks))
     return columns
 
 

@@ -151,7 +151,8 @@ class JointMotion:
         kernel /= kernel.sum()
         steps = -at / width**2 * kernel
         pairs = ((self._logged, kernel), (angle, kernel), (angle, steps))
-        command, angle, step = (np.convolve(np.pad(x, reach, "symmetric"), k, "valid") for x, k in pairs)
+        padded = [(np.pad(x, reach, "symmetric"), kernel) for x, kernel in pairs]
+        command, angle, step = (np.convolve(*pair, "valid").astype(np.float64) for pair in padded)
         return command, angle, step / self.log.period
 
     @cached_property
@@ -176,7 +177,7 @@ class JointMotion:
         command's effect. A log that is too short, or in which nothing changes, leaves all of it.
         """
         first, last = (round(lag / self.log.period) for lag in LAGS)
-        lag = np.arange(first, last + 1) * self.log.period
+        lag: Floats = np.arange(first, last + 1, dtype=np.float64) * self.log.period
         (command, angle, speed), used = self._quick, slice(last, len(self._logged) + first)
         counts = ~self._at_stop[used]
         if (
@@ -192,7 +193,7 @@ class JointMotion:
         own = power - sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
         product, total = np.correlate(command, wanted, "valid"), wanted @ wanted
         enough = (own > 1e-9 * power) & (total > 0)
-        explained = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
+        explained: Floats = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
         return lag, (1 - explained)[::-1], np.sign(product)[::-1]
 
 

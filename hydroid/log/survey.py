@@ -1,6 +1,6 @@
 """What the motion in logs says: of the settings, of the log, and of all logs together."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -23,27 +23,30 @@ def contradictions(
     motions = driven_joints(log)
 
     def about(
-        kind: str, quantity: Kind, *joints: int, level: Level = "warning", **numbers: float | str
+        kind: str,
+        quantity: Kind,
+        joints: Sequence[int],
+        numbers: Mapping[str, float | str] = {},
+        level: Level = "warning",
     ) -> LogFinding:
         columns = settings.columns(quantity, joints[0])
-        return found(
-            level, kind, log.source, joints, ("line", None, columns.column[0] if columns else ""), **numbers
-        )
+        place = ("line", None, columns.column[0] if columns else "")
+        return found(level, kind, log.source, joints, place, **numbers)
 
     def constant() -> Iterator[LogFinding]:
         for joint in range(1, log.joints + 1):
             command, angle, compared = log.command[:, joint - 1], log.angle[:, joint - 1], joint in outputs
             if (compared or command.any()) and np.ptp(angle) == 0:
-                yield about("angle is constant", "angle", joint)
+                yield about("angle is constant", "angle", [joint])
             if compared and settings.columns("command", joint) and np.ptp(command) == 0:
-                yield about("command is constant", "command", joint)
+                yield about("command is constant", "command", [joint])
 
     def raised() -> Iterator[LogFinding]:
         """Commands that rest in the middle of a range."""
         for joint in range(1, log.joints + 1):
             columns, likely = settings.columns("command", joint), likely_range(log.command[:, joint - 1])
             if columns and len(columns.column) == 1 and likely and likely.offset:
-                yield about("raised range", "command", joint, **likely.remedy(columns.scale, columns.offset))
+                yield about("raised range", "command", [joint], likely.remedy(columns.scale, columns.offset))
 
     def small() -> Iterator[LogFinding]:
         """Commands in a small range, though the joints move well; else they may be small commands in %."""
@@ -52,14 +55,14 @@ def contradictions(
         if columns and likely and likely.name in ("±1", "±10 V") and motions[joint].travel > 3:
             numbers = {"largest": 100 / likely.scale, "travel": motions[joint].travel}
             remedy = likely.remedy(columns.scale, columns.offset)
-            yield about("small range", "command", joint, **numbers, **remedy)
+            yield about("small range", "command", [joint], {**numbers, **remedy})
 
     def radians() -> Iterator[LogFinding]:
         """Angles that are too small for the commands, 1.5 deg/s at full command, and all below pi."""
         judged = {joint: motion for joint, motion in motions.items() if motion.push > LEAST}
         sluggish = all(0 < motion.path < 0.015 * motion.push for motion in judged.values())
         if judged and sluggish and np.nanmax(np.abs(log.angle)) <= np.deg2rad(3.2):
-            yield about("sluggish", "angle", next(iter(judged)), most=3.2)
+            yield about("sluggish", "angle", [*judged][:1], {"most": 3.2})
 
     findings = [*constant()]
     units = [*raised()] or [*small()] if motions and "unit of command" not in said else []
@@ -67,15 +70,16 @@ def contradictions(
     lags = {
         joint: motion.lag for joint, motion in motions.items() if motion.lag is not None and motion.shifted
     }
-    for kind, level, sign in (("early", "note", 1), ("late", "warning", -1)):
+    signs: tuple[tuple[str, Level, int], ...] = (("early", "note", 1), ("late", "warning", -1))
+    for kind, level, sign in signs:
         if joints := [joint for joint, lag in lags.items() if sign * lag > 0]:
             lag = float(np.median([lags[joint] for joint in joints]))
             numbers = {"lag": abs(lag), "delay": settings.delay_s + lag}
-            findings.append(about(kind, "command", *joints, level=level, **numbers))
+            findings.append(about(kind, "command", joints, numbers, level))
     for joint, motion in motions.items():
         if motion.turned:
             path, against = motion.directed
-            findings.append(about("turned", "command", joint, path=path, against=against))
+            findings.append(about("turned", "command", [joint], {"path": path, "against": against}))
     return together(findings)
 
 
@@ -101,8 +105,8 @@ def survey(logs: Sequence[Log]) -> list[LogFinding]:
         turned, straight = [m for m in own if m.turned], [m for m in own if m.straight]
         if turned and straight:
             odd, every = min(turned, straight, key=len)[0].log.source, len(turned + straight)
-            numbers = {"turned": str(len(turned)), "logs": str(every)}
-            findings.append(found("warning", "directions differ", odd, [joint], **numbers))
+            some, logs_ = str(len(turned)), str(every)
+            findings.append(found("warning", "directions differ", odd, [joint], turned=some, logs=logs_))
         held = _held([motion.log for motion in own], joint)
         open_ = [f"between {a:.0f} and {b:.0f}" for a, b in pairwise(held) if b - a >= 20 and a * b > 0]
         open_ += [f"above {high:.0f}" for high in held[-1:] if 0 < high < 80]

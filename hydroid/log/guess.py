@@ -89,7 +89,7 @@ def _columns(table: Table) -> list[_Column]:
     """Read every column of numbers, those of the usual length."""
     names = list(dict.fromkeys(name for name in table.names if name))
     units = {name: column_unit(name, table.units.get(name, "")) for name in names}
-    kinds = {name: kind_of(name, units[name]) for name in names}
+    kinds: dict[str, Kind] = {name: kind_of(name, units[name]) for name in names}
     read, clocks = dict[str, Floats](), set[str]()
     for group in (names, [name for name in names if kinds[name] != "other"], *([name] for name in names)):
         try:

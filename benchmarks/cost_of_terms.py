@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class Worker:
 
     def __init__(self, tree: Path) -> None:
         command, pipe = [sys.executable, "-c", WORKER, str(list(CASES.values()))], subprocess.PIPE
-        where = {"cwd": tree, "env": {"PYTHONPATH": str(tree)}}
+        where: dict[str, Any] = {"cwd": tree, "env": {"PYTHONPATH": str(tree)}}
         self.process = subprocess.Popen(command, **where, stdin=pipe, stdout=pipe, text=True)
 
     def seconds(self, case: int) -> float:

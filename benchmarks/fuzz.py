@@ -14,6 +14,7 @@ import traceback
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from common import options
 
@@ -45,7 +46,12 @@ def batch(job: tuple[str, int, int]) -> tuple[str, int, str]:
     """Read some files in another process; return their kind, whether it failed, and what it printed."""
     name, first, count = job
     command = [sys.executable, str(HERE), "--batch", name, "--first", str(first), "--inputs", str(count)]
-    how = {"capture_output": True, "text": True, "errors": "replace", "timeout": SECONDS_PER_BATCH}
+    how: dict[str, Any] = {
+        "capture_output": True,
+        "text": True,
+        "errors": "replace",
+        "timeout": SECONDS_PER_BATCH,
+    }
     try:
         done = subprocess.run(command, **how)
     except subprocess.TimeoutExpired:

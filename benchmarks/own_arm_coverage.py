@@ -9,6 +9,7 @@ intervals, not of the search. "predicted / spread" is the mean standard deviatio
 square error. The machine's delays are 0, where the bound is: they have no interval.
 """
 
+import importlib
 import sys
 import tempfile
 from pathlib import Path
@@ -26,9 +27,7 @@ from hydroid.settings.fit import FitSettings
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "urdf"
 sys.path.insert(0, str(EXAMPLE))
-import make_example  # noqa: E402
-
-example: Any = make_example
+example: Any = importlib.import_module("make_example")
 
 
 def machine(folder: Path) -> IdentifiedModel:

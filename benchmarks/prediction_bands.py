@@ -31,7 +31,7 @@ STIFFER = {"exact": 1.0, "S 5 % wrong": 1.05, "S 20 % wrong": 1.2, "S 50 % wrong
 
 def steps(settings: FitSettings, values: dict[str, float], rng: np.random.Generator) -> Log:
     """Random steps of the shoulder with white noise of 0.1 deg, at the start too."""
-    pose, time = settings.arm.pose("study"), np.arange(500) * 0.01
+    pose, time = settings.arm.pose("study"), np.arange(500, dtype=np.float64) * 0.01
     command = np.zeros((500, len(pose)))
     command[:, 1] = np.repeat(rng.uniform(-60.0, 60.0, 5), 100)
     drive = Log("steps.csv", time, command, np.tile(pose, (500, 1)), 0.01)

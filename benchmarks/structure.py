@@ -18,6 +18,7 @@ import sys
 import tokenize
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -115,7 +116,13 @@ print(sum(line[:2] == "  " and line[2:3].islower() and "  " in line.strip() for 
 def counted(checkout: Path, program: str) -> int:
     """Return the number that a program prints about a checkout."""
     environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
-    how = {"cwd": checkout, "env": environment, "capture_output": True, "text": True, "check": True}
+    how: dict[str, Any] = {
+        "cwd": checkout,
+        "env": environment,
+        "capture_output": True,
+        "text": True,
+        "check": True,
+    }
     return int(subprocess.run([sys.executable, "-c", program], **how).stdout)
 
 

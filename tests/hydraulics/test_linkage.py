@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hydraulic_reference import changed, simulate, wheel
-from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.hydraulics.records import Records, linkages, nominal_joints
 from hydroid.settings.arm import Arm
@@ -98,15 +97,3 @@ def test_a_bucket_turns_by_flow_over_area_and_moment_arm(arm: Arm):
 def test_a_linkage_that_does_not_reach_is_refused(arm: Arm):
     with pytest.raises(ValueError, match="four-bar linkage does not reach all of its range"):
         bucket(arm, coupler=0.05)
-
-
-def test_pivots_are_recovered():
-    """With known areas the speed at each angle tells the moment arm."""
-    truth = {"b": 0.075, "theta0": 78.0}
-    parameters = {
-        "b": {"quantity": "pivot_distance_2", "joints": [2], "bounds": [0.05, 0.12]},
-        "theta0": {"quantity": "pivot_angle", "joints": [2], "bounds": [45.0, 85.0]},
-    }
-    settings = settings_of(parameters)
-    log = duties(settings.arm.pose("study"), {2: [60, 60, -70, -70, 40, -50, -90, 80]})
-    assert_recovered(recover(settings, [log], truth, {"b": 0.08, "theta0": 70.0}), settings, truth)

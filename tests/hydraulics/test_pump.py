@@ -1,10 +1,9 @@
-"""One pump for all actuators: limits, power, how it comes up, a stiff reference, recovery."""
+"""One pump for all actuators: limits, power, how it comes up, a stiff reference."""
 
 import numpy as np
 import pytest
 from hydraulic_arm import DrivenArm, nominal
 from hydraulic_reference import changed, parameters, pulses, reference, simulate
-from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -130,19 +129,3 @@ def test_random_pumps_and_valves_stay_stable(arm: Arm):
 def test_a_pump_belongs_to_all_joints():
     with pytest.raises(ValueError, match="all joints share the pump"):
         ParameterSettings(quantity="pump_flow", joints=(2,), bounds=(1.0, 2.0))
-
-
-def test_a_shared_pump_that_comes_up_is_recovered():
-    """Two joints and one log of duties: flow, standby part, delay and rise of the pump."""
-    truth = {"flow": 1.6, "idle": 0.5, "after": 0.4, "rise": 0.2}
-    rows = {
-        "flow": ("pump_flow", 0.2, 10.0), "idle": ("pump_idle", 0.05, 1.0),
-        "after": ("pump_delay", 0.0, 2.0), "rise": ("pump_rise", 0.01, 2.0),
-    }  # fmt: skip
-    settings = settings_of({name: {"quantity": q, "bounds": [a, b]} for name, (q, a, b) in rows.items()})
-    settings = settings.model_copy(update={"outputs": (2, 3)})
-    log = duties(
-        settings.arm.pose("study"), {2: [80, -60, 0, 50, -90, 0, 70], 3: [-70, 90, 0, 0, -80, 0, 60]}
-    )
-    start = {"flow": 2.5, "idle": 0.8, "after": 0.3, "rise": 0.1}
-    assert_recovered(recover(settings, [log], truth, start), settings, truth)

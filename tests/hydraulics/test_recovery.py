@@ -1,58 +1,106 @@
-"""Terms that no other test recovers: each is estimated from a simulated log of one joint."""
+"""Every term is estimated from simulated logs: the truth lies within the interval."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 from recovery import assert_recovered, duties, recover, settings_of
 
+DUTIES = [60, -40, 90, -80, 40, 0, -30, 70, -60, 30]
+ROTARY = 4
+"""the roll: a rotary actuator turns it"""
+STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
+"""the shoulder at the lower end of its range"""
+
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
 
 class Case(NamedTuple):
-    """Rows of (quantity, lowest, highest, truth, start), what else the chain has, and the commands [%]."""
+    """Quantities with (lowest, highest, truth, start), what else the chain has, and commands [%] by joint."""
 
-    rows: tuple[tuple[str, float, float, float, float], ...]
-    hydraulics: dict[str, float]
-    commands: tuple[float, ...]
+    rows: dict[str, tuple[float, float, float, float]]
+    hydraulics: Mapping[str, float] = NOTHING
+    commands: tuple[dict[int, list[float]], ...] = ({2: DUTIES},)
     dwell: float = 1.0
-    joint: int = 2
+    pose: np.ndarray | None = None
 
 
 # The flow limit starts where it is felt: above the largest flow of the log it has no effect. The
 # effect of the start pressure fades with the first movement, and a log of several has a second optimum.
-DUTIES = (60, -40, 90, -80, 40, 0, -30, 70, -60, 30)
-ROTARY = 4
-"""the roll: a rotary actuator turns it"""
 CASES = {
-    "droop": Case((("pump_droop", 1, 150, 60, 20),), {"pump_flow": 3.0}, DUTIES),
-    "width of the slots": Case(
-        (("slot_width_a", 0.5, 5, 2.4, 1.5), ("slot_width_b", 0.5, 5, 1.6, 2.2)), {}, DUTIES
-    ),
+    "droop": Case({"pump_droop": (1, 150, 60, 20)}, {"pump_flow": 3.0}),
+    "width of the slots": Case({"slot_width_a": (0.5, 5, 2.4, 1.5), "slot_width_b": (0.5, 5, 1.6, 2.2)}),
     "volume of the line": Case(
-        (("line_volume", 20, 3000, 600, 200),), {"pump_flow": 1.5}, (80, 0, -80, 0) * 5, 0.25
+        {"line_volume": (20, 3000, 600, 200)}, {"pump_flow": 1.5}, ({2: [80, 0, -80, 0] * 5},), 0.25
     ),
-    "anti-cavitation": Case(
-        (("anticavitation", 0.005, 5, 0.05, 0.2),), {"return_a": 5.0, "return_b": 5.0}, DUTIES
+    "anti-cavitation": Case({"anticavitation": (0.005, 5, 0.05, 0.2)}, {"return_a": 5.0, "return_b": 5.0}),
+    "start pressure": Case({"start_pressure": (10, 120, 35, 60)}, {"dead_volume": 300.0}, ({2: [100]},), 0.5),
+    "first pivot": Case({"pivot_distance_1": (0.2, 0.4, 0.3, 0.26)}),
+    "dead volume": Case({"dead_volume": (5, 500, 120, 40)}),
+    "friction": Case({"dry_friction": (10, 3000, 400, 1000)}),
+    "overlap": Case({"overlap_a": (0.01, 1, 0.3, 0.1), "overlap_b": (0.01, 1, 0.15, 0.3)}),
+    "friction of a rotary actuator": Case({"dry_friction": (0.5, 100, 15, 30)}, NOTHING, ({ROTARY: DUTIES},)),
+    "leakage": Case({"leakage": (1e-4, 1, 0.02, 0.005)}),
+    "flow limit": Case({"flow_limit": (0.1, 20, 0.5, 0.8)}),
+    "the edges of a valve": Case(
+        {
+            "opening_a": (0.05, 1, 0.3, 0.4), "opening_b": (0.05, 1, 0.35, 0.4),
+            "return_a": (0.2, 5, 2.2, 1), "return_b": (0.2, 5, 0.7, 1),
+        },
+        {"anticavitation": 3.0},
     ),
-    "start pressure": Case((("start_pressure", 10, 120, 35, 60),), {"dead_volume": 300.0}, (100,), 0.5),
-    "first pivot": Case((("pivot_distance_1", 0.2, 0.4, 0.3, 0.26),), {}, DUTIES),
-    "dead volume": Case((("dead_volume", 5, 500, 120, 40),), {}, DUTIES),
-    "friction": Case((("dry_friction", 10, 3000, 400, 1000),), {}, DUTIES),
-    "overlap": Case((("overlap_a", 0.01, 1, 0.3, 0.1), ("overlap_b", 0.01, 1, 0.15, 0.3)), {}, DUTIES),
-    "friction of a rotary actuator": Case((("dry_friction", 0.5, 100, 15, 30),), {}, DUTIES, joint=ROTARY),
-    "leakage": Case((("leakage", 1e-4, 1, 0.02, 0.005),), {}, DUTIES),
-    "flow limit": Case((("flow_limit", 0.1, 20, 0.5, 0.8),), {}, DUTIES),
+    "pivots": Case(  # with known areas the speed at each angle tells the moment arm
+        {"pivot_distance_2": (0.05, 0.12, 0.075, 0.08), "pivot_angle": (45, 85, 78, 70)},
+        NOTHING, ({2: [60, 60, -70, -70, 40, -50, -90, 80]},),
+    ),
+    "a shared pump that comes up": Case(
+        {
+            "pump_flow": (0.2, 10, 1.6, 2.5), "pump_idle": (0.05, 1, 0.5, 0.8),
+            "pump_delay": (0, 2, 0.4, 0.3), "pump_rise": (0.01, 2, 0.2, 0.1),
+        },
+        NOTHING, ({2: [80, -60, 0, 50, -90, 0, 70], 3: [-70, 90, 0, 0, -80, 0, 60]},),
+    ),
+    "a valve that differs by side": Case(
+        {
+            "delay_a": (0, 0.5, 0.15, 0.1), "delay_b": (0, 0.5, 0.06, 0.1),
+            "plunger_damping_a": (5, 500, 160, 100), "plunger_damping_b": (5, 500, 60, 100),
+            "opening_exponent_a": (0.7, 3, 1.8, 1.5), "opening_exponent_b": (0.7, 3, 1.2, 1.5),
+            "dead_band_a": (0, 40, 20, 12), "dead_band_b": (0, 40, 8, 12),
+        },
+        NOTHING, ({2: [50, -40, 80, -90, 60, 0, -60, 40, -30, 90, -70, 30]},), 0.8,
+    ),
+    "notches and a slow return": Case(
+        {f"notch_{k}_a": (0.2, 5, true, 1) for k, true in enumerate((0.5, 2.0, 0.6, 1.5), start=1)}
+        | {"plunger_damping_a": (5, 500, 100, 60), "plunger_back_a": (0.2, 5, 2.5, 1)},
+        NOTHING, ({2: [15, -60, 25, 0, 40, -70, 60, 0, 20, -50, 90, -90, 30, 10]},), 0.8,
+    ),
+    "trapped pressure": Case(
+        {"trapped_pressure": (0, 100, 25, 10), "dead_volume": (5, 300, 60, 40)},
+        NOTHING, ({2: [25]}, {2: [50]}, {2: [100]}), pose=STOPPED,
+    ),
+    "a sensor's scale and lag": Case(
+        {"sensor_scale": (0.8, 1.2, 1.04, 1), "sensor_lag": (0, 0.5, 0.08, 0.03)},
+        NOTHING, ({2: [60, -40, 80, -70, 30]},),
+    ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_term_is_recovered(name):
     case = CASES[name]
-    shared = ("pump_droop", "line_volume")
-    parameters = {
-        q: {"quantity": q, "bounds": [low, high]} | ({} if q in shared else {"joints": [case.joint]})
-        for q, low, high, _, _ in case.rows
-    }
-    settings = settings_of(parameters, **case.hydraulics).model_copy(update={"outputs": (case.joint,)})
-    truth = {q: value for q, _, _, value, _ in case.rows}
-    start = {q: value for q, *_, value in case.rows}
-    log = duties(settings.arm.pose("study"), {case.joint: case.commands}, case.dwell)
-    assert_recovered(recover(settings, [log], truth, start), settings, truth)
+    joints = tuple(case.commands[0])
+    settings = settings_of(
+        {
+            q: {"quantity": q, "bounds": [low, high]}
+            | ({} if q.startswith("pump_") or q == "line_volume" else {"joints": list(joints)})
+            for q, (low, high, _, _) in case.rows.items()
+        },
+        **case.hydraulics,
+    ).model_copy(update={"outputs": joints})
+    pose = settings.arm.pose("study") if case.pose is None else case.pose
+    logs = [duties(pose, levels, case.dwell) for levels in case.commands]
+    truth, start = ({q: row[k] for q, row in case.rows.items()} for k in (2, 3))
+    assert_recovered(recover(settings, logs, truth, start), settings, truth)

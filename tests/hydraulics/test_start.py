@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hydraulic_reference import CYLINDER, START, A, B, parameters, simulate
-from recovery import assert_recovered, duties, recover, settings_of
+from recovery import duties, settings_of
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.cylinder import triangle
@@ -93,15 +93,3 @@ def test_a_joint_away_from_its_stops_is_held_by_its_oil():
     simulation = make_simulation(load_model(settings.arm), log, [1], settings)
     angle = simulation.simulate(bindings.candidates(np.array([[231.8, 53.4, p] for p in (0.0, 40.0)]))).angle
     np.testing.assert_array_equal(angle[0], angle[1])
-
-
-def test_trapped_pressure_is_recovered():
-    truth = {"trapped": 25.0, "volume": 60.0}
-    parameters = {
-        "trapped": {"quantity": "trapped_pressure", "joints": [2], "bounds": [0.0, 100.0]},
-        "volume": {"quantity": "dead_volume", "joints": [2], "bounds": [5.0, 300.0]},
-    }
-    settings = settings_of(parameters)
-    logs = [duties(STOPPED, {2: [u]}) for u in (25, 50, 100)]
-    start = {"trapped": 10.0, "volume": 40.0}
-    assert_recovered(recover(settings, logs, truth, start), settings, truth)

@@ -22,11 +22,10 @@ def with_failures(points):
 
 @pytest.mark.parametrize("coding", ["binary", "integer"])
 @pytest.mark.parametrize("cross", ["pointwise", "uniform"])
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_finds_the_bottom_of_a_sphere(coding, cross, seed):
+def test_finds_the_bottom_of_a_sphere(coding, cross):
     ga = SimpleGa(GeneticSettings(coding=coding, crossover=cross), 9)
-    population = advance(ga, sphere, None, np.random.default_rng(seed), 200)
-    random = sphere(np.random.default_rng(seed).random((201 * 70, 9))).min()
+    population = advance(ga, sphere, None, np.random.default_rng(0), 200)
+    random = sphere(np.random.default_rng(0).random((201 * 70, 9))).min()
     assert population.objectives.min() < random / 5  # random search with the same number of evaluations
 
 

@@ -1,8 +1,6 @@
-"""What a sensor reads: its scale and lag against closed forms, and recovered from a log."""
+"""What a sensor reads: its scale and lag against closed forms."""
 
 import numpy as np
-import pytest
-from recovery import assert_recovered, duties, recover, settings_of
 
 from hydroid.simulation.sensor import reading
 
@@ -32,16 +30,3 @@ def test_a_scale_acts_on_the_turn_since_the_start():
 def test_lags_far_below_the_period_vanish():
     angle = np.sin(TIME)[:, None]
     assert abs(reading(angle, sensors(1.0, 1e-6), 0.01) - angle).max() < 1e-5
-
-
-def test_scale_and_lag_are_recovered():
-    truth = {"scale": 1.04, "lag": 0.08}
-    parameters = {
-        "scale": {"quantity": "sensor_scale", "joints": [2], "bounds": [0.8, 1.2]},
-        "lag": {"quantity": "sensor_lag", "joints": [2], "bounds": [0.0, 0.5]},
-    }
-    settings = settings_of(parameters)
-    log = duties(settings.arm.pose("study"), {2: [60, -40, 80, -70, 30]})
-    found = recover(settings, [log], truth, {"scale": 1.0, "lag": 0.03})
-    assert_recovered(found, settings, truth)
-    assert found.standard_deviation[2:] == pytest.approx(0, abs=0.01)

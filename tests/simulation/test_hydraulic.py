@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,18 +38,6 @@ def steps(arm):
     return step_log(arm.pose("study"), [60.0, -80.0, 0.0, 30.0, -40.0])
 
 
-@pytest.mark.parametrize("other", ["locked", "passive", "measured"])
-def test_threads_and_neighbours_change_no_bit(spec, arm, steps, other):
-    everyone = candidates(arm, 7)
-    together = simulation(spec, arm, steps, other_joints=other, threads=1).simulate(everyone).angle
-    assert np.ptp(together, axis=1).min() > np.deg2rad(1)
-    for settings in ({"threads": 2}, {"threads": 3}):
-        again = simulation(spec, arm, steps, other_joints=other, **settings).simulate(everyone).angle
-        np.testing.assert_array_equal(again, together)
-    alone = simulation(spec, arm, steps, other_joints=other).simulate(everyone[slice(3, 4)]).angle
-    np.testing.assert_array_equal(alone, together[3:4])
-
-
 def test_with_shut_valves_and_no_leakage_the_arm_stands_for_a_minute(spec, arm):
     log = step_log(arm.pose("study"), [0.0], dwell=60.0)
     everyone = candidates(arm, 3, leakage=0.0)
@@ -76,45 +63,6 @@ def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec,
     np.testing.assert_allclose(passive.angle, locked, atol=np.deg2rad(0.1))
 
 
-def test_only_products_that_the_chain_knows_matter(spec, arm, steps):
-    """F1, F2, x1, x2 act through two numbers, and the currents' scale trades with them: null directions."""
-    one = candidates(arm, 2)
-    a = one.joints
-    ratio = np.sqrt(a.force_1 / a.force_2)
-    gap = (a.stroke_2 - ratio * a.stroke_1) / (ratio - 1)
-    coil = a.force_1 * (a.stroke_1 + gap) ** 2
-    x1, x2 = a.stroke_1 * 1.5, a.stroke_2 * 0.6
-    along = {
-        "stroke_1": x1,
-        "stroke_2": x2,
-        "current_max": a.current_max / 2,
-        "current_min": a.current_min / 2,
-    }
-    along |= {"force_1": 4 * coil / (x1 + gap) ** 2, "force_2": 4 * coil / (x2 + gap) ** 2}
-    run = simulation(spec, arm, steps).simulate
-    np.testing.assert_allclose(run(replaced(one, **along)).angle, run(one).angle, atol=1e-9)
-
-
-def test_a_set_without_a_force_curve_is_infeasible_and_harms_nobody(
-    spec, arm, steps, capfd, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    everyone = candidates(arm, 3)
-    run = simulation(spec, arm, steps).simulate
-    healthy = run(everyone).angle
-    capfd.readouterr()
-    force = everyone.joints.force_2.copy()
-    force[1] = 100.0  # the force would grow with the stroke
-    response = run(replaced(everyone, force_2=force))
-    np.testing.assert_array_equal(response.feasible, [True, False, True])
-    np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
-    assert np.isnan(response.angle[1]).all()
-    assert capfd.readouterr() == ("", "")
-    assert not Path("MUJOCO_LOG.TXT").exists()
-    nobody = run(replaced(everyone, force_2=100.0))
-    assert not nobody.feasible.any()
-
-
 def test_the_trace_explains_the_motion(spec, arm, steps):
     """Oil into chamber A over its area is the rod's way; no pressure is below vapour."""
     one = candidates(arm, 1, leakage=0.0, bulk_modulus=8e5)
@@ -129,22 +77,6 @@ def test_the_trace_explains_the_motion(spec, arm, steps):
     oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.joints.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
-
-
-def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, steps, capfd, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    everyone = candidates(arm, 3)
-    run = simulation(spec, arm, steps, other_joints="passive", threads=1)
-    healthy = run.simulate(everyone).angle
-    stiffness = everyone.joints.stiffness.copy()
-    stiffness[1, 4] = 1e9  # MuJoCo's spring is explicit in the angle: at 0.01 s it blows up
-    capfd.readouterr()
-    response = run.simulate(replaced(everyone, stiffness=stiffness))
-    np.testing.assert_array_equal(response.feasible, [True, False, True])
-    assert np.isnan(response.angle[1]).all()
-    np.testing.assert_array_equal(response.angle[[0, 2]], healthy[[0, 2]])
-    assert capfd.readouterr() == ("", "")
-    assert not Path("MUJOCO_LOG.TXT").exists()
 
 
 def test_reading_the_compiled_loop_from_the_cache_is_not_announced(caplog):

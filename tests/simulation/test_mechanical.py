@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -108,35 +107,6 @@ def test_a_common_factor_of_all_forces_and_masses_changes_nothing(spec, arm, stu
     scaled = Candidates(replaced(one, **forces).joints, 1.7 * one.mass)
     run = simulation(spec, arm, study_log, other_joints=other).simulate
     np.testing.assert_allclose(run(scaled).angle, run(one).angle, atol=1e-9)
-
-
-@pytest.mark.parametrize("other", ["locked", "passive", "measured"])
-def test_threads_and_neighbours_change_no_bit(spec, arm, study_log, other):
-    parameters = candidates(arm, 11)
-    together = simulation(spec, arm, study_log, other_joints=other, threads=1).simulate(parameters).angle
-    for settings in ({"threads": 2}, {"threads": 5}):
-        other_run = simulation(spec, arm, study_log, other_joints=other, **settings)
-        np.testing.assert_array_equal(other_run.simulate(parameters).angle, together)
-    alone = simulation(spec, arm, study_log, other_joints=other)
-    # large after small and small after large: the buffers of one call leave nothing to the next
-    for rows in (slice(3, 5), slice(0, 11), slice(7, 8)):
-        np.testing.assert_array_equal(alone.simulate(parameters[rows]).angle, together[rows])
-
-
-def test_a_diverging_member_is_marked_and_harms_nobody(spec, arm, study_log, capfd, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    parameters = candidates(arm, 4)
-    damping, stiffness = parameters.joints.damping.copy(), parameters.joints.stiffness.copy()
-    damping[2], stiffness[2] = 0.0, 1e9  # explicit at 0.01 s: blows up
-    run = simulation(spec, arm, study_log, other_joints="passive").simulate
-    healthy = run(parameters)
-    response = run(replaced(parameters, damping=damping, stiffness=stiffness))
-    np.testing.assert_array_equal(response.feasible, [True, True, False, True])
-    assert np.isnan(response.angle[2]).all()
-    np.testing.assert_array_equal(response.angle[[0, 1, 3]], healthy.angle[[0, 1, 3]])
-    np.testing.assert_array_equal(run(parameters).angle, healthy.angle)  # and nothing is left of it
-    assert capfd.readouterr() == ("", "")
-    assert not Path("MUJOCO_LOG.TXT").exists()
 
 
 def test_prescribed_joints_give_the_shoulder_the_motion_they_had(spec, arm):

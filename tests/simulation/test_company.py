@@ -1,0 +1,76 @@
+"""A population: no neighbour, no thread and no candidate that fails changes a bit of another."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import candidates, replaced
+
+from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.simulation import SimulationSettings
+from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation.scenario import Scenario
+
+KINDS = {"mech": None, "hyd": HydraulicSettings().substeps}
+each_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def population(arm, n: int) -> Candidates:
+    """Random arms whose areas, currents and calibration differ too."""
+    rng, everyone = np.random.default_rng(0), candidates(arm, n)
+    for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
+        everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
+    return everyone
+
+
+@pytest.fixture
+def simulation(spec, arm, study_log):
+    def make(kind: str, **settings) -> Simulation:
+        scenario = Scenario(spec, arm, study_log, [1], SimulationSettings(**settings))
+        return Simulation(scenario, arm, KINDS[kind])
+
+    return make
+
+
+@each_kind
+@pytest.mark.parametrize("other", ["locked", "passive", "measured"])
+def test_threads_and_neighbours_change_no_bit(arm, simulation, kind, other):
+    everyone = population(arm, 7)
+    together = simulation(kind, other_joints=other, threads=1).simulate(everyone).angle
+    assert np.ptp(together, axis=1).min() > np.deg2rad(0.2)
+    for threads in (2, 5):
+        again = simulation(kind, other_joints=other, threads=threads).simulate(everyone).angle
+        np.testing.assert_array_equal(again, together)
+    alone = simulation(kind, other_joints=other)
+    # large after small and small after large: the buffers of one call leave nothing to the next
+    for rows in (slice(3, 5), slice(0, 7), slice(6, 7)):
+        np.testing.assert_array_equal(alone.simulate(everyone[rows]).angle, together[rows])
+
+
+@pytest.mark.parametrize(
+    ("kind", "other", "spoiled"),
+    [
+        ("mech", "passive", {"damping": 0.0, "stiffness": 1e9}),  # explicit at 0.01 s: blows up
+        ("hyd", "passive", {"stiffness": 1e9}),
+        ("hyd", "locked", {"force_2": 100.0}),  # the force would grow with the stroke
+    ],
+)
+def test_a_set_that_cannot_be_simulated_is_marked_and_harms_nobody(
+    arm, simulation, kind, other, spoiled, capfd, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    everyone = population(arm, 4)
+    run = simulation(kind, other_joints=other).simulate
+    healthy = run(everyone).angle
+    columns = {name: everyone.joints[name].copy() for name in spoiled}
+    for name, column in columns.items():
+        column[2] = spoiled[name]
+    capfd.readouterr()
+    response = run(replaced(everyone, **columns))
+    np.testing.assert_array_equal(response.feasible, [True, True, False, True])
+    assert np.isnan(response.angle[2]).all()
+    np.testing.assert_array_equal(response.angle[[0, 1, 3]], healthy[[0, 1, 3]])
+    assert not run(replaced(everyone, **spoiled)).feasible.any()
+    np.testing.assert_array_equal(run(everyone).angle, healthy)  # and nothing is left of it
+    assert capfd.readouterr() == ("", "")
+    assert not Path("MUJOCO_LOG.TXT").exists()

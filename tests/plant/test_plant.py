@@ -235,7 +235,7 @@ def test_stage_2_exports_no_motors_and_says_that_mujoco_alone_is_not_enough(tmp_
     np.testing.assert_allclose(bare.body_mass, plant.model.body_mass)
     assert bare.dof_damping[0] == MECHANICAL["D"]
     text = (tmp_path / "model" / "actuators.yaml").read_text()
-    assert 900.0 in [round(float(area), 9) for area in re.findall(r"area_a: (\S+)", text)]
+    assert 900.0 in [round(float(area), 9) for area in re.findall(r"area_a: ([\d.]+)", text)]
 
 
 def test_a_plant_of_a_run_takes_commands_for_the_joints_that_the_fit_drove(tmp_path):

@@ -1,6 +1,6 @@
 """Every term is estimated from simulated logs: the truth lies within the interval."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -21,9 +21,9 @@ NOTHING: Mapping[str, float] = MappingProxyType({})
 class Case(NamedTuple):
     """Quantities with (lowest, highest, truth, start), what else the chain has, and commands [%] by joint."""
 
-    rows: dict[str, tuple[float, float, float, float]]
+    rows: Mapping[str, tuple[float, float, float, float]]
     hydraulics: Mapping[str, float] = NOTHING
-    commands: tuple[dict[int, list[float]], ...] = ({2: DUTIES},)
+    commands: Sequence[Mapping[int, Sequence[float]]] = ({2: DUTIES},)
     dwell: float = 1.0
     pose: np.ndarray | None = None
 

@@ -48,13 +48,9 @@ def choose_chain(
         spec.delete(joint)
 
 
-def _path(body: mujoco.MjsBody) -> tuple[str, ...]:
+def _path(body: mujoco.MjsBody | None) -> tuple[str, ...]:
     """The joints from the base to a body."""
-    path: list[str] = []
-    while body is not None and body.name != "world":
-        path += [joint.name for joint in body.joints]
-        body = body.parent
-    return tuple(reversed(path))
+    return () if body is None else (*_path(body.parent), *(joint.name for joint in body.joints))
 
 
 def _named(spec: mujoco.MjSpec, chain: Sequence[str], columns: Sequence[str]) -> int:

@@ -9,18 +9,18 @@ import mujoco
 import numpy as np
 
 from hydroid.cad.chain import choose_chain
-from hydroid.cad.repair import MASSLESS, repair_inertias, set_inertia
+from hydroid.cad.repair import MASSLESS, ball, repair_inertias, set_inertia
 from hydroid.cad.scene import SCENE, clear_scene, exclude_contacts, place_scene
-from hydroid.cad.shapes import HIDDEN, SHOWN, ball, read_mesh, shown_stl
-from hydroid.cad.source import Source, read_source
+from hydroid.cad.shapes import HIDDEN, SHOWN, read_mesh, shown_stl
+from hydroid.cad.source import read_source
 from hydroid.mjcf import mujoco_errors
 
 LARGEST_MESH = 50.0
 """size beyond which meshes are taken to be in millimetres [m]"""
 MESHES = "links"
 """folder of the meshes beside the model"""
-PAINT, BASE = (0.94, 0.53, 0.08, 1.0), (0.25, 0.27, 0.3, 1.0)
-"""colours of what the file gives none"""
+PAINT = (0.94, 0.53, 0.08, 1.0)
+"""colour of what the file gives none"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +51,15 @@ def import_arm(path: Path, columns: Sequence[str] = (), tip: str | None = None) 
     Raises:
         ModelError: the file cannot be read, or holds no arm.
     """
-    source = read_source(path)
-    spec, notes = source.spec, source.notes
+    notes: list[str] = []
+    spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
     choose_chain(spec, str(path), notes, columns, tip)
-    meshes = _convert_meshes(source)
+    exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
+    meshes = _convert_meshes(spec, files, exact, notes)
     _sort_shapes(spec)
     with mujoco_errors(str(path)):
-        repair_inertias(spec, source.urdf, notes)
+        repair_inertias(spec, urdf, notes)
         spec.fuse_static()
     if not any(np.any(joint.damping) for joint in spec.joints):
         notes.append("no joint has damping: a fit estimates it")
@@ -100,55 +101,53 @@ def _distinct(name: str, taken: set[str]) -> str:
     return free
 
 
-def _convert_meshes(source: Source) -> dict[str, bytes]:
-    """Turn the meshes into STL files in m, delete those that cannot be shown, and return the files."""
-    spec, notes, files = source.spec, source.notes, dict[str, tuple[str, bytes]]()
-    read = {name: read_mesh(path, notes) for name, path in source.meshes.items()}
+def _convert_meshes(
+    spec: mujoco.MjSpec, files: dict[str, Path], exact: bool, notes: list[str]
+) -> dict[str, bytes]:
+    """Turn the meshes into STL files in m, delete those that cannot be shown, and return the files.
+
+    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
+    """
+    read = {name: mesh for name, path in files.items() if (mesh := read_mesh(path, notes)) is not None}
     sizes = {
-        mesh.file: float(np.max(found.extents * np.abs(mesh.scale)))
+        mesh.file: float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
         for mesh in spec.meshes
-        if (found := read.get(mesh.file)) is not None
+        if mesh.file in read
     }
     largest = max(sizes, key=lambda name: sizes[name], default="")
     millimetres = bool(largest) and sizes[largest] > LARGEST_MESH
     if millimetres:
-        name = source.meshes[largest].name
-        notes.append(f"mesh {name} would be {sizes[largest]:.4g} m long: all meshes are taken to be in mm")
+        what = f"mesh {files[largest].name} would be {sizes[largest]:.4g} m long"
+        notes.append(f"{what}: all meshes are taken to be in mm")
     taken: set[str] = set()
-    for name, mesh in read.items():
-        content = None if mesh is None else shown_stl(mesh, source.meshes[name].name, notes)
-        if content is not None:
-            stem = _distinct(_word(source.meshes[name].stem), taken)
-            files[name] = f"{MESHES}/{stem}.stl", content
-    for mesh in list(spec.meshes):
+    names = {name: f"{MESHES}/{_distinct(_word(files[name].stem), taken)}.stl" for name in read}
+    meshes: dict[str, bytes] = {}
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
-        if mesh.file and (mesh.file not in files or not shapes):
+        mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
+        given = read.get(mesh.file) if shapes else None
+        shown = given and shown_stl(given, mesh.scale, files[mesh.file].name, notes)
+        if not shown:
             for part in (*shapes, mesh):
                 spec.delete(part)
-        elif mesh.file:
-            mesh.file = files[mesh.file][0]
-            mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
-            if source.urdf or all(geom.parent.explicitinertial for geom in shapes):
-                mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # of no use, and never refused
-    spec.meshdir, spec.strippath, spec.assets = "", False, dict(files.values())
-    return dict(files.values())
+            continue
+        mesh.file = names[mesh.file]
+        meshes[mesh.file] = shown[0]
+        mesh.inertia = shown[1] if exact else mesh.inertia
+    spec.meshdir, spec.strippath, spec.assets = "", False, meshes
+    return meshes
 
 
 def _sort_shapes(spec: mujoco.MjSpec) -> None:
     """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
-    plain = np.array([0.5, 0.5, 0.5, 1.0])
     for body in spec.bodies:
         visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
         solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
         for geom in body.geoms:
             geom.group = SHOWN if geom in (visual or solid) else HIDDEN
             geom.contype = geom.conaffinity = int(geom in (solid or visual))
-            if not geom.material and np.allclose(geom.rgba, plain):
-                geom.rgba = PAINT if any(_joints_above(body)) else BASE
-
-
-def _joints_above(body: mujoco.MjsBody | None) -> list[mujoco.MjsJoint]:
-    return [] if body is None else [*body.joints, *_joints_above(body.parent)]
+            if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
+                geom.rgba = PAINT
 
 
 def _mend_joint(joint: mujoco.MjsJoint, notes: list[str]) -> None:

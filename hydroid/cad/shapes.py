@@ -1,4 +1,4 @@
-"""Mesh files and MuJoCo's shapes -> triangles in m, and the mass properties of what they enclose."""
+"""Mesh files and MuJoCo's shapes -> triangles in m."""
 
 from pathlib import Path
 
@@ -31,21 +31,31 @@ def read_mesh(path: Path, notes: list[str]) -> trimesh.Trimesh | None:
     return mesh
 
 
-def shown_stl(mesh: trimesh.Trimesh, name: str, notes: list[str]) -> bytes | None:
-    """Return a binary STL of the mesh, or of its hull where MuJoCo refuses the mesh; None: both."""
-    for candidate, what in ((mesh, "its hull is shown"), (mesh.convex_hull, "it is not shown")):
-        content = candidate.export(file_type="stl")
-        assert isinstance(content, bytes)
+def shown_stl(
+    mesh: trimesh.Trimesh, scale: Array, name: str, notes: list[str]
+) -> tuple[bytes, mujoco.mjtMeshInertia] | None:
+    """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note: it refuses both.
+
+    That is exact where the mesh is closed, else that of its hull, and of no use where it is flat.
+    """
+    if len(mesh.faces) > 200_000:
+        notes.append(f"mesh {name} has more triangles than MuJoCo reads: its hull is shown")
+        mesh = mesh.convex_hull
+    content, kinds, refusal = mesh.export(file_type="stl"), mujoco.mjtMeshInertia, ""
+    assert isinstance(content, bytes)
+    closed = [kinds.mjMESH_INERTIA_EXACT] if mesh.is_volume else []
+    for kind in (*closed, kinds.mjMESH_INERTIA_CONVEX, kinds.mjMESH_INERTIA_SHELL):
         spec = mujoco.MjSpec()
         spec.assets = {"a.stl": content}
-        spec.add_mesh(name="a", file="a.stl")
-        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="a", mass=0)
+        spec.add_mesh(name="a", file="a.stl", scale=scale, inertia=kind)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="a")
         try:
             with mujoco_errors(f"mesh {name}"):
                 spec.compile()
-            return content
+            return content, kind
         except ModelError as error:
-            notes.append(f"{error}: {what}")
+            refusal = str(error)
+    notes.append(f"{refusal}: it is not shown")
     return None
 
 
@@ -70,25 +80,3 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
             return trimesh.creation.icosphere(subdivisions=2, radius=1.0).apply_scale(size)
         case _:
             return None
-
-
-def solid_properties(mesh: trimesh.Trimesh) -> tuple[float, Array, Array, str] | None:
-    """Return volume [m³], centre [m], inertia for 1 kg [m²], and what was taken for the solid.
-
-    That is the mesh if it is closed, else its convex hull. None: it is flat.
-    """
-    closed = mesh.is_watertight and mesh.volume > 0
-    try:
-        solid = mesh if closed else mesh.convex_hull
-    except Exception:  # qhull's own error for flat points
-        return None
-    if not np.isfinite(solid.volume) or solid.volume < 1e-9:  # one cubic millimetre
-        return None
-    inertia = np.asarray(solid.moment_inertia) / solid.mass
-    return float(solid.volume), np.asarray(solid.center_mass), inertia, "mesh" if closed else "mesh's hull"
-
-
-def ball(mass: float) -> Array:
-    """Return the inertia of a steel ball about its centre [kg·m²], shape (3, 3)."""
-    radius = (mass / 7850.0 / (4 / 3 * np.pi)) ** (1 / 3)
-    return 0.4 * mass * radius**2 * np.eye(3)

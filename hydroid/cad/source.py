@@ -1,7 +1,6 @@
 """A URDF or MJCF file -> MuJoCo's spec of it with hinges alone, and where its meshes are."""
 
-from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,36 +12,19 @@ from hydroid.mjcf import mujoco_errors
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
-HELD = {"prismatic": "slides", "floating": "floats freely", "planar": "moves in a plane"}
-"""kinds of a URDF's joints that hydroid does not move, and what they do"""
-HELD_IN_MJCF = {
+HELD = {
     mujoco.mjtJoint.mjJNT_SLIDE: "slides",
     mujoco.mjtJoint.mjJNT_FREE: "floats freely",
     mujoco.mjtJoint.mjJNT_BALL: "is a ball joint",
 }
+"""kinds of joints that hydroid does not move, and what they do"""
 
 
-@dataclass
-class Source:
-    """A file as MuJoCo reads it, without the joints that hydroid does not move.
+def read_source(path: Path, notes: list[str]) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
+    """Read a URDF or an MJCF without the joints that hydroid does not move.
 
-    Attributes:
-        path: the file.
-        spec: MuJoCo's.
-        urdf: whether it is a URDF.
-        meshes: where each file that the spec names lies, by that name.
-        notes: a line for each thing that was assumed, left out or mended.
-    """
-
-    path: Path
-    spec: mujoco.MjSpec
-    urdf: bool
-    meshes: dict[str, Path] = field(default_factory=dict[str, Path])
-    notes: list[str] = field(default_factory=list[str])
-
-
-def read_source(path: Path) -> Source:
-    """Read a URDF or an MJCF.
+    Returns:
+        MuJoCo's spec, where each file of a mesh that it names lies, and whether the file is a URDF.
 
     Raises:
         ModelError: missing, not XML, of another kind, a xacro, or refused by MuJoCo.
@@ -57,115 +39,76 @@ def read_source(path: Path) -> Source:
     if any("xacro" in str(element.tag).lower() for element in root.iter()):
         hint = f"expand it first: xacro {path.name} > robot.urdf"
         raise ModelError("is a xacro, not a URDF", where=where, hint=hint)
-    if root.tag == "robot":
-        return _urdf(path, root)
-    if root.tag == "mujoco":
-        return _mjcf(path)
-    what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
-    raise ModelError(what, where=where, hint="export the arm as URDF")
+    urdf, folder = root.tag == "robot", path.resolve().parent
+    if not urdf and root.tag != "mujoco":
+        what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
+        raise ModelError(what, where=where, hint="export the arm as URDF")
+    with mujoco_errors(where):
+        if urdf:
+            files = _prepare_urdf(root, notes)
+            spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+        else:
+            spec = mujoco.MjSpec.from_file(where)
+            files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
+            folder /= spec.meshdir
+    found = {name: _find(given, folder, notes) for name, given in files.items()}
+    _hold_joints(spec, notes)
+    return spec, {name: place for name, place in found.items() if place}, urdf
 
 
-def _urdf(path: Path, root: ElementTree.Element) -> Source:
-    source, mimics = Source(path, mujoco.MjSpec(), urdf=True), list[str]()
+def _prepare_urdf(root: ElementTree.Element, notes: list[str]) -> dict[str, str]:
+    """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain file name."""
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:
-            source.notes.append(
-                f"the root link {link.get('name')} is the fixed base: its mass does not matter"
-            )
-    for joint in root.iterfind("joint"):
-        name, kind = str(joint.get("name")), str(joint.get("type"))
-        mimic = joint.find("mimic")
-        if mimic is not None:
-            joint.remove(mimic)
-            mimics.append(name)
-            source.notes.append(
-                f"joint {name} mimics {mimic.get('joint')}, which hydroid does not model: it is held at 0"
-            )
-        elif kind in HELD:
-            joint.set("type", "fixed")  # MuJoCo refuses some of them
-            source.notes.append(f"joint {name} {HELD[kind]}: hydroid moves hinges only, so it is held at 0")
-    _find_urdf_meshes(source, root)
+            notes.append(f"the root link {link.get('name')} is the fixed base: its mass does not matter")
+    for joint in root.iterfind("joint[@type='planar']"):  # MuJoCo makes three joints of it
+        joint.set("type", "fixed")
+        notes.append(_held(str(joint.get("name")), "moves in a plane"))
+    names: dict[str, str] = {}
+    for mesh in root.iterfind("link/*/geometry/mesh"):
+        mesh.set("filename", names.setdefault(str(mesh.get("filename")), f"mesh{len(names)}.stl"))
     section = root.find("mujoco")
     section = ElementTree.SubElement(root, "mujoco") if section is None else section
     compiler = section.find("compiler")
     compiler = ElementTree.SubElement(section, "compiler") if compiler is None else compiler
     compiler.attrib.update(URDF_OPTIONS)
-    with mujoco_errors(str(path)):
-        source.spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    for name in mimics:
-        source.spec.delete(source.spec.joint(name))
-    return source
+    return {name: given for given, name in names.items()}
 
 
-def _find_urdf_meshes(source: Source, root: ElementTree.Element) -> None:
-    """Give every mesh a plain file name, and take out the shapes whose mesh is not there."""
-    names: dict[str, str] = {}
-    for link in root.iterfind("link"):
-        for shape in [s for s in link if s.tag in ("visual", "collision")]:
-            mesh = shape.find("geometry/mesh")
-            if mesh is None:
-                continue
-            given = str(mesh.get("filename"))
-            if given not in names:
-                found, looked = _find(given, source.path.resolve().parent)
-                names[given] = f"mesh{len(names)}.stl" if found else ""
-                if found:
-                    source.meshes[names[given]] = found
-                else:
-                    source.notes.append(f"mesh {given} is not there; looked for {looked}")
-            if names[given]:
-                mesh.set("filename", names[given])
-            else:
-                link.remove(shape)
+def _find(given: str, folder: Path, notes: list[str]) -> Path | None:
+    """Look for a mesh from the folder and its parents, with and without its package's name, or by name."""
+    rest = Path(given.rpartition("://")[2])
+    places = (folder, *islice(folder.parents, 4))
+    tried = [place / tail for place in places for tail in (rest, Path(*rest.parts[1:]))]
+    alike = (path for path in islice(folder.rglob("*"), 20_000) if path.name == rest.name)
+    found = next((path for path in chain(tried, alike) if is_file(path)), None)
+    if found is None:
+        looked = f"{tried[0]}, {tried[-1]} and {rest.name} below {folder}"
+        notes.append(f"mesh {given} is not there; looked for {looked}")
+    return found
 
 
-def _find(given: str, folder: Path) -> tuple[Path | None, str]:
-    """Return where a mesh lies, and what was looked for."""
-    scheme, _, rest = given.rpartition("://")
-    parts = Path(rest).parts
-    tried: list[Path] = []
-    if scheme in ("package", "model") and len(parts) > 1:
-        inside = Path(*parts[1:])
-        for place in [folder, *islice(folder.parents, 4)]:
-            tried += [place / rest, place / inside]
-    else:
-        tried = [folder / rest, Path(rest)]
-    last = parts[-1] if parts else given
-    alike = (path for path in islice(folder.rglob("*"), 20_000) if parts and path.name == last)
-    found = next((path for path in tried if is_file(path)), None) or next(alike, None)
-    return found, f"{tried[0]}, {tried[-1]} and {last} below {folder}"
-
-
-def _mjcf(path: Path) -> Source:
-    with mujoco_errors(str(path)):
-        source = Source(path, mujoco.MjSpec.from_file(str(path)), urdf=False)
-    spec, notes = source.spec, source.notes
-    folder = path.resolve().parent / spec.meshdir
-    for mesh in spec.meshes:
-        if mesh.file:
-            found = next((p for p in (folder / mesh.file, folder / Path(mesh.file).name) if is_file(p)), None)
-            if found:
-                source.meshes[mesh.file] = found
-            else:
-                notes.append(f"mesh {mesh.file} is not there; looked for {folder / mesh.file}")
+def _hold_joints(spec: mujoco.MjSpec, notes: list[str]) -> None:
+    """Delete the joints that are no hinges or follow others, and say so of all that is left out."""
     followers: dict[str, str] = {}
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT:
-            leader = equality.name2
-            followers[equality.name1] = f"follows {leader}" if leader else "is held by an equality"
+            followers[equality.name1] = f"mimics {equality.name2}" if equality.name2 else "has an equality"
         else:
             notes.append(f"equality {equality.name or '(unnamed)'} is left out: hydroid models serial arms")
     for joint in list(spec.joints):
         name = joint.name or f"of {joint.parent.name}"
-        if joint.type in HELD_IN_MJCF:
-            what = HELD_IN_MJCF[joint.type]
-            notes.append(f"joint {name} {what}: hydroid moves hinges only, so it is held at 0")
-        elif name in followers:
+        if name in followers:
             notes.append(f"joint {name} {followers[name]}, which hydroid does not model: it is held at 0")
+        elif joint.type in HELD:
+            notes.append(_held(name, HELD[joint.type]))
         else:
             continue
         spec.delete(joint)
     if spec.actuators:
         notes.append(f"its {len(spec.actuators)} actuators are left out: the hydraulics take their place")
-    return source
+
+
+def _held(joint: str, what: str) -> str:
+    return f"joint {joint} {what}: hydroid moves hinges only, so it is held at 0"

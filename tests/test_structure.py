@@ -86,17 +86,3 @@ def test_the_search_knows_no_robot():
 def test_the_workers_know_no_robot():
     for path in (ROOT / "parallel").glob("*.py"):
         assert imported_packages(path) <= {"errors", "settings", "parallel"}, path
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "commands").glob("*.py")), ids=lambda p: p.stem)
-def test_the_command_line_imports_nothing_heavy(path: Path):
-    """`--help` needs the lazy group only; a command answers wrong input before it imports a simulator."""
-    heavy = {"mujoco", "scipy", "matplotlib", "numba", "trimesh", "rich", "jinja2"}
-    light = path.stem in ("app", "console", "options", "progress", "result")
-    heavy |= {"numpy", "pydantic", "yaml"} if light else set()
-    top = [n for n in ast.parse(path.read_text()).body if isinstance(n, ast.Import | ast.ImportFrom)]
-    for node in top:
-        names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
-        assert not {n.split(".")[0] for n in names} & heavy
-        allowed = ("hydroid.commands", "hydroid.errors", "hydroid.progress")
-        assert not light or all(not n.startswith("hydroid.") or n.startswith(allowed) for n in names)

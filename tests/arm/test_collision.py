@@ -72,23 +72,6 @@ def test_the_smallest_distance_is_that_of_all_pairs(machine: Machine, arm: Arm):
         assert found is None or found[0] == below[0]
 
 
-def test_two_balls_meet_when_and_as_deep_as_geometry_says():
-    model = mujoco.MjModel.from_xml_string(SWINGS)
-    angle = np.radians(np.column_stack([np.linspace(180, 0, 181), np.full(181, 180.0)]))
-    time = np.arange(181) / 10
-    # the first ball comes over the top; the second one looks away from it
-    free = CollisionChecker(model).clearance(time, angle)
-    assert not free.meetings
-    assert free.distance.min() == pytest.approx(1.9)  # the height of a ball at its lowest, less its radius
-    towards = angle * [1.0, 0.0]
-    centre = np.array([1.0, 0.0])
-    ball = np.column_stack([np.cos(towards[:, 0]), np.sin(towards[:, 0])])
-    apart = np.linalg.norm(ball - (np.array([3.0, 0.0]) - centre), axis=1) - 0.2
-    met = CollisionChecker(model).clearance(time, towards)
-    assert met.distance == pytest.approx(np.minimum(apart, 1.9), abs=1e-9)
-    assert met.nearest[-1] == ("first", "second")
-
-
 def test_depth_and_time_of_a_meeting():
     text = SWINGS.replace('pos="3 0 2"', 'pos="2.1 0 2"')
     model = mujoco.MjModel.from_xml_string(text)

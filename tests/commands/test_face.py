@@ -1,7 +1,6 @@
 """The command line and the public names are the same functions, answer at once, and explain themselves."""
 
 import inspect
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -91,22 +90,6 @@ for arguments in {[[str(word) for word in call] for call in calls]}:
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr[-2000:]
-
-
-def test_help_answers_within_twice_the_import_of_typer():
-    """By processor time, best of several: other work on the machine adds little to it."""
-
-    def best(code: str) -> float:
-        times = []
-        for _ in range(5):
-            before = os.times()
-            subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-            after = os.times()
-            times.append(after.children_user - before.children_user)
-        return min(times)
-
-    show = "import sys; sys.argv[1:] = ['--help']; from hydroid.commands.app import main; main()"
-    assert best(show) < 2 * best("import typer")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")

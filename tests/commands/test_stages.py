@@ -1,11 +1,6 @@
 """The commands as a user meets them: from logs to fits, errors on other logs, predictions."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -35,6 +30,10 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     # a refinement that ends at its limit of one step says so
     assert found["converged"] is False
     assert "least-squares refinement did not converge: it reached the iteration limit" in done.err
+
+    hydroid_cli("fit-mech", short, *GA, "--out", "run", code=2)  # not twice by mistake
+    other = hydroid_cli("fit-hyd", "--resume", "--out", "run", code=2)
+    assert "is a run of fit-mech, not of fit-hyd" in other.err
 
     (row,) = json.loads(hydroid_cli("validate", short, "--fit=run", "--json", "--out=val").out)["results"]
     assert set(row) >= {"fit", "log", "joint", "mae_deg", "rms_deg", "max_deg", "fit_percent"}
@@ -112,26 +111,3 @@ def test_check_prints_json_and_says_by_its_status_that_a_log_is_unusable(short: 
     assert (good["usable"], good["driven_joints"]) == (True, [2])
     assert not bad["usable"]
     assert {finding["level"] for finding in bad["findings"]} >= {"error"}
-
-
-@pytest.mark.slow
-def test_a_stopped_run_goes_on_and_ends_the_same(short: Path, hydroid_cli: Run, tmp_path: Path):
-    arguments = ["fit-mech", short, *GA, "--no-refinement", "--quiet", "--set", "search.ga.generations=60"]
-    hydroid_cli(*arguments, "--out", "whole")
-    command = [sys.executable, "-m", "hydroid", *map(str, arguments), "--out", "parts"]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ)
-    deadline = time.monotonic() + 60
-    while not (tmp_path / "parts" / "run.json").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(0.5)
-    process.send_signal(signal.SIGTERM)
-    _, errors = process.communicate(timeout=30)
-    assert process.returncode == 130, errors
-    assert "--resume" in errors
-    assert json.loads((tmp_path / "parts" / "run.json").read_text())["status"] == "interrupted"
-    hydroid_cli(*arguments, "--out", "parts", code=2)  # not twice by mistake
-    other = hydroid_cli("fit-hyd", "--resume", "--out", "parts", code=2)
-    assert "is a run of fit-mech, not of fit-hyd" in other.err
-    hydroid_cli("fit-mech", "--resume", "--out", "parts", "--quiet")
-    for name in ("history.csv", "estimate.yaml", "pareto.csv", "tables/parameters.csv"):
-        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

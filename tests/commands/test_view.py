@@ -12,13 +12,12 @@ from command_line import Run
 
 import hydroid
 from hydroid import load_settings
-from hydroid.errors import LogError, RunError, SettingsError
+from hydroid.errors import LogError, SettingsError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 
 ROOT = Path(__file__).parents[2]
-LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
 VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
@@ -57,26 +56,6 @@ def test_without_a_display_the_viewer_says_so_and_names_the_other_way(tmp_path: 
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_motion_is_written_where_pictures_can_be_rendered(tmp_path: Path):
-    short = tmp_path / "short.csv"
-    short.write_text("\n".join(LOG.read_text().splitlines()[:101]) + "\n")
-    try:
-        hydroid.view(short, out=tmp_path / "a.gif")
-    except RunError as error:
-        if "can be rendered" not in str(error):
-            raise
-        pytest.skip("no OpenGL on this machine")
-    from PIL import Image
-
-    with Image.open(tmp_path / "a.gif") as picture:
-        frames = []
-        for k in range(picture.n_frames):
-            picture.seek(k)
-            frames.append(picture.convert("RGB").tobytes())
-    assert len(frames) == 10
-    assert len(set(frames)) > 5  # it moves
-
-
 def test_one_log_moves_both_arms_as_mirror_images(model: IdentifiedModel, study_log: Log, tmp_path: Path):
     both = hydroid.simulate(study_log, fit=model, arm="both", out=tmp_path / "both.csv").result
     alone = hydroid.simulate(study_log, fit=model, out=None).log
@@ -100,17 +79,6 @@ def test_each_arm_has_its_own_columns(model: IdentifiedModel, tmp_path: Path):
     np.testing.assert_array_equal(both["left"].command[:, 2], rows[:, 2])
     with pytest.raises(LogError, match="u1_pct"):
         hydroid.simulate(tmp_path / "own.csv", fit=model, out=None)
-
-
-def test_columns_of_single_joints_are_named_too():
-    changed = load_settings("fit-mech", {"log.joints": {2: {"command": {"column": ["up", "down"]}}, 4: None}})
-    left = changed.log.of_arm("left")
-    command, angle, none = left.columns("command", 2), left.columns("angle", 3), left.columns("command", 4)
-    assert command is not None
-    assert command.column == ("left_up", "left_down")
-    assert angle is not None
-    assert angle.column == ("left_q3_deg",)
-    assert none is None
 
 
 def test_an_arm_that_is_none_is_refused(model: IdentifiedModel, study_log: Log):

@@ -1,14 +1,12 @@
 """ROS bags and MCAP whose topics have clocks of their own: within the error of linear interpolation."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from log_formats import BagWriter
 
-from hydroid.errors import LogError
-from hydroid.log import Log, check_log, guess_columns, open_table, read_log
+from hydroid.log import check_log, guess_columns, open_table, read_log
 from hydroid.settings.log import LogSettings
 
 KINDS = ("ros1", "ros2", "mcap")
@@ -77,16 +75,6 @@ def test_unsynchronised_topics_come_to_one_clock(kind: str, tmp_path: Path) -> N
     assert "/valves/command: no header stamp, so the time of recording counts" in said
 
 
-def test_the_three_kinds_hold_the_same_bits(tmp_path: Path) -> None:
-    logs: list[Log] = []
-    for kind in KINDS:
-        (tmp_path / kind).mkdir()
-        logs.append(read_log(write(tmp_path / kind, kind)[0], SETTINGS, RANGES)[0])
-    for log in logs[1:]:
-        np.testing.assert_array_equal(log.angle, logs[0].angle)
-        np.testing.assert_array_equal(log.command, logs[0].command)
-
-
 def test_the_columns_of_a_bag_are_guessed(tmp_path: Path) -> None:
     guess = guess_columns(open_table(write(tmp_path, "mcap")[0]), ["boom", "stick"])
     joints = guess.log["joints"]
@@ -118,11 +106,3 @@ def test_bad_bags_are_refused_in_one_line(tmp_path: Path) -> None:
     one, _ = write(tmp_path, "ros1")
     one.write_bytes(one.read_bytes()[:5000])
     assert "cannot be read as a bag" in errors(one)
-
-
-def test_a_missing_package_names_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, _ = write(tmp_path, "ros1")
-    for name in [name for name in sys.modules if name.partition(".")[0] == "rosbags"]:
-        monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(LogError, match=r"needs the package rosbags.*pip install 'hydroid\[ros\]'"):
-        open_table(path)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from log_files import NAMES, cells, faults, lines, read, save
-from log_formats import matlab, write_mat, write_mat73, write_parquet
+from log_formats import BagWriter, matlab, write_mat, write_mat73, write_parquet
 
 from hydroid.errors import LogError
 from hydroid.log import Log, open_table
@@ -140,6 +140,11 @@ BAD = {
 }
 
 
+def empty_bag(path: Path) -> Path:
+    with BagWriter(path, "ros1"):
+        return path
+
+
 @pytest.mark.parametrize("kind", BAD)
 def test_a_bad_file_is_refused_in_one_line(kind: str, tmp_path: Path) -> None:
     make, said = BAD[kind]
@@ -149,12 +154,17 @@ def test_a_bad_file_is_refused_in_one_line(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "package", "extra"), [("mat73", "h5py", "mat"), ("parquet", "pyarrow", "parquet")]
+    ("write", "package", "extra"),
+    [
+        (lambda path: write_mat73(path, COLUMNS), "h5py", "mat"),
+        (lambda path: write_parquet(path, COLUMNS), "pyarrow", "parquet"),
+        (empty_bag, "rosbags", "ros"),
+    ],
 )
 def test_a_missing_package_names_its_extra(
-    kind: str, package: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    write, package: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = WRITERS[kind](tmp_path / "log", COLUMNS)
+    path = write(tmp_path / "log.bag")
     for name in [name for name in sys.modules if name.partition(".")[0] == package]:
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(LogError, match=rf"needs the package {package}.*pip install 'hydroid\[{extra}\]'"):

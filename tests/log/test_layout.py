@@ -74,14 +74,3 @@ def test_a_faulty_cell_below_a_preamble_has_its_place(
 
 def test_a_torn_row_below_the_names_is_a_fault(tmp_path: Path) -> None:
     assert faults(save(tmp_path / "log.csv", rows(below=[["broken", "off"]])))[0].line == 2
-
-
-@pytest.mark.parametrize("above", [[], ["# a rig, at night"]])
-def test_columns_may_be_parted_by_spaces(above: list[str], tmp_path: Path) -> None:
-    path = tmp_path / "log.txt"
-    path.write_text("\n".join([*above, *(" ".join(f"{cell:>12}" for cell in row) for row in ROWS)]))
-    log, findings = read(path)
-    reference, _ = read(save(tmp_path / "plain.csv", ROWS))
-    assert "separated by spaces" in findings[-1].what
-    np.testing.assert_array_equal(log.command, reference.command)
-    np.testing.assert_array_equal(log.angle, reference.angle)

@@ -75,13 +75,3 @@ def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
     log, findings = read(path, repair=True)
     assert len(log.time) == 79
     assert "3 rows without a time" in findings[0].what
-
-
-def test_wrapped_angles_of_a_continuous_joint_are_joined(tmp_path: Path) -> None:
-    values = cells(400)
-    values[:, 4] = 300 * values[:, 0] - 100
-    true, _ = read(save(tmp_path / "true.csv", lines(values)))
-    values[:, 4] = (values[:, 4] + 180) % 360 - 180
-    log, findings = read(save(tmp_path / "wrapped.csv", lines(values)))
-    np.testing.assert_allclose(log.angle, true.angle, atol=1e-9)
-    assert [(f.level, f.column) for f in findings] == [("note", "q2_deg")]

@@ -47,14 +47,6 @@ def test_samples_on_the_grid_pass_unchanged() -> None:
     np.testing.assert_array_equal(grid, np.arange(1000) * 0.01)
 
 
-def test_an_unmeasured_joint_stays_unmeasured_off_the_grid() -> None:
-    time = np.arange(100, dtype=float) * 0.013
-    angle = np.stack([np.full(100, np.nan), time], axis=1)
-    _, _, q = resample(time, np.zeros((100, 2)), angle, 0.01)
-    assert np.isnan(q[:, 0]).all()
-    np.testing.assert_allclose(q[:, 1], np.arange(len(q)) * 0.01, atol=1e-12)
-
-
 def test_a_resampled_log_is_said_to_be(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", lines(cells(60, 0.02)))
     log, findings = read(path)

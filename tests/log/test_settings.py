@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hydroid.errors import SettingsError
-from hydroid.settings.load import load, validate
+from hydroid.settings.load import load
 from hydroid.settings.log import ColumnMap, LogSettings
 
 names = st.text("abcxyz_ []°", min_size=1, max_size=6)
@@ -47,18 +47,6 @@ def test_a_joint_inherits_what_it_does_not_say() -> None:
     assert settings.columns("angle", 4) is None
 
 
-def test_columns_of_one_joint_may_be_mapped_where_none_are_common() -> None:
-    settings = LogSettings.model_validate(
-        {
-            "command": None,
-            "angle": None,
-            "joints": {2: {"command": {"column": "u"}, "angle": {"column": "q"}}},
-        }
-    )
-    assert settings.columns("command", 2) == ColumnMap(("u",), "%")
-    assert settings.columns("command", 1) is None
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -85,9 +73,3 @@ def test_a_setting_that_is_not_allowed_is_refused_by_name(text: str, said: str, 
     with pytest.raises(SettingsError, match="line 1") as caught:
         load(file, LogSettings)
     assert said in str(caught.value)
-
-
-def test_an_override_reaches_one_joint() -> None:
-    settings = validate({"joints": {"3": {"command": None}}}, LogSettings, "--set")
-    assert settings.columns("command", 3) is None
-    assert settings.columns("angle", 3) == LogSettings().columns("angle", 3)

@@ -1,4 +1,3 @@
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from log_files import RANGES, RIG, RIG_RANGES
+from log_files import RANGES
 
-from hydroid.errors import LogError, RunError
+from hydroid.errors import LogError
 from hydroid.log import Log, read_log, write_log
 from hydroid.settings.log import LogSettings
 
@@ -60,16 +59,6 @@ def test_what_is_written_reads_back(
     np.testing.assert_allclose(back.angle, log.angle, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["rig_shoulder_1", "rig_all_joints_1"])
-def test_a_rig_log_survives_to_the_bit(name: str, tmp_path: Path) -> None:
-    log, _ = read_log(RIG / f"{name}.csv", LogSettings(), RIG_RANGES)
-    write_log(tmp_path / "copy.csv", log, LogSettings())
-    back, findings = read_log(tmp_path / "copy.csv", LogSettings(), RIG_RANGES)
-    assert findings == []
-    np.testing.assert_array_equal(back.command, log.command)
-    np.testing.assert_array_equal(back.angle, log.angle)
-
-
 LOG = Log("x", np.arange(T, dtype=float) * 0.01, np.ones((T, 2)), np.zeros((T, 2)), 0.01)
 
 
@@ -83,16 +72,3 @@ def test_nothing_is_lost_silently(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
     write_log(path, unmeasured, LogSettings(angle=None))
     assert not read_log(path, LogSettings(angle=None), RANGES)[0].measured.any()
-
-
-def test_a_failed_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("old")
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(RunError, match=r"log\.csv: cannot be written \(No space left"):
-        write_log(path, LOG, LogSettings())
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("log.csv", "old")]

@@ -19,7 +19,6 @@ from worker_targets import DEADLY, Deadly, Rows
 
 from hydroid.errors import RunError
 from hydroid.fitting.memo import Memo
-from hydroid.parallel import cluster
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
@@ -156,19 +155,6 @@ def site(tmp_path: Path) -> Iterator[Site]:
     started = Site(tmp_path)
     yield started
     started.end()
-
-
-def test_a_scheduler_of_a_script_refuses_foreigners(site: Site, monkeypatch: pytest.MonkeyPatch):
-    assert site.address.startswith("tls://")
-    monkeypatch.setattr(cluster, "CONNECT", 2.0)
-    for given in (site.address, site.address.replace("tls", "tcp"), str(site.file)):
-        with (
-            pytest.raises(RunError, match="no Dask scheduler answers"),
-            open_workers(given),
-        ):
-            pass
-    with pytest.raises(OSError, match=r"[Tt]imed out|TLS|SSL"):
-        distributed.Client(site.address, security=distributed.Security.temporary(), timeout=2.0)
 
 
 def test_one_two_and_four_workers_and_one_killed_change_no_bit(site: Site, tmp_path: Path):

@@ -100,10 +100,10 @@ def test_an_array_of_ten_seeds_is_collected(site: Path):
     job = submit("array.sbatch", "log.csv", *QUICK, "--set", "search.ga.generations=2")
     end_of(job)
     assert len(jobs(job)) == 10
-    out = run("hydroid", "collect", "runs/array/seed-*", "--out", "runs/array/collected", "--json")
+    out = run("hydroid", "report", "runs/array/seed-*", "--merge", "--out", "runs/array/merged", "--json")
     found = json.loads(out)
     assert [run["seed"] for run in found["runs"].values()] == list(range(1, 11))
-    with Path("runs/array/collected/tables/runs.csv").open(newline="") as file:
+    with Path("runs/array/merged/tables/runs.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert rows[0]["run"] == found["best"]
     assert {row["run"] for row in rows} == {f"runs/array/seed-{seed}" for seed in range(1, 11)}

@@ -12,7 +12,7 @@ from urllib.request import urlopen
 import numpy as np
 import psutil
 import pytest
-from spread_problem import CountingSpread, arguments, assert_same, random_candidates
+from spread_problem import arguments, assert_same, random_candidates
 from worker_targets import Rows
 
 from hydroid.errors import ModelError, RunError, SettingsError
@@ -66,17 +66,6 @@ def test_threads_of_a_worker_and_freed_parameters_change_no_bit(two: DaskWorkers
     assert_same(spread.varied(freed), plain.varied(freed), theta)
 
 
-def test_whatever_a_problem_becomes_is_spread_too():
-    spread = CountingSpread()
-    problem = Problem(*arguments(), spread)
-    theta = random_candidates(problem, 2)
-    shorter = [log.first(0.5) for log in problem.logs]
-    for variant in (problem, problem.varied(problem.settings.freed(), shorter)):
-        variant.residuals(theta)
-        variant.evaluate(theta)
-    assert spread.counts == {"output_errors": 4, "objectives": 4}
-
-
 def test_errors_come_through(two: DaskWorkers):
     with pytest.raises(ModelError, match=r"^arm.xml: has no such joint; take another$"):
         two(Rows(), "refused", NINE, 2)
@@ -116,26 +105,6 @@ def test_a_foreign_client_is_refused(two: DaskWorkers, monkeypatch: pytest.Monke
             distributed.Client(address, security=other, timeout=2.0)
         gc.collect()  # it closes here, and not in the thread of the next one
     assert two.count == 2
-
-
-def test_a_refused_client_leaves_nothing_to_close(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch):
-    """Collected in the thread that the next client waits for, an open one would wait for that client."""
-    collected: list[int] = []
-    make_loop = distributed.utils.get_loop_factory
-
-    def collect():
-        collected.append(gc.collect())
-        return make_loop()
-
-    monkeypatch.setattr(distributed.utils, "get_loop_factory", collect)
-    gc.disable()
-    try:
-        for _ in range(2):
-            with pytest.raises(RunError, match=r"no Dask scheduler answers .*TLS"):
-                opened(two.client.scheduler_info()["address"])
-    finally:
-        gc.enable()
-    assert len(collected) == 2
 
 
 NO_TLS = (SettingsError, "without TLS anyone .*--dask-insecure")

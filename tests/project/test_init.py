@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from machine import write_log
@@ -19,11 +18,6 @@ from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
 from hydroid.project import Project
 from hydroid.settings.arm import load_arm
-
-QUICK = {
-    "search.multistart": {"starts": 1, "iterations": 1, "horizons": []},
-    "refinement": {"iterations": 1},
-}
 
 
 def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
@@ -40,19 +34,6 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_log(folder / "machine", folder / f"move_{seed}.csv", seed, seconds=8.0)
     init(folder / "mine", robot, sorted(folder.glob("move_*.csv")))
     return folder
-
-
-def test_the_model_has_the_files_masses_and_inertias(place: Path):
-    arm = load_arm(place / "mine" / "arm.yaml")
-    built = mujoco.MjSpec.from_file(str(place / "mine" / "arm.xml")).compile()
-    assert arm.link_names == ("house", "boom", "stick")
-    np.testing.assert_allclose([built.body(name).mass[0] for name in arm.link_names], [800, 200, 90])
-    square = np.array([2.0, 0.2, 0.3]) ** 2
-    expected = np.sort((square.sum() - square) * 200 / 12)
-    np.testing.assert_allclose(np.sort(built.body("boom").inertia), expected, rtol=1e-6)
-    assert [mesh.name for mesh in sorted((place / "mine" / "links").iterdir())] == [
-        "boom.stl", "house.stl", "stick.stl",
-    ]  # fmt: skip
 
 
 def test_columns_units_and_scales_are_those_of_the_log(place: Path):
@@ -74,19 +55,6 @@ def test_a_fit_starts_near_the_log(place: Path):
     openings = [joint.actuator.max_opening for joint in second.arm.joints]
     true = [joint.actuator.max_opening for joint in load_arm(place / "machine" / "arm.yaml").joints]
     assert np.all(np.abs(np.log(np.array(openings) / true)) < np.log(2.5))
-
-
-def test_a_fit_and_what_follows_run(place: Path, tmp_path: Path):
-    logs = sorted(place.glob("move_*.csv"))[:1]
-    hyd = hydroid.fit_hyd(logs, out=tmp_path / "hyd", config=place / "mine" / "fit.yaml", set=QUICK)
-    units = {name: one.unit for name, one in hyd.results[0].summary.estimate.items()}
-    assert {units[f"size_{name}"] for name in ("swing", "boom", "stick")} == {"cm³/rad"}
-    assert {"M_boom", "open_A_boom", "lag_boom"} <= set(units)
-    hydroid.view(hyd.best.folder, actuator=3, out=tmp_path / "actuator")
-    hydroid.simulate(logs[0], fit=hyd.best.folder, out=tmp_path / "again.csv")
-    assert (tmp_path / "again.csv").read_text().startswith("t_ms,")
-    plant = hydroid.load_plant(hyd.best.folder)
-    assert plant.step(np.array([50.0, 0, 0])).shape == (3,)
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.text import Text
 from report_fits import make_fit, make_problem, make_uncertainty
 
 from hydroid.fitting.validation import fitted
@@ -217,14 +216,6 @@ def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
         before = dict(mpl.rcParams)
         assert drawn() == plain
         assert dict(mpl.rcParams) == before
-
-
-def test_a_dollar_in_a_name_is_a_dollar():
-    problem = make_problem(("a$x^2$.csv",))
-    drawn = figure(draw(responses(problem, make_fit(problem))[0]))
-    named = [text for text in drawn.findobj(Text) if "$" in text.get_text()]
-    assert named
-    assert not any(text.get_parse_math() for text in named)
 
 
 @pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])

@@ -4,9 +4,6 @@ import errno
 import os
 import resource
 import shutil
-import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import step_log
+from small_fits import TRUTH, Watcher
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
@@ -32,21 +30,6 @@ SMALL = {
     "refinement": None,
     "objective.segments": {"equal": 2},
 }
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
-
-
-class Watcher:
-    """Stops a fit after so many generations."""
-
-    def __init__(self, stop_at: int = 0) -> None:
-        self.stop_at = stop_at
-
-    def generation(self, row) -> None:
-        if row[0] == self.stop_at:
-            raise KeyboardInterrupt
-
-    def refining(self, simulated: int, rms: float) -> None:
-        pass
 
 
 @pytest.fixture(scope="module")
@@ -262,25 +245,6 @@ def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
     with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
         fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
     fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
-
-
-def test_a_killed_process_leaves_no_lock(tmp_path):
-    code = f"""
-import pathlib, time
-from hydroid.run.lock import locked
-with locked(pathlib.Path({str(tmp_path)!r})):
-    print("held", flush=True)
-    time.sleep(60)
-"""
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "held\n"
-    with pytest.raises(RunError, match=f"in use by process {process.pid} on "), locked(tmp_path):
-        pass
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    with locked(tmp_path):
-        pass
 
 
 def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 import hydroid
-from hydroid.assets import assets, find_config
+from hydroid.assets import find_config
 from hydroid.errors import SettingsError
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.fit import FitSettings
@@ -46,6 +46,7 @@ def test_overrides_replace_one_setting(tmp_path: Path):
     ("text", "says"),
     [
         (MINIMAL + "sarch: {}\n", ["line 7", "unknown setting 'sarch'; did you mean 'search'?"]),
+        (MINIMAL.replace("parameters", "paramters"), ["unknown setting 'paramters'"]),
         (MINIMAL.replace("link1", "2"), ["line 5", "parameters.M1.link"]),
         (MINIMAL.replace("[1, 2]", "[2, 1]"), ["line 3", "lower < upper"]),
         (MINIMAL.replace("bounds: [1, 2]", "x: 1"), ["unknown setting 'parameters.M1.x'"]),
@@ -107,30 +108,6 @@ def test_numbers_may_be_written_in_any_way_yaml_knows(tmp_path: Path):
     assert (settings.log.delay_s, settings.log.repair_s) == (1.0, 0.1)
     assert settings.objective.weights == {2: 1000.0, 3: 2.0, 4: 5.0}
     assert settings.objective.norm == "inf"
-
-
-def test_a_misspelt_setting_is_named_before_the_one_that_is_missing_for_it(tmp_path: Path):
-    with pytest.raises(SettingsError, match="unknown setting 'paramters'"):
-        load(written(tmp_path, MINIMAL.replace("parameters", "paramters")), FitSettings)
-
-
-def test_an_unknown_config_lists_the_shipped_ones():
-    with pytest.raises(SettingsError, match="fit-mech") as caught:
-        find_config("nonsense")
-    assert "nonsense" in str(caught.value)
-
-
-def test_yaml_cannot_run_code(tmp_path: Path):
-    target = tmp_path / "made"
-    path = written(tmp_path, f'parameters: !!python/object/apply:os.mkdir ["{target}"]\n')
-    with pytest.raises(SettingsError):
-        load(path, FitSettings)
-    assert not target.exists()
-
-
-def test_the_assets_are_where_they_should_be():
-    for folder in ("models", "meshes", "configs"):
-        assert any((assets() / folder).iterdir())
 
 
 NAMED = """

@@ -53,11 +53,3 @@ def test_a_killed_study_ends_the_same(tmp_path: Path):
     assert workers
     for pid in workers:
         assert not (Path("/proc") / str(pid)).exists()
-
-
-@pytest.mark.slow
-def test_dask_and_processes_come_to_the_same(tmp_path: Path):
-    file = written(tmp_path, seeds=1)
-    assert start(file, tmp_path / "here", "-q").wait(timeout=300) == 0
-    assert start(file, tmp_path / "there", "-q", "--dask", "local:2").wait(timeout=300) == 0
-    assert content(tmp_path / "there") == content(tmp_path / "here")

@@ -86,20 +86,6 @@ def test_a_row_does_not_depend_on_its_neighbours_to_the_last_bit(moving):
             assert some[field].tobytes() == value[rows].tobytes()
 
 
-def test_only_what_moves_is_left():
-    locked = lock(SPEC, ARM, ["wrist", "shoulder"], ARM.pose("study"))
-    model = locked.model
-    assert locked.joints == ("shoulder", "wrist")
-    assert [model.joint(k).name for k in range(2)] == ["shoulder", "wrist"]
-    assert (model.nbody, model.nq, model.nv, model.nu) == (3, 2, 2, 0)
-    assert model.ngeom == model.nmesh == model.nsite == model.ntendon == model.nkey == 0
-    for off in (mujoco.mjtDisableBit.mjDSBL_CONTACT, mujoco.mjtDisableBit.mjDSBL_AUTORESET):
-        assert model.opt.disableflags & off.value
-    assert model.opt.timestep == FULL.opt.timestep
-    np.testing.assert_array_equal(model.jnt_range, FULL.jnt_range[[1, 4]])
-    assert model.jnt_limited.all()
-
-
 def test_what_a_users_model_says_of_its_joints_is_kept():
     spec = SPEC.copy()
     wrist = spec.joint("wrist")

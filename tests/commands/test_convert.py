@@ -6,19 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from log_files import NAMES, cells
-from log_formats import write_mat, write_parquet
+from log_formats import write_parquet
 from typer.testing import CliRunner
 
 import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import SettingsError
-from hydroid.log import read_log
 from hydroid.settings.log import LogSettings
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
 EXCAVATOR = ROOT / "examples" / "excavator"
-WIDE = np.full((2, 2), np.inf) * [-1, 1]
 
 
 @pytest.mark.parametrize("name", ["fit_01", "check_04"])
@@ -44,17 +42,6 @@ def test_a_guessed_log_reads_back_to_the_same_bits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.angle, log.angle)
     assert done.result.guess is not None
     assert len(done.result.guess.reasons) == 15
-
-
-def test_a_matlab_file_with_names_of_its_own(tmp_path: Path) -> None:
-    time, *signals = cells(300).T
-    names = ("zeit", "valve_1", "valve_2", "winkel_1", "winkel_2")
-    columns = dict(zip(names, (time, *signals), strict=True))
-    write_mat(tmp_path / "log.mat", columns | {"valve_1": signals[0] / 10, "valve_2": signals[1] / 10})
-    hydroid.convert(tmp_path / "log.mat", out=tmp_path / "log.csv")
-    log, findings = read_log(tmp_path / "log.csv", LogSettings(), WIDE)
-    assert [f for f in findings if f.level == "error"] == []
-    np.testing.assert_allclose(log.command, np.array(signals[:2]).T, rtol=1e-15)
 
 
 def test_the_command_prints_each_guess_and_json(tmp_path: Path) -> None:

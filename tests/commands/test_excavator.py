@@ -26,14 +26,6 @@ def test_all_logs_are_read_without_repair(settings, caplog: pytest.LogCaptureFix
     assert {log.period for log in logs} == {0.05}
 
 
-def test_the_notice_travels_with_the_logs():
-    assert "MIT License" in (FOLDER / "LICENSE").read_text(encoding="utf-8")
-    page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    assert "EfficientTrack" in page
-    assert "ZiqingZou" in page
-    assert "geometry is ours" in page.replace("\n", " ")
-
-
 def test_a_short_fit_of_two_logs_needs_no_stage_1(tmp_path: Path):
     """What `make excavator` does, on two logs and for a few steps."""
     quick = {

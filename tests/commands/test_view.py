@@ -86,18 +86,6 @@ def test_an_arm_that_is_none_is_refused(model: IdentifiedModel, study_log: Log):
         hydroid.simulate(study_log, fit=model, arm="middle", out=None)
 
 
-def test_a_crossing_is_found_and_only_beside_another_arm(arm: Arm):
-    alone, beside, both = (
-        hydroid.view(crossing(arm), collisions=True, config="fit-mech", arm=which).result
-        for which in (None, "right", "both")
-    )
-    assert not alone.meetings
-    assert {beside.meetings[0].first[:5], beside.meetings[0].second[:4]} == {"right", "left"}
-    assert beside.distance == pytest.approx(beside.distance[::-1], abs=1e-6)  # there and back
-    # mirror images meet in the middle, so sooner, and half as far round
-    assert both.meetings[0].begins < beside.meetings[0].begins
-
-
 def test_the_exit_status_says_whether_bodies_meet(arm: Arm, hydroid_cli: Run):
     log = crossing(arm)
     degrees = np.column_stack([log.time, np.degrees(log.angle[:, :2])])

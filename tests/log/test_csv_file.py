@@ -85,13 +85,12 @@ def test_a_file_that_is_no_log(data: bytes, said: str, tmp_path: Path) -> None:
         read(file)
 
 
-def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="No such file"):
-        read(tmp_path / "none.csv")
-    with pytest.raises(LogError, match="directory"):
-        read(tmp_path)
-    with pytest.raises(LogError, match="cannot be read"):
-        read(Path("null\0byte.csv"))
+@pytest.mark.parametrize(
+    ("name", "said"), [("none.csv", "No such file"), (".", "directory"), ("null\0byte.csv", "cannot be read")]
+)
+def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=said):
+        read(tmp_path / name)
 
 
 def test_the_line_of_a_fault_counts_comments_and_blank_lines(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_structs_of_matlab(kind: str, tmp_path: Path) -> None:
         same(log, tmp_path)
 
 
-def test_timestamps_and_null_in_parquet(tmp_path: Path) -> None:
+def test_timestamps_in_parquet(tmp_path: Path) -> None:
     import pyarrow
 
     stamps = pyarrow.array(
@@ -93,18 +93,6 @@ def test_timestamps_and_null_in_parquet(tmp_path: Path) -> None:
     log, findings = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
     assert findings == []
     same(log, tmp_path)
-    gone = pyarrow.array([None, *COLUMNS["u1_pct"][1:]])
-    (fault,) = faults(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "u1_pct": gone}))
-    assert (fault.line, fault.column) == (1, "u1_pct")
-    assert ", row 1, column" in fault.where
-    assert fault.what == "no value is there"
-
-
-def test_a_faulty_value_has_its_row(tmp_path: Path) -> None:
-    angle = COLUMNS["q1_deg"].copy()
-    angle[40] = 120
-    (fault,) = faults(write_mat(tmp_path / "log.mat", {**COLUMNS, "q1_deg": angle}))
-    assert "log.mat, row 41, column q1_deg: angle of joint 1 is 120 deg" in str(fault)
 
 
 def truncated(path: Path) -> Path:
@@ -127,6 +115,14 @@ BAD = {
     "text in parquet": (
         lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": ["up"] * 80}),
         "column u1_pct: holds text, such as 'up'",
+    ),
+    "no value in parquet": (
+        lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": [None, *COLUMNS["u1_pct"][1:]]}),
+        "row 1, column u1_pct: no value is there",
+    ),
+    "out of the range": (
+        lambda p: write_mat(p / "log.mat", {**COLUMNS, "q1_deg": np.where(T == 0.4, 120, COLUMNS["q1_deg"])}),
+        "log.mat, row 41, column q1_deg: angle of joint 1 is 120 deg",
     ),
     "other length": (
         lambda p: write_mat(p / "log.mat", {**COLUMNS, "q2_deg": T[:40]}),

@@ -21,16 +21,6 @@ def guess(folder: Path, names: list[str], *columns: np.ndarray, above: str = "")
     return guess_columns(open_table(path), JOINTS)
 
 
-def test_the_default_names(tmp_path: Path) -> None:
-    found = guess(tmp_path, ["time_s", "u2_pct", "q2_deg"], T, STEPS, SWEEP)
-    assert found.log["time"] == {"column": "time_s", "unit": "s"}
-    assert found.log["period_s"] == 0.02
-    assert found.log["joints"] == {
-        2: {"command": {"column": "u2_pct"}, "angle": {"column": "q2_deg", "unit": "deg"}}
-    }
-    assert found.unused == ()
-
-
 @pytest.mark.parametrize(
     ("scale", "offset", "unit", "entry"),
     [

@@ -23,14 +23,6 @@ def log_of(dead=0.0, lag=0.0, sign=1.0, speed=0.5):
     return Log("a", time, command[:, None], angle[:, None], PERIOD)
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.1, 0.4])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_sign_and_lag_are_found(lag, sign):
-    motion = JointMotion(log_of(lag=lag, sign=sign), 1)
-    assert motion.turned == (sign < 0)
-    assert motion.follows(1)[1] == pytest.approx(lag, abs=0.06)
-
-
 @pytest.mark.parametrize("dead", [0.0, 20.0, 50.0])
 def test_a_dead_band_is_found(dead):
     assert JointMotion(log_of(dead=dead, lag=0.1), 1).dead_band == pytest.approx(dead + 5, abs=6)

@@ -1,11 +1,6 @@
-from pathlib import Path
-
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hydroid.errors import SettingsError
-from hydroid.settings.load import load
 from hydroid.settings.log import ColumnMap, LogSettings
 
 names = st.text("abcxyz_ []°", min_size=1, max_size=6)
@@ -45,31 +40,3 @@ def test_a_joint_inherits_what_it_does_not_say() -> None:
     assert settings.columns("angle", 3) == ColumnMap(("elbow",), "rad")
     assert settings.columns("command", 4) is None
     assert settings.columns("angle", 4) is None
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("command: {column: u}", "{joint}"),
-        ("angle: {column: q}", "{joint}"),
-        ("command: {column: [a, b, c]}", "1 or 2 column names"),
-        ("angle: {unit: bar}", "bar is no unit of a log's angles"),
-        ("command: {column: 3}", "a column's name"),
-        ("command: {scale: 0}", "must not be 0"),
-        ("angle: {unit: grad}", "'deg', 'rad'"),
-        ("time: {unit: week}", "'h' or 'day'"),
-        ("joints: {0: null}", "at least 1"),
-        ("joints: {2: u2}", "joints.2"),
-        ("joints: {2: {comand: null}}", "comand"),
-        ("joints: [1, 2]", "joints"),
-        ("period_s: 0", "period_s"),
-        ("delay_s: .nan", "delay_s"),
-        ("periods: 0.01", "unknown setting 'periods'"),
-    ],
-)
-def test_a_setting_that_is_not_allowed_is_refused_by_name(text: str, said: str, tmp_path: Path) -> None:
-    file = tmp_path / "log.yaml"
-    file.write_text(text)
-    with pytest.raises(SettingsError, match="line 1") as caught:
-        load(file, LogSettings)
-    assert said in str(caught.value)

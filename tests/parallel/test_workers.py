@@ -2,7 +2,6 @@
 
 import gc
 import os
-import stat
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from worker_targets import Rows
 
 from hydroid.errors import ModelError, RunError, SettingsError
 from hydroid.parallel import cluster, workers
-from hydroid.parallel.cluster import open_workers, write_credentials
+from hydroid.parallel.cluster import open_workers
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem
 
@@ -141,12 +140,3 @@ def test_no_workers_no_slurm_and_no_dask(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SettingsError, match=r"pip install 'hydroid\[cluster\]'"):
         opened("local")
-
-
-def test_only_the_user_can_read_credentials(tmp_path: Path):
-    folder = tmp_path / "private"
-    write_credentials(folder)
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-    assert "BEGIN CERTIFICATE" in (folder / "distributed.yaml").read_text()
-    with pytest.raises(FileExistsError):
-        write_credentials(folder)

@@ -1,15 +1,12 @@
 """An actuator's curves: what is drawn obeys the laws that it draws."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel, load_identified
-from hydroid.reporting.actuator_report import JointActuator, actuator_page, draw, joint_actuator
+from hydroid.reporting.actuator_report import JointActuator, draw, joint_actuator
 from hydroid.reporting.chart import Panel
-from hydroid.reporting.page_file import write_page
 
 SETTINGS = {"hydraulics.overlap_a": 0.4, "hydraulics.flow_limit": 2.0, "parameters.I_max.fixed": 1.2}
 
@@ -72,12 +69,6 @@ def test_the_torque_is_largest_where_the_moment_arm_is(actuator: JointActuator):
     angle, torque = curve(actuator, "torque", "A at supply")
     arm = actuator.joint.actuator.moment_arm(np.radians(angle))
     assert torque == pytest.approx(arm * (1000e-6 * 150e5 - 750e-6 * 5e5))
-
-
-def test_a_rotary_joint_is_drawn_too(tmp_path: Path):
-    page = actuator_page(joint_actuator(nominal(SETTINGS), 4))
-    written = write_page(page, tmp_path)
-    assert {path.name for path in written} == {"actuator.html"}
 
 
 def test_a_set_without_a_force_stroke_curve_is_refused_in_words():

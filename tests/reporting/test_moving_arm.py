@@ -32,13 +32,6 @@ def moved(model: mujoco.MjModel, error=ERROR, most: int = MOST) -> MovingArm:
     return moving_arm(model, ARM.joint_names, predicted(LOG.angle[:, [1, 2]] - error), most)
 
 
-def test_a_part_for_each_joint_that_moves_and_one_that_stands(model):
-    arm = moved(model)
-    assert len(arm.poses["measured"]) == 3
-    assert [len(part) for part in arm.poses["measured"]] == [1, len(arm.time), len(arm.time)]
-    assert {shape.body for shape in arm.shapes} == {0, 1, 2}
-
-
 def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
     arm, data = moved(model), mujoco.MjData(model)
     address = [int(model.joint(name).qposadr[0]) for name in ARM.joint_names]

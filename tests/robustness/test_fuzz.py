@@ -86,19 +86,6 @@ def test_hostile_logs_are_refused_at_once(room: Path, data: bytes) -> None:
     assert time.perf_counter() - started < 10
 
 
-CELLS = st.floats().map(repr) | st.floats(-99, 99).map(lambda x: f"{x:.3f}") | st.text(max_size=6)
-
-
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(
-    st.lists(st.lists(CELLS, min_size=15, max_size=15), max_size=4), st.sampled_from(",;\t"), st.booleans()
-)
-def test_logs_of_any_cells(room: Path, rows: list[list[str]], separator: str, header: bool) -> None:
-    names = HEADER.decode().split(",")
-    lines = [separator.join(row) for row in ([names] if header else []) + rows]
-    KINDS["log"].read(room, "\n".join(lines).encode("utf-8", "surrogatepass"))
-
-
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
 TREES = st.recursive(
     LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner)
@@ -111,12 +98,6 @@ def test_settings_of_any_value(key: str, value: object) -> None:
     whole = {"parameters": {"K": {"quantity": "gain", "fixed": 1.0}}} | {key: value}
     with suppress(SettingsError):  # whose message is one line; nothing else may be raised
         validate(whole, FitSettings, "f.yaml")
-
-
-@settings(max_examples=30, deadline=None, derandomize=True)
-@given(st.text(max_size=30))
-def test_overrides_of_any_text(room: Path, text: str) -> None:
-    KINDS["set"].read(room, text.encode("utf-8", "replace"))
 
 
 @pytest.mark.parametrize(

@@ -137,26 +137,16 @@ def test_the_checkpoint_of_another_run_is_refused(folder, made, tmp_path):
         other.checkpoints()
 
 
-def full_at_fsync(monkeypatch):
-    """A full disk behind a network is told as late as this."""
+def test_a_full_disk_leaves_both_checkpoints(folder, monkeypatch):
+    """A full disk behind a network is told as late as at the last call."""
 
     def fsync(handle: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", fsync)
-
-
-@pytest.mark.parametrize("fault", ["no room", "at fsync"])
-def test_a_full_disk_leaves_both_checkpoints(folder, made, fault, monkeypatch):
     before = content(folder.path)
-    checkpoints = folder.checkpoints()
-    if fault == "no room":
-        with files_up_to(1000), pytest.raises(RunError, match=r"checkpoint\.npz: cannot be written"):
-            checkpoints["search"] = stored(3)
-    else:
-        full_at_fsync(monkeypatch)
-        with pytest.raises(RunError, match="No space left"):
-            checkpoints["search"] = stored(3)
+    with pytest.raises(RunError, match="No space left"):
+        folder.checkpoints()["search"] = stored(3)
     assert content(folder.path) == before
     assert same(folder, 2)
 
@@ -255,26 +245,3 @@ def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):
     with locked(tmp_path):
         pass
     assert "no lock on this file system" in caplog.text
-
-
-def test_a_run_tells_its_course_in_its_log(made, tmp_path):
-    settings, _arm, path, _ = made
-    with pytest.raises(KeyboardInterrupt):
-        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
-    fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
-    lines = (tmp_path / "run" / "run.log").read_text().splitlines()
-    for words in (
-        "mujoco",
-        f"process {os.getpid()}",
-        "seed 1",
-        str(path),
-        "checkpoint: generation 2 of 4",
-        "interrupted",
-        "resumed from search",
-        "checkpoint: generation 4 of 4",
-        "done in",
-    ):
-        assert any(words in line for line in lines), words
-    times, levels = zip(*(line.split()[:2] for line in lines), strict=True)
-    assert set(levels) == {"INFO"}
-    assert all(len(time) == len("2026-01-01T00:00:00+0000") for time in times)

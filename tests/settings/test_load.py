@@ -42,6 +42,23 @@ def test_overrides_replace_one_setting(tmp_path: Path):
     assert settings.parameters["M1"].link == "link1"
 
 
+LOG_FAULTS = [
+    ("command: {column: u}", "{joint}"),
+    ("angle: {column: q}", "{joint}"),
+    ("command: {column: [a, b, c]}", "1 or 2 column names"),
+    ("command: {column: 3}", "a column's name"),
+    ("command: {scale: 0}", "must not be 0"),
+    ("angle: {unit: bar}", "bar is no unit of a log's angles"),
+    ("angle: {unit: grad}", "'deg', 'rad'"),
+    ("time: {unit: week}", "'h' or 'day'"),
+    ("joints: {0: null}", "at least 1"),
+    ("joints: {2: u2}", "joints.2"),
+    ("joints: [1, 2]", "joints"),
+    ("period_s: 0", "period_s"),
+]
+"""settings of `log`, and what is said of them"""
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -67,6 +84,7 @@ def test_overrides_replace_one_setting(tmp_path: Path):
         (MINIMAL + "search: {seed: '3'}\n", ["search.seed: must be a whole number (given: '3')"]),
         (MINIMAL + "log: {delay_s: false}\n", ["log.delay_s: must be a number (given: false)"]),
         (MINIMAL + "log: {delay_s: '0.1'}\n", ["log.delay_s: must be a number (given: '0.1')"]),
+        *((MINIMAL + f"log: {{{text}}}\n", ["line 7", says]) for text, says in LOG_FAULTS),
         (MINIMAL + "joint_refinement: 1\n", ["joint_refinement: must be true or false (given: 1)"]),
         (MINIMAL + "joint_refinement: yes\n", ["joint_refinement: must be true or false (given: 'yes')"]),
         (MINIMAL + "outputs: 2\n", ["outputs: must be a list in brackets"]),
@@ -100,14 +118,6 @@ def test_a_fault_in_an_override_names_the_override(tmp_path: Path, key: str, val
 def test_a_malformed_override_is_refused(text: str):
     with pytest.raises(SettingsError, match="--set"):
         parse_override(text)
-
-
-def test_numbers_may_be_written_in_any_way_yaml_knows(tmp_path: Path):
-    text = MINIMAL + "log: {delay_s: 1, repair_s: 1e-1}\nobjective: {weights: {2: 1e3, 3: 2}, norm: .inf}\n"
-    settings = load(written(tmp_path, text), FitSettings, {"objective.weights.4": 5})
-    assert (settings.log.delay_s, settings.log.repair_s) == (1.0, 0.1)
-    assert settings.objective.weights == {2: 1000.0, 3: 2.0, 4: 5.0}
-    assert settings.objective.norm == "inf"
 
 
 NAMED = """

@@ -199,26 +199,3 @@ def test_what_cannot_be_shown_is_refused(nominal: IdentifiedModel, study_log: Lo
         film.check_kind(Path("a.avi"))
     with pytest.raises(SettingsError, match="commands nothing"):
         simulated_motion(nominal, {"alone": step_log(study_log.start, [0.0])})
-
-
-def test_two_arms_move_as_mirror_images(nominal: IdentifiedModel, study_log: Log):
-    both = simulated_motion(nominal, {"right": study_log, "left": study_log})
-    np.testing.assert_array_equal(both.simulated[:, :7], both.simulated[:, 7:])
-    assert [signals.name for signals in both.signals] == ["both shoulder"]
-    one = simulated_motion(nominal, {"left": study_log})
-    assert np.ptp(one.simulated[:, :7], axis=0).max() == 0  # the other arm rests
-    np.testing.assert_array_equal(one.simulated[:, 7:], both.simulated[:, 7:])
-    pressure = one.signals[0].pressure["simulated"]
-    assert 1 < pressure.min() < pressure.max() < 400
-
-
-def test_the_window_shows_the_ghost_anew_in_every_picture(nominal: IdentifiedModel, study_log: Log):
-    bent = study_log.angle + np.linspace(0, 0.5, len(study_log.time))[:, None]
-    playback = Replay(simulated_motion(nominal, {"alone": replace(study_log, angle=bent)}))
-    viewer = played(playback, 5)
-    assert viewer.drawn[0] > 7  # links and cylinders
-    assert len(set(viewer.drawn)) == 1
-    names, values = viewer.texts[-1][2:]
-    assert names.splitlines() == ["time", "shoulder"]
-    assert "(log " in values
-    assert values.endswith(" bar")

@@ -4,10 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from page import DOCS, page, read_rows
-from statements import local_minima, ranking, turning_points
+from statements import ranking
 from studies import ArticleStudy, Plan, load_studies
 
 from hydroid.posterior.jacobian import jacobian
@@ -58,17 +57,6 @@ def test_the_page_is_what_the_committed_results_say():
     for study in STUDIES.values():
         for claim in study.claims:  # in the table of all, and with its numbers in the study's part
             assert text.count(claim.says) >= 2
-
-
-def test_peaks_and_troughs_of_a_sine_are_counted_without_its_ripple():
-    time = np.linspace(0, 4, 4001)
-    assert turning_points(np.sin(2 * np.pi * time) + 0.02 * np.sin(200 * time)) == 8
-
-
-def test_minima_of_two_valleys_are_two():
-    x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(-1, 1, 11), indexing="ij")
-    assert local_minima((x**2 - 1) ** 2 + y**2) == 2
-    assert local_minima(x**2 + y**2) == 1
 
 
 def test_an_order_of_effects_holds_or_is_contradicted():

@@ -183,14 +183,6 @@ def test_an_impossible_inertia_is_that_of_the_mesh(tmp_path, fault):
     np.testing.assert_allclose(model.body("boom").ipos, [1, 0, 0], atol=1e-9)
 
 
-def test_an_open_mesh_counts_by_its_hull(tmp_path):
-    path = write_robot(tmp_path, boom=link("boom", ixx=0, iyy=0, izz=0))
-    box = trimesh.load(tmp_path / "digger/meshes/boom.stl", force="mesh")
-    box.update_faces(np.arange(len(box.faces)) > 1)
-    (tmp_path / "digger/meshes/boom.stl").write_bytes(box.export(file_type="stl"))
-    assert "the inertia of its mesh's hull" in said(import_arm(path), "link boom: its inertia is 0")
-
-
 def test_meshes_in_millimetres_are_scaled(tmp_path):
     arm = import_arm(write_robot(tmp_path, scale=1000.0))
     line = said(arm, "mesh boom.stl would be 2000 m long: all meshes are taken to be in mm")

@@ -110,24 +110,6 @@ def test_runs_that_cannot_be_used_are_named_and_left_out(runs, caplog, tmp_path:
         hydroid.report(["seed-*"], merge=True, out="seed-3")
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        {"estimates": {}},
-        {"estimates": {"best": {"rms_deg": -1.0, "values": TRUTH}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": None, "values": TRUTH}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": 1.0, "values": TRUTH | {"K": "x"}}}, "final": "best"},
-        {"estimates": {"best": {"rms_deg": 10**400, "values": TRUTH}}, "final": "best"},
-        {"final": ["best"]},
-    ],
-)
-def test_a_damaged_estimate_is_left_out(runs, caplog, damage: dict[str, object]):
-    change(Path("seed-2/estimate.yaml"), **damage)
-    seeds, (warnings,) = collected(caplog, "seed-*")
-    assert seeds == [1, 3]
-    assert warnings.startswith("left out: seed-2/estimate.yaml")
-
-
 def test_a_seed_counts_once(runs, caplog):
     shutil.copytree("seed-2", "again")
     seeds, warnings = collected(caplog, "seed-*", "again")

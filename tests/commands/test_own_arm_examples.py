@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import hydroid
 from hydroid.commands.app import app
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -66,3 +67,11 @@ def test_the_urdf_and_its_meshes_are_what_the_script_makes():
 )
 def test_what_is_made_up_is_called_so(name: str, words: str):
     assert words in " ".join((EXAMPLES / name / "README.md").read_text(encoding="utf-8").split())
+
+
+def test_all_logs_of_the_excavator_are_read_without_repair():
+    files = sorted((EXAMPLES / "excavator").glob("*_*.csv"))
+    assert len(files) == 18
+    logs = hydroid.read_logs(files, hydroid.load_settings(EXAMPLES / "excavator" / "fit.yaml"))
+    assert all(log.driven.all() and log.measured.all() for log in logs)
+    assert {log.period for log in logs} == {0.05}

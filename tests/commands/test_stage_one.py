@@ -70,26 +70,3 @@ def test_a_config_that_names_its_own_layout_and_arm_keeps_them(tmp_path: Path):
     assert settings.log.time.column == "clock"
     assert settings.log.delay_s == 0.1
     assert settings.arm.model == (ROOT / "models" / "hydrolek.xml").resolve()
-
-
-def test_the_masses_of_an_own_arm_come_from_stage_one(tmp_path: Path):
-    text = (ROOT / "models" / "hydrolek.xml").read_text().replace('body name="link3"', 'body name="forearm"')
-    (tmp_path / "arm.xml").write_text(text.replace('meshdir="../meshes"', f'meshdir="{ROOT / "meshes"}"'))
-    arm = yaml.safe_load((ROOT / "configs" / "hydrolek.yaml").read_text()) | {
-        "model": "arm.xml",
-        "pair": None,
-    }
-    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(arm))
-    settings = yaml.safe_load((ROOT / "configs" / "fit-mech.yaml").read_text())
-    settings["arm"] = str(tmp_path / "arm.yaml")
-    settings["parameters"]["M_forearm"] = settings["parameters"].pop("M3") | {"link": "forearm"}
-    (tmp_path / "mech.yaml").write_text(yaml.safe_dump(settings))
-    first = hydroid.load_settings(tmp_path / "mech.yaml")
-    write_settings(tmp_path / "mech", first)
-    values = {name.replace("M3", "M_forearm"): value for name, value in VALUES.items()} | {"K": 1.0}
-    estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in values.items()}
-    write_estimate(tmp_path / "mech", FitSummary(stage="mech", estimate=estimate, final="best"))
-    second = hydroid.load_settings("fit-hyd", with_mechanics(tmp_path / "mech", "fit-hyd", {}, ["a.csv"]))
-    assert "M3" not in second.parameters
-    assert second.parameters["M_forearm"].link == "forearm"
-    assert second.parameters["M_forearm"].fixed == VALUES["M3"]

@@ -2,6 +2,7 @@
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import yaml
 
 from hydroid.commands.app import COMMANDS as NAMES
 from hydroid.commands.app import click_command
+from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.settings.log import LogSettings
 
 ROOT = Path(__file__).parents[2]
@@ -110,3 +112,12 @@ def test_what_the_pages_show_runs(tmp_path: Path):
         for where, command in (*shell, (name, [sys.executable, "-c", code])):
             done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
             assert done.returncode == 0, f"{where}\n{done.stderr[-2000:]}"
+
+
+def test_the_page_of_settings_is_up_to_date_and_describes_each_of_them():
+    script = runpy.run_path(str(ROOT / "docs" / "settings_reference.py"))
+    page = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
+    assert page == script["reference"](), "write it again with `make docs`"
+    assert script["undescribed"]() == []
+    assert all(q.meaning for q in QUANTITIES.values() if q.name not in MECHANICAL)
+    assert QUANTITIES["flow_limit"].factor == 1e-3 / 60

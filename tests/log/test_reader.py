@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import NAMES, RIG, RIG_RANGES, cells, faults, lines, read, save
+from log_files import RIG, RIG_RANGES, cells, faults, lines, read, save
 
 from hydroid.errors import LogError
 from hydroid.log import read_log
@@ -115,27 +115,6 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
         read(path)
 
 
-def test_a_fault_in_many_rows_is_one_finding_that_counts_them(tmp_path: Path) -> None:
-    def spoil(rows: list[list[str]]) -> None:
-        for row in rows[5:]:
-            row[1] = "NaN"
-
-    (fault,) = faults(edited(tmp_path, spoil))
-    assert (fault.line, fault.column) == (6, "u1_pct")
-    assert "75 more rows, to line 81" in fault.what
-
-
-def test_time_in_milliseconds_and_from_any_start(tmp_path: Path) -> None:
-    values = cells()
-    plain, _ = read(save(tmp_path / "a.csv", lines(values)))
-    values[:, 0] = 1000 * values[:, 0] + 1_700_000_000_000
-    rows: list[list[str]] = [[*NAMES], *([f"{t:.3f}", *(f"{x:.10g}" for x in row)] for t, *row in values)]
-    log, findings = read(save(tmp_path / "b.csv", rows), LogSettings.model_validate({"time": {"unit": "ms"}}))
-    assert findings == []
-    np.testing.assert_array_equal(log.time, plain.time)
-    np.testing.assert_array_equal(log.angle, plain.angle)
-
-
 @pytest.mark.parametrize(
     "stamp",
     [
@@ -181,27 +160,6 @@ def test_commands_alone_are_enough_where_angles_are_not_required(tmp_path: Path)
     assert log.driven.all()
 
 
-def test_two_columns_scale_and_offset_make_one_command(tmp_path: Path) -> None:
-    """4 to 20 mA, one column a direction; the angle in rad, logged the other way around."""
-    values, table = cells(), lines(cells())
-    for row, (_, u1, _, q1, _) in zip(table[1:], values, strict=True):
-        row[1:4] = [f"{4 + 0.16 * max(s * u1, 0):.12g}" for s in (1, -1)] + [f"{1 - np.deg2rad(q1):.12g}"]
-    mapping = {
-        1: {
-            "command": {"column": ["u1_pct", "u2_pct"], "scale": 6.25, "offset": -25},
-            "angle": {"unit": "rad", "scale": -1, "offset": 1},
-        },
-        2: {"command": None},
-    }
-    log, _ = read(save(tmp_path / "log.csv", table), LogSettings.model_validate({"joints": mapping}))
-    np.testing.assert_allclose(log.command[:, 0], values[:, 1], atol=1e-9)
-    np.testing.assert_allclose(log.angle[:, 0], np.deg2rad(values[:, 3]), atol=1e-9)
-    table[40][2] = "3.9"
-    (fault,) = faults(save(tmp_path / "log.csv", table), LogSettings.model_validate({"joints": mapping}))
-    assert (fault.line, fault.column) == (41, "u2_pct")
-    assert "allowed are 0 to 100 %" in fault.what
-
-
 def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
     settings = LogSettings.model_validate({"joints": {5: None}})
     with pytest.raises(LogError, match=r"log\.joints\.5: the arm has joints 1 to 2"):
@@ -233,3 +191,22 @@ def test_a_jittering_clock_needs_no_repair_and_shifts_nothing(tmp_path: Path) ->
     gap = save(tmp_path / "gap.csv", lines(np.delete(values, np.s_[50:52], axis=0)))
     assert "--repair" in str(faults(gap, LogSettings(period_s=0.05))[0])
     assert len(read(gap, LogSettings(period_s=0.05, repair_s=0.2), repair=True)[0].time) == len(log.time)
+
+
+def test_a_resampled_log_is_said_to_be(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.csv", lines(cells(60, 0.02)))
+    log, findings = read(path)
+    assert len(log.time) == 119
+    assert [f.what for f in findings] == ["resampled from steps of 0.02 s to 0.01 s"]
+    log, findings = read(path, LogSettings(period_s=0.02))
+    assert len(log.time) == 60
+    assert findings == []
+
+
+def test_the_delay_setting_moves_the_command_only(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.csv", lines(cells()))
+    plain, _ = read(path)
+    late, _ = read(path, LogSettings(delay_s=0.07))
+    np.testing.assert_array_equal(late.command[7:], plain.command[:-7])
+    np.testing.assert_array_equal(late.command[:7], 0)
+    np.testing.assert_array_equal(late.angle, plain.angle)

@@ -4,9 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from log_files import RIG, RIG_RANGES
 from wrong_logs import ROOT, WRONG, Wrong, boom, rig, save, told
 
 import hydroid
+from hydroid.log import check_log
+from hydroid.settings.log import LogSettings
 
 SETTINGS = hydroid.load_settings("fit-mech")
 
@@ -36,15 +39,45 @@ def test_a_stop_is_neither_a_delay_nor_another_sign(duties: list[float], stop: f
     assert not {"late", "direction"} & {*kinds}
 
 
-def test_a_finding_of_several_logs_is_said_once(tmp_path: Path) -> None:
-    many = [{n: -v if n == "u2_pct" else v for n, v in rig(rows=2000).items()} for _ in range(5)]
-    lines = told(Wrong("", "", "", lambda: many), tmp_path)
-    (line,) = [line for line in lines if "against the command" in line]
-    assert line.endswith("(and in 4 more logs: log2.csv, log3.csv, log4.csv, ...)")
-
-
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (path,) = save(Wrong("", "", "", lambda: [boom([50])]), tmp_path)
     (log,) = hydroid.check([path], config=SETTINGS).result.logs
     angle = log.log.angle[:, 1]
     assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
+
+
+LOGS = ("rig_shoulder_1", "rig_shoulder_2", "rig_all_joints_1")
+
+
+def warned(tmp_path: Path, name: str, command: float = 1.0, angle: float = 1.0, offset: float = 0.0) -> str:
+    """The warnings of a rig's log whose commands and angles are multiplied."""
+    values = np.loadtxt(RIG / f"{name}.csv", delimiter=",", skiprows=1)[:4000]
+    values[:, 1:8] *= command
+    values[:, 8:] = values[:, 8:] * angle + offset
+    with (RIG / f"{name}.csv").open() as file:
+        header = file.readline().strip()
+    path = tmp_path / "log.csv"
+    np.savetxt(path, values, fmt="%.6f", delimiter=",", header=header, comments="")
+    _, findings = check_log(path, LogSettings(angle_margin_deg=30), RIG_RANGES)
+    return " ".join(f"{f.what}; {f.hint}" for f in findings if f.level == "warning")
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_plain_logs_raise_no_suspicion(tmp_path: Path, name: str) -> None:
+    for how in ({}, {"command": 0.1}, {"angle": 0.3}, {"command": 0.01, "angle": 0.01}):
+        said = warned(tmp_path, name, **how)
+        assert "scale: 100" not in said
+        assert "unit: rad" not in said
+
+
+def test_small_motions_about_zero_are_not_taken_for_radians(tmp_path: Path) -> None:
+    """A quick shake by strong commands stays within 3 deg, and yet moves far more than radians would."""
+    time = np.arange(3000) * 0.01
+    values = np.zeros((3000, 15))
+    values[:, 0], values[:, 2] = time, 60 * np.sign(np.sin(2 * np.pi * 0.25 * time + 0.1))
+    values[:, 9] = 2.5 * np.cos(2 * np.pi * 0.25 * time)
+    names = ["time_s", *(f"u{j}_pct" for j in range(1, 8)), *(f"q{j}_deg" for j in range(1, 8))]
+    path = tmp_path / "log.csv"
+    np.savetxt(path, values, fmt="%.6f", delimiter=",", header=",".join(names), comments="")
+    _, findings = check_log(path, LogSettings(), RIG_RANGES)
+    assert not [f for f in findings if "rad" in f.hint and f.level == "warning"]

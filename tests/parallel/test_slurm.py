@@ -142,17 +142,6 @@ def test_a_requeued_run_ends_as_one_that_was_not_stopped(site: Path, monkeypatch
     assert results("runs/long") == results("runs/whole")
 
 
-def test_dask_workers_in_one_allocation_change_no_bit(site: Path):
-    options = ["log.csv", *QUICK, "--set", "search.ga.generations=3"]
-    few = ("--ntasks=2", "--mem-per-cpu=1G")
-    job = submit("dask.sbatch", "runs/wide", *options, options=few)
-    end_of(job)
-    assert "tls://" in told()  # what Dask's scheduler says of itself
-    assert not list(site.glob(".dask-*"))  # the credentials are gone
-    run("hydroid", "fit-mech", *options, "--out", "runs/whole")
-    assert results("runs/wide") == results("runs/whole")
-
-
 def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(
     site: Path, monkeypatch: pytest.MonkeyPatch
 ):

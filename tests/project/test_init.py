@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from machine import write_log
 from robots import link, write_robot
-from scipy.io import savemat
 from typer.testing import CliRunner
 
 import hydroid
@@ -77,28 +76,6 @@ def test_from_cad_and_log_to_a_validated_fit(place: Path, tmp_path: Path, monkey
     assert max(errors) < 0.5
 
 
-def test_an_mjcf_and_a_mat_file_give_the_same_settings(place: Path, tmp_path: Path):
-    """MuJoCo's own model of the arm, and the first log as MATLAB saves it: a struct of matrices."""
-    lines = (place / "move_0.csv").read_text().splitlines()
-    values = np.array([[float(cell) for cell in line.split(";")] for line in lines[1:]])
-    rec = {"time_s": values[:, 0] / 1000, "valve_V": values[:, 1:4], "q_rad": values[:, 4:7]}
-    savemat(tmp_path / "run.mat", rec)
-    shutil.copytree(place / "machine", tmp_path / "robot")
-    project = init(tmp_path / "mine", tmp_path / "robot" / "arm.xml", [tmp_path / "run.mat"])
-    found = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
-    other = hydroid.load_settings(place / "mine" / "fit.yaml")
-    assert [found.log.columns("angle", j).column for j in (1, 2, 3)] == [
-        ("q_rad[1]",),
-        ("q_rad[2]",),
-        ("q_rad[3]",),
-    ]
-    assert set(found.parameters) == set(other.parameters)
-    np.testing.assert_allclose(found.arm.masses[:3], other.arm.masses[:3])
-    read = hydroid.read_logs(tmp_path / "run.mat", found), hydroid.read_logs(place / "move_0.csv", other)
-    np.testing.assert_allclose(read[0][0].angle, read[1][0].angle, atol=1e-12)
-    assert project.commands[1].startswith("hydroid fit-hyd ")
-
-
 def test_nothing_is_overwritten(place: Path):
     before = {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
     with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder"):
@@ -134,12 +111,6 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     assert {"area_A_boom", "area_B_boom", "open_A_boom"} <= set(settings.parameters)
 
 
-def swapped(lines: list[str]) -> list[str]:
-    """Two valves' columns exchanged under their names."""
-    cells = [line.split(";") for line in lines]
-    return [lines[0], *(";".join([c[0], c[2], c[1], *c[3:]]) for c in cells[1:])]
-
-
 def scaled(column: int, factor: float, shift: float) -> Callable[[list[str]], list[str]]:
     """One column's numbers changed."""
 
@@ -166,14 +137,6 @@ CHANGED_LOGS = {
             )
         },
         [10, 10, 10],
-    ),
-    "commands of another joint": (
-        swapped,
-        {
-            "swing_joint follows the command of boom_joint": "check which columns belong together",
-            "boom_joint follows the command of swing_joint": "check which columns belong together",
-        },
-        [-10, -10, 10],
     ),
 }
 """change of a log's lines, the notes by their beginnings with what they say, and the commands' scales"""

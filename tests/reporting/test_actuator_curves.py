@@ -38,21 +38,6 @@ def test_the_force_curve_at_rated_current_runs_through_its_points(actuator: Join
         assert np.interp(at, stroke, force) == pytest.approx(expected, rel=2e-3)
 
 
-def test_a_plunger_rests_where_the_spring_meets_the_coil(actuator: JointActuator):
-    (rests,) = [m for m in panel(actuator, "force").marks if m.kind == "points" and not m.label]
-    currents = "0.3 A", "0.75 A", "0.9 A", "1.2 A"  # I_min, between, rated, I_max
-    for at, force, current in zip(rests.x, rests.y, currents, strict=True):
-        assert np.interp(at, *curve(actuator, "force", current)) == pytest.approx(force, rel=2e-3)
-        assert np.interp(at, *curve(actuator, "force", "spring")) == pytest.approx(force, rel=1e-9)
-
-
-def test_the_valve_stays_shut_within_its_overlap(actuator: JointActuator):
-    at, area = curve(actuator, "opening", "side A")
-    assert np.nanmax(area[at < 0.4]) == 0.0
-    assert np.nanmax(area) == pytest.approx(0.40)
-    assert np.interp(1.4, at, area) == pytest.approx(0.20, rel=1e-3)  # half of the slot beyond the overlap
-
-
 def test_flow_grows_with_the_root_of_the_drop_up_to_the_pumps_limit(actuator: JointActuator):
     at, ten = curve(actuator, "flow", "10 bar")
     _, fifty = curve(actuator, "flow", "50 bar")
@@ -63,12 +48,6 @@ def test_flow_grows_with_the_root_of_the_drop_up_to_the_pumps_limit(actuator: Jo
     _, against = curve(actuator, "pressure_flow", "100 % open")
     assert against.max() == pytest.approx(2.0)
     assert abs(against[-1]) < 1e-9  # nothing flows into a chamber at supply pressure
-
-
-def test_the_torque_is_largest_where_the_moment_arm_is(actuator: JointActuator):
-    angle, torque = curve(actuator, "torque", "A at supply")
-    arm = actuator.joint.actuator.moment_arm(np.radians(angle))
-    assert torque == pytest.approx(arm * (1000e-6 * 150e5 - 750e-6 * 5e5))
 
 
 def test_a_set_without_a_force_stroke_curve_is_refused_in_words():

@@ -82,9 +82,13 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize("name", ["report", "validation"])
-@pytest.mark.parametrize("width", [400, 1400])
-def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, width: int):
-    found = seen(pages[name], width)
+@pytest.mark.parametrize(
+    "how",
+    [(400,), (1400,), (1400, "--force-dark-mode", "--blink-settings=preferredColorScheme=0")],
+    ids=["phone", "screen", "dark"],
+)
+def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, how: tuple):
+    found = seen(pages[name], *how)
     assert found["problems"] == []
     assert found["requests"] == []
     assert found["content"] <= found["width"] + 1
@@ -95,11 +99,6 @@ def test_a_page_is_whole_in_a_browser(pages: dict[str, Path], name: str, width: 
     levels = found["headings"]
     assert levels[0] == 1
     assert np.max(np.diff(levels)) <= 1
-
-
-def test_a_page_is_whole_in_the_dark(pages: dict[str, Path]):
-    found = seen(pages["report"], 1400, "--force-dark-mode", "--blink-settings=preferredColorScheme=0")
-    assert (found["problems"], found["empty"]) == ([], 0)
 
 
 def test_a_page_is_printed_on_paper(pages: dict[str, Path], tmp_path: Path):

@@ -11,7 +11,6 @@ from hydroid.fitting.summary import summarise
 from hydroid.fitting.validation import fitted, pooled_indices
 from hydroid.reporting.page import log_names
 from hydroid.reporting.parameters_report import parameter_table
-from hydroid.reporting.predictions import error_table
 from hydroid.reporting.table import Table
 
 
@@ -52,16 +51,6 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
     assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
-
-
-def test_errors_are_those_of_the_responses():
-    problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
-    fit = make_fit(problem)
-    predictions = fitted(problem, fit)
-    table = error_table(predictions, problem.settings.arm)
-    assert column(table, "joint") == ["shoulder", "elbow", "shoulder", "elbow"]
-    rms = [np.degrees(one.indices[joint].rms) for one in predictions for joint in (2, 3)]
-    assert column(table, "rms [deg]") == pytest.approx(rms)
 
 
 def test_the_fit_of_all_joints_measures_each_about_its_own_mean():

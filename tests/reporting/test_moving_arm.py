@@ -11,7 +11,7 @@ from hydroid.arm.model import load_model
 from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
 from hydroid.reporting.moving_arm import MOST, VIEW, MovingArm, motion_section, moving_arm
-from hydroid.reporting.outlines import placed, shapes, sight
+from hydroid.reporting.outlines import sight
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 ARM = PROBLEM.settings.arm
@@ -50,32 +50,11 @@ def test_the_last_link_is_drawn_where_mujoco_puts_it(model):
     assert np.linalg.norm(drawn[1] - drawn[0]) > 10
 
 
-def test_the_arm_stays_in_its_picture(model):
-    arm = moved(model)
-    for name, poses in arm.poses.items():
-        for shape in arm.shapes:
-            at = placed(shape.corners, poses[shape.body].reshape(-1, 2, 4))
-            assert at.min() >= 0, name
-            assert (at <= arm.size).all()
-
-
 def test_a_long_log_has_few_moments_and_begins_at_the_largest_difference(model):
     arm = moved(model, most=20)
     assert len(arm.time) == 20
     assert (arm.time[0], arm.time[-1]) == (LOG.time[0], LOG.time[-1])
     assert abs(arm.errors["shoulder"][arm.start]) == np.abs(arm.errors["shoulder"]).max()
-
-
-def test_an_arm_without_shapes_is_lines_from_joint_to_joint():
-    inertial = '<inertial pos="0.5 0 0" mass="1" diaginertia="1 1 1"/>'
-    stick = f'<body pos="2 0 0">{inertial}<joint name="stick" axis="0 -1 0"/></body>'
-    boom = f'<body>{inertial}<joint name="boom" axis="0 -1 0"/>{stick}</body>'
-    bare = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boom}</worldbody></mujoco>")
-    lengths = [np.linalg.norm(np.diff(line, axis=0)) for line in [shape.corners for shape in shapes(bare)]]
-    assert lengths == pytest.approx([2.0, 0.5])
-    two = replace(LOG, angle=LOG.angle[:, 1:3], command=LOG.command[:, 1:3])
-    moving = moving_arm(bare, ["boom", "stick"], predicted(two.angle, (1, 2), two))
-    assert [len(shape.corners) for shape in moving.shapes] == [2, 2]
 
 
 def test_a_log_that_diverged_is_not_shown():

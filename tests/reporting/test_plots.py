@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 from report_fits import make_fit, make_problem, make_uncertainty
@@ -11,15 +10,12 @@ from report_fits import make_fit, make_problem, make_uncertainty
 from hydroid.fitting.validation import fitted
 from hydroid.posterior.directions import identifiability
 from hydroid.posterior.profile import THRESHOLD, Profile
-from hydroid.posterior.sweep import Surface
-from hydroid.reporting.analysis_report import landscape
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, rendered, style
 from hydroid.reporting.objectives import learning, pareto
 from hydroid.reporting.page_file import plain
 from hydroid.reporting.predictions import JointResponse, draw, joint_responses
 from hydroid.reporting.uncertainty_report import UncertaintyStudy, draw_profiles
-from hydroid.settings.problem import ObjectiveSettings
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
 
@@ -134,19 +130,6 @@ def test_a_response_shows_measured_angle_every_estimate_residual_pressures_and_c
     assert np.array_equal(lower.marks[0].y, log.command[:, 1])
 
 
-def test_a_response_that_runs_away_does_not_flatten_the_others():
-    problem = make_problem()
-    fit = make_fit(problem)
-    away = replace(fit.estimates["utopia"], responses=(np.linspace(0, 1e6, 120)[:, None],))
-    fit = replace(fit, estimates=fit.estimates | {"utopia": away})
-    record = responses(problem, fit)[0]
-    reach = 4 * max(np.degrees(np.ptp(record.measured)), 1.0)
-    for panel, middle in zip(draw(record).panels, (np.degrees(record.measured.mean()), 0.0), strict=False):
-        (runaway,) = labelled(panel, "utopia").values()
-        assert np.isnan(runaway.y).any()
-        assert np.nanmax(np.abs(runaway.y - middle), initial=0.0) < reach
-
-
 @pytest.mark.parametrize(("ratio", "log"), [(5.0, False), (20.0, True), (1e6, True)])
 def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bool):
     problem = make_problem()
@@ -158,17 +141,6 @@ def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bo
     assert labelled(chart.panels[0])["best so far"].y == pytest.approx(np.degrees(history[:, 4]))
     assert chart.panels[0].log_y == log
     check(chart)
-
-
-def test_a_file_leaves_out_what_is_off_and_has_every_label_once():
-    x = np.arange(3.0)
-    shown, off = Mark("line", x, x, label="a"), Mark("line", x, 9 * x, label="b", off=True)
-    chart = Chart((Panel("x", "y", (shown, off)), Panel("x", "y", (shown,))), linked=True)
-    drawn = figure(chart, "A title")
-    assert [len(axes.lines) for axes in drawn.axes] == [1, 1]
-    apart = Chart((Panel("x", "y", (shown,)), Panel("x", "y", (replace(shown, label="c"),))))
-    assert apart.apart
-    assert not chart.apart
 
 
 def test_every_kind_of_mark_can_be_drawn():
@@ -189,19 +161,6 @@ def test_every_kind_of_mark_can_be_drawn():
     )
 
 
-def test_matplotlib_is_left_as_it_was_and_its_settings_do_not_matter():
-    fit = make_fit(make_problem())
-
-    def drawn() -> tuple[bytes, bytes]:
-        return rendered(drawn_front(make_problem(), fit))
-
-    plain = drawn()
-    with mpl.rc_context({"font.size": 30.0, "svg.fonttype": "none", "axes.grid": False}):
-        before = dict(mpl.rcParams)
-        assert drawn() == plain
-        assert dict(mpl.rcParams) == before
-
-
 @pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])
 def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     rng = np.random.default_rng(0)
@@ -216,24 +175,6 @@ def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
         assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
-
-
-def make_surface(estimate: tuple[float, float]) -> Surface:
-    parameters = make_problem().parameters.parameters[:2]
-    values = np.union1d(np.linspace(0.05, 0.5, 9), estimate[0]), np.linspace(50.0, 500.0, 7)
-    error = np.abs(values[0][:, None] - estimate[0]) + np.abs(values[1] - 200.0) / 1e3
-    return Surface(parameters, values, error, estimate, abs(estimate[1] - 200.0) / 1e3)
-
-
-def test_a_surface_marks_the_estimate_and_the_lowest_point_where_they_are():
-    for estimate in ((0.2, 200.0), (0.21, 260.0)):
-        surface = make_surface(estimate)
-        chart = landscape(surface, ObjectiveSettings())
-        check(chart)
-        marks = {mark.label.split(" (")[0]: mark for mark in chart.panels[0].marks}
-        for label, (x, y, *_) in (("estimate", estimate), ("lowest point drawn", surface.lowest)):
-            assert (marks[label].x[0], marks[label].y[0]) == pytest.approx((x, y))
-        assert surface.lowest[2] <= surface.estimate_error
 
 
 def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_ends():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from hydroid.reporting.table import Given, Table
-from hydroid.words import number, plain
+from hydroid.words import number
 
 HOSTILE = r"<b>&_%$#{}~^|\*`[x](http://e.org).csv"
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc",)), max_size=30)
@@ -43,25 +43,6 @@ def test_a_shown_number_is_right_to_four_digits(value: float):
     assert abs(Decimal(number(value)) - Decimal(value)) <= abs(Decimal(value)) * Decimal("5.01e-4")
 
 
-@given(st.floats(1e-4, 9e6))
-def test_ordinary_numbers_have_four_digits_and_no_exponent(value: float):
-    for text in (number(value), number(-value).removeprefix("-")):
-        assert "e" not in text
-        digits = text.replace(".", "").lstrip("0")
-        assert len(digits) == 4 or (value >= 1e4 and digits[4:].strip("0") == "")
-
-
-@pytest.mark.parametrize(
-    ("write", "value", "text"),
-    [
-        *((number, 0.0, "0"), (number, 0.2, "0.2000"), (number, 9.9999, "10.00"), (number, 12345.6, "12350")),
-        *((number, math.inf, "–"), (plain, 0.05, "0.05"), (plain, 2e6, "2000000"), (plain, math.nan, "–")),
-    ],
-)
-def test_numbers_as_read(write, value: float, text: str):
-    assert write(value) == text
-
-
 @pytest.mark.parametrize("name", [HOSTILE, r"\|", "**bold**", "<script>", "`x`", "[x][y]", "_a_ ~~b~~"])
 def test_markdown_shows_a_hostile_name_as_it_is(name: str):
     source = Table(name, ("h",), ((name,),), name).markdown()
@@ -82,14 +63,6 @@ def test_latex_leaves_no_special_letter_bare():
     assert not set("%$#_~^<>|") & set(rest)
     assert rest.count("{") == rest.count("}")
     assert "\n{[}2ex] \\\\" in source  # else a length for the line break before it
-
-
-def test_every_format_has_every_cell():
-    several = Table("t", ("name", "value", "c"), (("K", 1.5, "x"), ("D", None, None), ("S", math.nan, "")))
-    assert several.numeric == (False, True, False)
-    assert several.markdown().count("\n|") == 5
-    assert several.latex().count(r" \\") == 4
-    assert [row["value"] for row in several.records()] == [1.5, None, None]  # JSON has no NaN
 
 
 def test_without_a_terminal_no_line_is_cut(

@@ -19,7 +19,6 @@ from hydroid.log import write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting import page_file
-from hydroid.run import lock
 from hydroid.run.folder import RunFolder
 from hydroid.run.lock import locked
 
@@ -235,13 +234,3 @@ def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
     with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
         fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
     fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
-
-
-def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, caplog):
-    def flock(*_: object) -> None:
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(lock.fcntl, "flock", flock)
-    with locked(tmp_path):
-        pass
-    assert "no lock on this file system" in caplog.text

@@ -115,19 +115,6 @@ def test_a_slow_machine_shows_slow_motion_without_jumps(slide: Sliders):
     assert np.diff(viewer.times) == pytest.approx(LATE, abs=0.011)
 
 
-def test_the_viewers_reset_starts_again(slide: Sliders):
-    def reset(k, data):
-        if k == 10:
-            data.time = 0.0
-            data.ctrl[:] = 0.0
-
-    start = slide.plant.angle
-    slide.plant.data.ctrl[SHOULDER] = 60.0
-    viewer = played(slide, 12, at=reset)
-    assert viewer.times[9] > 0.1 > viewer.times[11]
-    assert np.abs(slide.plant.angle - start).max() < 1e-3
-
-
 def renderable(motion: Motion) -> Stage:
     """A small stage where this machine has OpenGL without a display; otherwise the test is skipped."""
     try:

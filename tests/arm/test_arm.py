@@ -88,12 +88,10 @@ def test_a_cylinder_between_two_points_of_the_assembled_arm(tmp_path, above):
         assert np.linalg.norm(places[1] - places[0]) == pytest.approx(cylinder.length(angle), abs=1e-9)
     assert (cylinder.length(0.1) > cylinder.length(0.0)) == (cylinder.sense > 0) == (above < 0)
     assert cylinder.stroke == pytest.approx(1e3 * np.ptp(cylinder.length(np.radians([-60, 60]))), abs=1e-3)
-    sites = BOOM.replace(
-        '<body name="hook"', f'<site name="tilt_pivot_parent" pos="{text(here)}"/><body name="hook"'
-    )
-    sites = sites.replace(
-        '<joint name="tilt"', f'<site name="tilt_pivot_child" pos="{text(there)}"/><joint name="tilt"'
-    )
+    before = {"parent": ('<body name="hook"', here), "child": ('<joint name="tilt"', there)}
+    sites = BOOM
+    for name, (old, place) in before.items():
+        sites = sites.replace(old, f'<site name="tilt_pivot_{name}" pos="{text(place)}"/>{old}')
     same = write_arm(tmp_path, sites, actuators={"tilt": CYLINDER}).joints[1].actuator
     assert (same.triangle, same.stroke, same.pivots) == (cylinder.triangle, cylinder.stroke, cylinder.pivots)
 

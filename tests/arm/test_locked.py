@@ -96,21 +96,6 @@ def test_what_a_users_model_says_of_its_joints_is_kept():
         assert getattr(part, field)[0] == getattr(whole, field)[4] != 0, field
 
 
-def test_it_steps_like_the_whole_arm_down_to_the_stop():
-    """Everything moves and falls until joints rest on their limits."""
-    model = full_model(NOMINAL)
-    model.dof_damping[:] = 20.0
-    locked = lock(SPEC, ARM, ARM.joint_names, np.zeros(J))
-    locked.model.dof_damping[:] = 20.0
-    whole, part = mujoco.MjData(model), mujoco.MjData(locked.model)
-    whole.qpos[:] = part.qpos[:] = ARM.pose("study")
-    for _ in range(300):
-        mujoco.mj_step(model, whole)
-        mujoco.mj_step(locked.model, part)
-    np.testing.assert_allclose(part.qpos, whole.qpos, atol=1e-8)
-    assert np.min(whole.qpos - ARM.lower) < 0.02
-
-
 def test_a_batch_follows_principal_axes_that_change_places(tmp_path):
     """Two blocks on one hinge: which axis is the longest depends on their masses."""
     blocks = {"a": (0.3, 0.2, 0.1), "b": (0.1, 0.2, 0.5)}

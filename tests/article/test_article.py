@@ -6,11 +6,7 @@ from pathlib import Path
 
 import pytest
 from page import DOCS, page, read_rows
-from statements import ranking
-from studies import ArticleStudy, Plan, load_studies
-
-from hydroid.posterior.jacobian import jacobian
-from hydroid.problem.problem import Problem
+from studies import Plan, load_studies
 
 STUDIES = load_studies()
 ITEMS = {f"table {n}" for n in range(1, 10)} | {f"figure {n}" for n in range(9, 21) if n != 12}
@@ -57,16 +53,6 @@ def test_the_page_is_what_the_committed_results_say():
     for study in STUDIES.values():
         for claim in study.claims:  # in the table of all, and with its numbers in the study's part
             assert text.count(claim.says) >= 2
-
-
-def test_an_order_of_effects_holds_or_is_contradicted():
-    study: ArticleStudy = STUDIES["model"]
-    plan = Plan("model", study, quick=True)
-    problem = Problem(next(iter(plan.cells.values())), plan.logs)
-    effects = jacobian(problem, problem.parameters.vector(study.truth, "truth")).effects.tolist()
-    by_name = dict(zip(problem.parameters.names, effects, strict=True))
-    assert ranking(by_name, [["D", "S"], ["M1"]])[0].value == "confirmed"
-    assert ranking(by_name, [["M1"], ["D"]])[0].value == "contradicted"
 
 
 @pytest.mark.slow

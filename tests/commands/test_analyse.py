@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import step_log
-from small_fits import TRUTH
+from small_fits import TRUTH, steps_of
 
 import hydroid
 from hydroid import load_settings
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
-from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
 CHANGES = {f"parameters.{name}.fixed": TRUTH[name] for name in TRUTH if name.startswith("M")}
@@ -21,11 +19,9 @@ CHANGES = {f"parameters.{name}.fixed": TRUTH[name] for name in TRUTH if name.sta
 def case() -> tuple[IdentifiedModel, Log]:
     """A log with noise, and a model that is several standard deviations off its optimum."""
     settings = load_settings("article-mech", CHANGES | {"simulation.other_joints": "locked"})
-    clean = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH, "truth")
-    noise = np.random.default_rng(1).normal(0.0, np.radians(0.1), clean.angle.shape)
-    noise[0] = 0.0
+    log = steps_of(settings, TRUTH, {2: [60.0, -80.0]}, noise_deg=0.1)
     off = TRUTH | {"D": 1.04 * TRUTH["D"], "S": 0.97 * TRUTH["S"]}
-    return identified(settings, off, "a model that is off"), replace(clean, angle=clean.angle + noise)
+    return identified(settings, off, "a model that is off"), log
 
 
 def test_a_better_optimum_is_refined_and_reported(case):
@@ -42,8 +38,7 @@ def test_a_better_optimum_is_refined_and_reported(case):
         result.uncertainty.interval[:3, 1] > [0.2, 231.8, 53.4]
     )
     assert inside.all()
-    for profile in result.profiles:
-        assert not profile.better_optimum
+    assert not any(profile.better_optimum for profile in result.profiles)
     # from there nothing better is found
     again = hydroid.analyse(log, fit=replace(model, theta=result.uncertainty.theta), profile="D", out=None)
     assert again.result.moved == ()

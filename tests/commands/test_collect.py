@@ -80,14 +80,6 @@ def test_the_best_run_is_the_first_of_the_table_of_runs(fitted, runs):
     assert values == list(fits[best.seed].best.theta)
 
 
-def test_order_and_repetition_of_names_do_not_matter(runs):
-    hydroid.report(["seed-1", "seed-2", "seed-3"], merge=True, out="a")
-    hydroid.report(["seed-3", "seed-*", str(runs[0].resolve()), "seed-1/"], merge=True, out="b")
-    for file in Path("a").rglob("*.*"):
-        other = Path("b") / file.relative_to("a")
-        assert other.read_bytes().replace(str(Path.cwd()).encode() + b"/", b"") == file.read_bytes()
-
-
 def test_runs_that_cannot_be_used_are_named_and_left_out(runs, caplog, tmp_path: Path):
     change(Path("seed-1/run.json"), status="interrupted")
     assert collected(caplog, "seed-*") == (

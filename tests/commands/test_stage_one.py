@@ -37,17 +37,11 @@ def test_a_mass_that_stage_1_moved_without_knowing_it_is_said(
     )
 
 
-def stage_one(folder: Path, **overrides: object) -> Path:
-    """A run folder of stage 1 without its search."""
-    settings = hydroid.load_settings("fit-mech", overrides)
-    write_settings(folder, settings)
-    estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in VALUES.items()}
-    write_estimate(folder, FitSummary(stage="mech", estimate=estimate, final="best"))
-    return folder
-
-
 def test_stage_two_reads_logs_as_stage_one_did(tmp_path: Path):
-    mech = stage_one(tmp_path / "mech", **{"log.time.column": "t", "log.delay_s": 0.1})
+    mech = tmp_path / "mech"
+    write_settings(mech, hydroid.load_settings("fit-mech", {"log.time.column": "t", "log.delay_s": 0.1}))
+    estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in VALUES.items()}
+    write_estimate(mech, FitSummary(stage="mech", estimate=estimate, final="best"))
     changes = with_mechanics(mech, "fit-hyd", {"log.delay_s": 0.2}, ["a.csv"])
     settings = hydroid.load_settings("fit-hyd", changes)
     assert settings.log.time.column == "t"
@@ -58,15 +52,13 @@ def test_stage_two_reads_logs_as_stage_one_did(tmp_path: Path):
     assert {name: settings.parameters[name].fixed for name in masses} == masses
     assert settings.parameters["D"].fixed is None
     assert settings.parameters["S"].fixed == 0.0
-
-
-def test_a_config_that_names_its_own_layout_and_arm_keeps_them(tmp_path: Path):
-    mech = stage_one(tmp_path / "mech", **{"log.time.column": "t", "log.delay_s": 0.1})
+    # a config that names its own layout and arm keeps them
     own = yaml.safe_load((ROOT / "configs" / "fit-hyd.yaml").read_text())
     own |= {"arm": "hydrolek", "log": {"time": {"column": "clock"}}}
     (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
-    changes = with_mechanics(mech, tmp_path / "own.yaml", {}, ["a.csv"])
-    settings = hydroid.load_settings(tmp_path / "own.yaml", changes)
+    settings = hydroid.load_settings(
+        tmp_path / "own.yaml", with_mechanics(mech, tmp_path / "own.yaml", {}, ["a.csv"])
+    )
     assert settings.log.time.column == "clock"
     assert settings.log.delay_s == 0.1
     assert settings.arm.model == (ROOT / "models" / "hydrolek.xml").resolve()

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-import yaml
 
 from hydroid.commands.app import COMMANDS as NAMES
 from hydroid.commands.app import click_command
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
-from hydroid.settings.log import LogSettings
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -78,14 +76,6 @@ def test_the_table_of_commands_has_all_of_them():
     table = (ROOT / "docs" / "commands.md").read_text()
     named = re.findall(r"^\| [a-z]* ?\| `hydroid ([a-z]+-?[a-z]+) ", table, re.MULTILINE)
     assert sorted(named) == sorted(COMMANDS)
-
-
-def test_the_example_of_another_layout_is_valid():
-    text = (ROOT / "configs" / "fit-mech.yaml").read_text()
-    example = re.findall(r"^#   (.*)$", text, re.MULTILINE)
-    settings = LogSettings.model_validate(yaml.safe_load("\n".join(example))["log"])
-    assert set(settings.joints) == {1, 2, 4, 5, 6, 7}
-    assert settings.time.unit == "ms"
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from log_formats import BagWriter
 
-from hydroid.log import check_log, guess_columns, open_table, read_log
+from hydroid.log import check_log, read_log
 from hydroid.settings.log import LogSettings
 
 KINDS = ("ros1", "ros2", "mcap")
@@ -73,13 +73,6 @@ def test_unsynchronised_topics_come_to_one_clock(kind: str, tmp_path: Path) -> N
     said = [f.what for f in findings if f.level == "note"]
     assert "/joint_states, /valves/command: resampled to 0.01 s" in said
     assert "/valves/command: no header stamp, so the time of recording counts" in said
-
-
-def test_the_columns_of_a_bag_are_guessed(tmp_path: Path) -> None:
-    guess = guess_columns(open_table(write(tmp_path, "mcap")[0]), ["boom", "stick"])
-    joints = guess.log["joints"]
-    assert joints[1]["angle"] == {"column": "/joint_states.position[boom]", "unit": "rad"}
-    assert joints[2]["command"] == {"column": "/valves/command.data[2]"}
 
 
 def errors(path: Path, settings: LogSettings = SETTINGS) -> str:

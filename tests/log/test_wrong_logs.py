@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import RIG, RIG_RANGES
+from log_files import RIG_RANGES
 from wrong_logs import ROOT, WRONG, Wrong, boom, rig, save, told
 
 import hydroid
@@ -44,30 +44,6 @@ def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (log,) = hydroid.check([path], config=SETTINGS).result.logs
     angle = log.log.angle[:, 1]
     assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
-
-
-LOGS = ("rig_shoulder_1", "rig_shoulder_2", "rig_all_joints_1")
-
-
-def warned(tmp_path: Path, name: str, command: float = 1.0, angle: float = 1.0, offset: float = 0.0) -> str:
-    """The warnings of a rig's log whose commands and angles are multiplied."""
-    values = np.loadtxt(RIG / f"{name}.csv", delimiter=",", skiprows=1)[:4000]
-    values[:, 1:8] *= command
-    values[:, 8:] = values[:, 8:] * angle + offset
-    with (RIG / f"{name}.csv").open() as file:
-        header = file.readline().strip()
-    path = tmp_path / "log.csv"
-    np.savetxt(path, values, fmt="%.6f", delimiter=",", header=header, comments="")
-    _, findings = check_log(path, LogSettings(angle_margin_deg=30), RIG_RANGES)
-    return " ".join(f"{f.what}; {f.hint}" for f in findings if f.level == "warning")
-
-
-@pytest.mark.parametrize("name", LOGS)
-def test_plain_logs_raise_no_suspicion(tmp_path: Path, name: str) -> None:
-    for how in ({}, {"command": 0.1}, {"angle": 0.3}, {"command": 0.01, "angle": 0.01}):
-        said = warned(tmp_path, name, **how)
-        assert "scale: 100" not in said
-        assert "unit: rad" not in said
 
 
 def test_small_motions_about_zero_are_not_taken_for_radians(tmp_path: Path) -> None:

@@ -77,14 +77,6 @@ def test_a_killed_workers_candidates_are_simulated_by_another(two: DaskWorkers, 
     assert deaths.read_text() == "x"
 
 
-def test_workers_that_were_killed_while_idle_are_replaced(two: DaskWorkers):
-    rows = Rows()
-    before = set(two(rows, "process", NINE, 1)[:, 0])
-    for process in before:
-        os.kill(int(process), signal.SIGKILL)
-    assert not before & set(two(rows, "process", NINE, 1)[:, 0])
-
-
 def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path: Path):
     problem = Problem(*arguments())
     theta = random_candidates(problem, 7)[:6]

@@ -13,11 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
-from worker_targets import Rows
-
-from hydroid.parallel.cluster import open_workers
 
 pytestmark = [
     pytest.mark.slow,
@@ -140,30 +136,3 @@ def test_a_requeued_run_ends_as_one_that_was_not_stopped(site: Path, monkeypatch
     assert re.search("resumed from search", (folder / "run.log").read_text())
     run("hydroid", "fit-mech", *options, "--threads", "1", "--out", "runs/whole")
     assert results("runs/long") == results("runs/whole")
-
-
-def test_workers_that_are_jobs_are_replaced_when_one_is_cancelled(
-    site: Path, monkeypatch: pytest.MonkeyPatch
-):
-    dask = pytest.importorskip("dask")
-    pytest.importorskip("dask_jobqueue")
-    job = {"cores": 1, "memory": "1GiB", "walltime": "00:10:00"}
-    configuration = {f"jobqueue.slurm.{key}": value for key, value in job.items()}
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
-    theta = np.arange(6.0)[:, None]
-    with dask.config.set(configuration), open_workers("slurm:2") as workers:
-        assert workers is not None
-
-        def works() -> bool:
-            return bool((workers(Rows(), "squares", theta, 1) == theta**2).all())
-
-        assert works()
-        wait_for(lambda: workers.count == 2)
-        first = set(run("squeue", "--noheader", "--format=%i").split())
-        assert len(first) == 2
-        run("scancel", min(first))
-        assert works()
-        wait_for(lambda: len(set(run("squeue", "--noheader", "--format=%i").split()) - first) == 1)
-        wait_for(lambda: workers.count == 2)
-        assert works()
-    wait_for(lambda: not run("squeue", "--noheader").strip())

@@ -55,16 +55,6 @@ def test_workers_change_no_bit(two: DaskWorkers, config: str):
     assert_same(spread, plain, theta)
 
 
-def test_threads_of_a_worker_and_freed_parameters_change_no_bit(two: DaskWorkers):
-    settings, logs = arguments(**{"simulation.threads": 2, "objective.norm": 2, "parameters.K.fixed": 0.2})
-    plain, spread = Problem(settings, logs), Problem(settings, logs, two)
-    theta = random_candidates(plain, 3)
-    assert_same(spread, plain, theta)
-    freed = settings.freed()
-    assert spread.varied(freed).parameters.free.all()
-    assert_same(spread.varied(freed), plain.varied(freed), theta)
-
-
 def test_errors_come_through(two: DaskWorkers):
     with pytest.raises(ModelError, match=r"^arm.xml: has no such joint; take another$"):
         two(Rows(), "refused", NINE, 2)

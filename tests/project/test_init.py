@@ -1,6 +1,7 @@
 """A project out of an arm's CAD and a log: it runs, says what it assumed, and overwrites nothing."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,7 @@ from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
 from hydroid.project import Project
 from hydroid.settings.arm import load_arm
+from hydroid.settings.fit import FitSettings
 
 
 def init(folder: Path, arm: Path | None = None, logs: list[Path] | None = None, **more: Any) -> Project:
@@ -111,56 +113,35 @@ def test_without_cad_there_is_a_template_that_runs(tmp_path: Path):
     assert {"area_A_boom", "area_B_boom", "open_A_boom"} <= set(settings.parameters)
 
 
-def scaled(column: int, factor: float, shift: float) -> Callable[[list[str]], list[str]]:
-    """One column's numbers changed."""
-
-    def change(lines: list[str]) -> list[str]:
-        cells = [line.split(";") for line in lines]
-        for row in cells[1:]:
-            row[column] = f"{factor * float(row[column]) + shift:.6g}"
-        return [";".join(row) for row in cells]
-
-    return change
+def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]:
+    """A project of a changed log, and its settings."""
+    (folder / "log.csv").write_text(text)
+    made = init(folder / "mine", place / "digger/urdf/digger.urdf", [folder / "log.csv"])
+    return made, hydroid.load_settings(folder / "mine" / "fit.yaml")
 
 
-CHANGED_LOGS = {
-    "a command against its angle is turned round": (
-        scaled(2, -1, 0),
-        {"boom_joint moves against its command (for ": "of the command is reversed"},
-        [10, -10, 10],
-    ),
-    "angles outside the range": (
-        scaled(5, 1, 2),
-        {
-            "boom_joint: the angles in the log run from": (
-                "but the arm allows -28.6479 to 68.7549: give the angle an offset"
-            )
-        },
-        [10, 10, 10],
-    ),
-}
-"""change of a log's lines, the notes by their beginnings with what they say, and the commands' scales"""
-
-
-@pytest.mark.parametrize("case", CHANGED_LOGS)
-def test_what_the_numbers_of_a_log_tell_is_said(place: Path, tmp_path: Path, case: str):
-    change, notes, scales = CHANGED_LOGS[case]
-    lines = (place / "move_0.csv").read_text().splitlines()
-    (tmp_path / "log.csv").write_text("\n".join(change(lines)))
-    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
-    for start, text in notes.items():
-        (line,) = [line for line in project.columns if line.startswith(start)]
-        assert text in line
-    settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
-    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == scales
+@pytest.mark.parametrize(
+    ("column", "change", "note", "scale"),
+    [
+        (2, lambda u: -u, r"boom_joint moves against its command .*of the command is reversed", -10),
+        (5, lambda q: q + 2, r"boom_joint: the angles .*allows -28\.6479 to 68\.7549: give the angle an", 10),
+    ],
+)
+def test_what_the_numbers_of_a_log_tell_is_said(
+    place: Path, tmp_path: Path, column: int, change: Callable[[float], float], note: str, scale: int
+):
+    header, *rows = [line.split(";") for line in (place / "move_0.csv").read_text().splitlines()]
+    for row in rows:
+        row[column] = f"{change(float(row[column])):.6g}"
+    made, settings = project(place, tmp_path, "\n".join(";".join(row) for row in (header, *rows)))
+    assert len([line for line in made.columns if re.match(note, line)]) == 1
+    assert [settings.log.columns("command", j).scale for j in (1, 2, 3)] == [10, scale, 10]
 
 
 def test_a_joint_that_moves_without_a_command_follows_the_log(place: Path, tmp_path: Path):
-    lines = (place / "move_0.csv").read_text().replace("valve_stick_joint_V", "torque").splitlines()
-    (tmp_path / "log.csv").write_text("\n".join(lines))
-    project = init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [tmp_path / "log.csv"])
-    settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
-    assert project.unused == ("torque",)
+    text = (place / "move_0.csv").read_text().replace("valve_stick_joint_V", "torque")
+    made, settings = project(place, tmp_path, text)
+    assert made.unused == ("torque",)
     assert settings.outputs == (1, 2)
     assert settings.simulation.other_joints == "measured"
 
@@ -188,8 +169,8 @@ def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     rows = [";".join(line.split(";")[k] for k in at) for line in lines[1:]]
     (tmp_path / "log.csv").write_text("\n".join(["t_ms;u1_V;u2_V;u3_V;q1_rad;q2_rad;q3_rad", *rows]))
     arm = place / "mine" / "arm.yaml"
-    project = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=order)
-    assert project.files == ("arm.png", "fit.yaml", "next-steps.md")
+    made = init(tmp_path / "second", arm, [tmp_path / "log.csv"], joints=order)
+    assert made.files == ("arm.png", "fit.yaml", "next-steps.md")
     settings = hydroid.load_settings(tmp_path / "second" / "fit.yaml")
     assert settings.arm == load_arm(arm)
     assert [settings.log.columns("command", j).column for j in (1, 2, 3)] == [("u3_V",), ("u1_V",), ("u2_V",)]

@@ -5,17 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_fits import make_fit, make_problem, make_uncertainty
+from report_fits import make_fit, make_problem
 
 from hydroid.fitting.validation import fitted
-from hydroid.posterior.directions import identifiability
-from hydroid.posterior.profile import THRESHOLD, Profile
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, rendered, style
 from hydroid.reporting.objectives import learning, pareto
 from hydroid.reporting.page_file import plain
 from hydroid.reporting.predictions import JointResponse, draw, joint_responses
-from hydroid.reporting.uncertainty_report import UncertaintyStudy, draw_profiles
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
 
@@ -175,20 +172,3 @@ def test_a_thinned_curve_keeps_its_ends_extremes_and_gaps(samples: int):
     gap = np.where(np.arange(samples) > samples // 2, np.nan, curve)
     if samples > 1:
         assert np.isnan(Mark("line", time, gap).thinned(1000).y).any()
-
-
-def test_a_profile_is_drawn_over_its_interval_and_crosses_the_threshold_at_its_ends():
-    uncertainty = make_uncertainty(problem := make_problem(), make_fit(problem).best.theta)
-    centre, deviation = uncertainty.theta[0], uncertainty.standard_deviation[0]
-    values = centre + deviation * np.linspace(-40, 40, 13)
-    deviance = ((values - centre) / deviation) ** 2
-    half = deviation * np.sqrt(THRESHOLD)
-    profile = Profile("K", values, deviance, (centre - half, centre + half), uncertainty.theta)
-    shown = identifiability(problem, uncertainty)
-    chart = draw_profiles(UncertaintyStudy(problem, "test", uncertainty, shown, (profile,)))
-    check(chart)
-    (panel,) = chart.panels
-    assert panel.x_limits is not None
-    assert np.ptp(panel.x_limits) < 4 * half
-    curve = labelled(panel)["profile"]
-    assert np.interp(centre + half, curve.x, curve.y) == pytest.approx(THRESHOLD, rel=0.02)

@@ -163,13 +163,6 @@ def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_place_where_nothing_can_be_written_is_named(made, tmp_path):
-    settings, _arm, path, _ = made
-    (tmp_path / "file").write_text("")
-    with pytest.raises(RunError, match=r"file/run: cannot be written \(Not a directory\)"):
-        fit(settings, read_logs([path], settings), tmp_path / "file" / "run", progress=Watcher())
-
-
 def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
     settings, _arm, path, _ = made
     (tmp_path / "thesis.tex").write_text("mine")

@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hydroid
-from hydroid.assets import find_config
 from hydroid.errors import SettingsError
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.fit import FitSettings
@@ -26,14 +25,6 @@ def written(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "c.yaml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_a_dump_loads_back(tmp_path: Path):
-    import yaml
-
-    settings = load(find_config("fit-mech"), FitSettings)
-    again = load(written(tmp_path, yaml.safe_dump(settings.model_dump(mode="json"))), FitSettings)
-    assert again == settings
 
 
 def test_overrides_replace_one_setting(tmp_path: Path):

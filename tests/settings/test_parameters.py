@@ -86,13 +86,6 @@ def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():
     assert settings.parameters["C"].joints == (2,)
 
 
-def test_one_compared_joint_keeps_the_plain_name():
-    entry = {"quantity": "damping", "each": True, "bounds": [1.0, 5.0]}
-    assert load_settings("fit-mech", {"parameters.D": entry}).parameters["D"].joints is None
-    several = load_settings("fit-mech", {"parameters.D": entry, "outputs": [2, 3]}).parameters
-    assert [p.joints for n, p in several.items() if n.startswith("D")] == [(2,), (3,)]
-
-
 def test_a_log_scale_maps_the_unit_box_by_ratios_and_back():
     parameters = ParameterSet((Parameter("a", "", 0.1, 1000.0, log=True), Parameter("b", "", 0.0, 4.0)))
     theta = parameters.from_unit(np.array([[0.0, 0.0], [0.25, 0.25], [1.0, 1.0]]))

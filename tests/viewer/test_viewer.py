@@ -84,21 +84,6 @@ def test_a_log_is_shown_as_the_plant_steps(nominal: IdentifiedModel, study_log: 
     assert np.ptp(np.array(expected)[:, SHOULDER]) > 0.05  # it does move
 
 
-def test_sliders_move_their_joint_and_zero_stops_it(slide: Sliders):
-    plant = slide.plant
-    start = plant.angle
-    plant.data.ctrl[SHOULDER] = 60.0
-    slide.advance(1.0)
-    moved = plant.angle - start
-    assert moved[SHOULDER] > np.radians(5)
-    assert np.abs(np.delete(moved, SHOULDER)).max() < 0.1 * moved[SHOULDER]
-    plant.data.ctrl[SHOULDER] = 0.0
-    slide.advance(2.0)
-    stopped = plant.angle[SHOULDER]
-    slide.advance(3.0)
-    assert plant.angle[SHOULDER] == pytest.approx(stopped, abs=np.radians(0.1))
-
-
 def test_the_picture_keeps_pace_with_the_clock(slide: Sliders):
     viewer = played(slide, 30)
     assert viewer.times[0] == 0.0
@@ -147,31 +132,18 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
     assert len(np.unique(panel.reshape(-1, 3), axis=0)) > 20
 
 
-def test_where_both_agree_the_ghost_is_hidden(nominal: IdentifiedModel, study_log: Log):
-    motion = simulated_motion(nominal, {"alone": study_log})
-    assert motion.measured is None  # commands alone: nothing moves in the log
-    exact = replace(motion, measured=motion.simulated)
-    with renderable(exact) as stage:
-        picture = stage.machine(1.0).astype(float)
-    assert (picture[..., 2] - picture[..., 0] > 60).mean() < 0.003
-
-
 @pytest.mark.parametrize("kind", [".gif", ".mp4", ".png"])
 def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log, kind, monkeypatch):
     if kind == ".mp4":
-        pytest.importorskip("av")
+        av = pytest.importorskip("av")
     motion = simulated_motion(nominal, {"alone": study_log})
     renderable(motion).__exit__()
     rate = film.KINDS[kind][1]
     monkeypatch.setitem(film.KINDS, kind, ((480, 270), rate))
     content = film.render_motion(motion, kind, (1.0, 1.5))
     if kind == ".mp4":
-        import av
-
         with av.open(io.BytesIO(content)) as file:
-            frames = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
-        assert len(frames) == round(0.5 * rate)
-        assert frames[0].shape == (270, 480, 3)
+            assert sum(1 for _ in file.decode(video=0)) == round(0.5 * rate)
         return
     with Image.open(io.BytesIO(content)) as picture:
         assert picture.format == kind[1:].upper()

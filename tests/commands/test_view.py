@@ -26,14 +26,6 @@ def model() -> IdentifiedModel:
     return identified(load_settings("article-mech", {"start_pose": "study"}), VALUES, "truth")
 
 
-def crossing(arm: Arm) -> Log:
-    """A trajectory in which the azimuth turns 45 deg to the other arm and back; the arm is stretched."""
-    time = 0.01 * np.arange(401)
-    angle = np.tile(arm.pose("home"), (401, 1))
-    angle[:, 0] = np.radians(45) * np.sin(np.pi * time / 4) ** 2
-    return Log("crossing", time, np.zeros((401, 7)), angle, 0.01)
-
-
 def test_an_actuator_is_drawn_with_the_settings_beside_the_estimate(hydroid_cli: Run, tmp_path: Path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "config.yaml").write_text((ROOT / "configs" / "fit-hyd.yaml").read_text())
@@ -87,9 +79,17 @@ def test_an_arm_that_is_none_is_refused(model: IdentifiedModel, study_log: Log):
 
 
 def test_the_exit_status_says_whether_bodies_meet(arm: Arm, hydroid_cli: Run):
-    log = crossing(arm)
-    degrees = np.column_stack([log.time, np.degrees(log.angle[:, :2])])
-    np.savetxt("a.csv", degrees, "%.9g", ",", header="time_s,q1_deg,q2_deg", comments="")
+    """The azimuth turns 45 deg to the other arm and back; the arm is stretched."""
+    time, (_, shoulder, *_) = 0.01 * np.arange(401), np.degrees(arm.pose("home"))
+    swing = 45 * np.sin(np.pi * time / 4) ** 2
+    np.savetxt(
+        "a.csv",
+        np.column_stack([time, swing, np.full(401, shoulder)]),
+        "%.9g",
+        ",",
+        header="time_s,q1_deg,q2_deg",
+        comments="",
+    )
     assert json.loads(hydroid_cli("view", "a.csv", "--collisions", "--json").out)["free"] is True
     beside = ("view", "a.csv", "--collisions", "--arm", "right")
     met = hydroid_cli(*beside, "--out", "found", code=1)

@@ -105,14 +105,10 @@ class CurveEstimate(Settings):
 
 
 def _finding(value: Any) -> Any:
-    """Return a finding from a mapping: files have no tuples."""
-    if not isinstance(value, dict):
-        return value
-    given: dict[str, Any] = dict(value)
+    """Return a finding from a mapping: files have no dataclasses."""
     try:
-        given["subjects"] = tuple(given["subjects"])
-        return Finding(**given)
-    except (KeyError, TypeError):
+        return Finding(**value) if isinstance(value, dict) else value
+    except TypeError:
         raise ValueError("is no finding") from None
 
 
@@ -180,21 +176,9 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
     Raises:
         RunError: the folder cannot be written.
     """
-    write_atomic(folder / NAME, _yaml(summary.plain()))
-
-
-def _yaml(content: dict[str, Any]) -> str:
-    # lists of numbers on one line each
-    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-
-
-def read_estimate(file: Path) -> FitSummary:
-    """Read an `estimate.yaml`.
-
-    Raises:
-        SettingsError: it cannot be read, or is damaged.
-    """
-    return load(file, FitSummary)
+    one_line_a_list: Any = {"default_flow_style": None, "width": 110}
+    text = yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True, **one_line_a_list)
+    write_atomic(folder / NAME, text)
 
 
 def estimate_file(source: Path) -> Path:
@@ -230,7 +214,7 @@ def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:
             raise
         raise SettingsError("is no estimate", where=str(file), hint=_GIVE) from None
     if "estimate" in content:
-        summary = read_estimate(file)
+        summary = load(file, FitSummary)
         return dict(summary.values), summary
     values = content.get("parameters", content)
     if isinstance(values, dict) and any(isinstance(value, dict) for value in values.values()):

@@ -8,10 +8,11 @@ import pytest
 
 import hydroid
 from hydroid.errors import RunError, SettingsError
-from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, read_estimate, write_estimate
+from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, write_estimate
 from hydroid.identified_model import load_identified, start_values, write_settings
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
+from hydroid.settings.load import load
 
 VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
@@ -96,7 +97,7 @@ def test_an_estimate_comes_back_as_it_was_written(tmp_path: Path):
         estimates={"best": NamedEstimate(values={"K": 0.1 + 0.2}, rms_deg=None)},
     )
     write_estimate(tmp_path, summary)
-    assert read_estimate(tmp_path / "estimate.yaml") == summary
+    assert load(tmp_path / "estimate.yaml", FitSummary) == summary
     assert summary.plain()["schema"] == 1
 
 

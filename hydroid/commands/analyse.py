@@ -23,13 +23,6 @@ if TYPE_CHECKING:
     from hydroid.problem.problem import Problem
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
 
-SENSITIVITY = ("log", "output", "parameter", "rms_per_percent")
-SURFACE = (
-    *("parameters", "first_lowest", "second_lowest", "lowest_{}"),
-    *("first_estimate", "second_estimate", "estimate_{}"),
-)
-"""keys of the tables of sensitivities and of surfaces"""
-
 
 @command
 def analyse(
@@ -110,12 +103,16 @@ def analyse(
         surfaces = [sweeps.surface(problem, theta, pair, *grid, progress) for pair in pairs]
     page = analysis_page(problem, theta, uncertainty_page(study), sweep, surfaces)
     error = "error" if problem.settings.objective.relative else "error_deg"
-    keys = {"sensitivity": SENSITIVITY, "surface": [key.format(error) for key in SURFACE]}
+    lowest, estimate = ([f"first_{at}", f"second_{at}", f"{at}_{error}"] for at in ("lowest", "estimate"))
+    keys = {
+        "sensitivity": ("log", "output", "parameter", "rms_per_percent"),
+        "surface": ("parameters", *lowest, *estimate),
+    }
     tables = {name: page.tables[name] for name in keys if name in page.tables}
-    known, profiles = study.summary.plain(), {p.name: p.interval for p in study.profiles}
+    known = study.summary.plain()
     for name, parameter in known["estimate"].items():
-        ends = profiles.get(name)
-        parameter["profile_interval"] = None if ends is None else [finite(end) for end in ends]
+        interval = study.intervals.get(name)
+        parameter["profile_interval"] = interval and [*map(finite, interval)]
     content = {"at": study.source, "rank": study.identifiability.rank}
     content |= {name: known[name] for name in ("findings", "estimate")}
     content |= {name: rows(table, *keys[name]) for name, table in tables.items()}

@@ -1,7 +1,6 @@
 """`hydroid check`: what is wrong or unusual about logs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,8 +15,7 @@ if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
 
 
-@dataclass(frozen=True, eq=False)
-class LogCheck:
+class LogCheck(NamedTuple):
     """One file.
 
     Attributes:
@@ -32,9 +30,8 @@ class LogCheck:
     findings: "Sequence[LogFinding]"
     moved_deg: Mapping[int, float]
 
-    @property
-    def content(self) -> dict[str, Any]:
-        """Of JSON."""
+    def plain(self) -> dict[str, Any]:
+        """Return what JSON holds."""
         log = self.log
         return {
             "log": str(self.path),
@@ -45,15 +42,6 @@ class LogCheck:
             "moved_deg": {str(joint): deg for joint, deg in self.moved_deg.items()},
             "findings": plain_findings(self.findings),
         }
-
-    @property
-    def line(self) -> str:
-        """What a terminal shows of a usable log."""
-        content = self.content
-        driven = ", ".join(map(str, content["driven_joints"])) or "none"
-        moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in self.moved_deg.items())
-        text = f"{self.path}: {content['samples']} samples, {content['duration_s']:.2f} s"
-        return f"{text}, driven joints: {driven}" + (f"; moved: {moved}" if moved else "")
 
 
 class Checked(NamedTuple):
@@ -92,10 +80,16 @@ def check(
     every = [*(finding for one in found for finding in one.findings), *together]
     every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
     lines = [f"{level}: {line}" for level, line in grouped(every)]
-    content = {"logs": [one.content for one in found], "findings": plain_findings(together)}
-    usable = [one.line for one in found if one.log]
-    status = 0 if len(usable) == len(found) else 2
-    return Result([*lines, *usable], content, Checked(found, together), exit_status=status)
+    contents = [one.plain() for one in found]
+    for one in contents:
+        if one["usable"]:
+            driven = ", ".join(map(str, one["driven_joints"])) or "none"
+            moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in one["moved_deg"].items())
+            size = f"{one['samples']} samples, {one['duration_s']:.2f} s"
+            lines.append(f"{one['log']}: {size}, driven joints: {driven}" + (moved and f"; moved: {moved}"))
+    content = {"logs": contents, "findings": plain_findings(together)}
+    status = 0 if all(one.log for one in found) else 2
+    return Result(lines, content, Checked(found, together), exit_status=status)
 
 
 def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:

@@ -71,7 +71,8 @@ def convert(
     settings = None if config is None else load_settings(config, changes)
     layout, guess, lines = settings.log if settings else LogSettings(), None, list[str]()
     table = open_table(path, layout)
-    if settings is None or (_is_default(layout) and layout.time.column not in table.names):
+    usual = all(layout.columns(kind, 1) == LogSettings().columns(kind, 1) for kind in ("command", "angle"))
+    if settings is None or (usual and not layout.joints and layout.time.column not in table.names):
         joints = settings.arm.joint_names if settings else None
         guess, layout = _guessed(table, joints, {} if settings else changes)
         lines = _guess_lines(guess)
@@ -80,26 +81,10 @@ def convert(
     write_log(target, read, _plain_layout(read), exact=True)
     lines += [f"{finding.level}: {finding}" for finding in findings]
     size = f"{len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
-    content = {
-        "out": str(out),
-        "samples": len(read.time),
-        "duration_s": read.duration,
-        "period_s": read.period,
-        "log": guess and guess.log,
-        "reasons": [*guess.reasons] if guess else [],
-        "findings": plain_findings(findings),
-    }
+    content = {"out": str(out), "samples": len(read.time)}
+    content |= {"duration_s": read.duration, "period_s": read.period, "findings": plain_findings(findings)}
+    content |= {"log": guess and guess.log, "reasons": [*guess.reasons] if guess else []}
     return Result([*lines, f"{out}: {size}"], content, Converted(replace(read, source=str(out)), guess))
-
-
-def _is_default(layout: LogSettings) -> bool:
-    """Whether settings name the columns that they have without a section `log`."""
-    joints = range(1, MOST_JOINTS + 1)
-    columns = [
-        (own.time, [own.columns(kind, joint) for kind in ("command", "angle") for joint in joints])
-        for own in (layout, LogSettings())
-    ]
-    return columns[0] == columns[1]
 
 
 def _guessed(

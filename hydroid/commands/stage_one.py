@@ -58,30 +58,29 @@ def with_mechanics(
     if mech is not None and summary is not None:
         changes = {**_inherited(estimate_file(Path(mech)).parent, config, logs), **changes}
     settings = load_stage("hyd", config, changes)
-    wanted = {name: settings.parameters[name] for name in _mechanical(settings)}
-    open_ones = {name: p for name, p in wanted.items() if name not in values and p.fixed is None}
-    if free := [name for name, p in open_ones.items() if mech is not None or not p.states_start]:
-        hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
-        what = f"stage 2 needs the values of {', '.join(free)} from stage 1"
-        raise SettingsError(what, where=str(mech or ""), hint=hint)
-    held = {
-        name: values[name]
-        for name, p in wanted.items()
-        if name in values
-        and (p.quantity == "mass" or not p.states_start)
-        and f"parameters.{name}.fixed" not in changes
-    }
-    for name, value in held.items() if summary else ():
-        flag = summary.estimate[name].flag if summary else None
-        nominal = settings.nominal(wanted[name]) if wanted[name].quantity == "mass" else None
-        doubtful = nominal and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
+    held: dict[str, Any] = {}
+    missing: list[str] = []
+    for name in _mechanical(settings):
+        p, value = settings.parameters[name], values.get(name)
+        if value is None and p.fixed is None and (mech is not None or not p.states_start):
+            missing.append(name)
+        key, mass = f"parameters.{name}.fixed", p.quantity == "mass"
+        if value is None or key in changes or (p.states_start and not mass):
+            continue
+        held[key] = value
+        nominal, flag = settings.nominal(p), summary and summary.estimate[name].flag
+        doubtful = mass and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
         if doubtful and nominal and abs(value - nominal) > MOVED * nominal:
             _log.warning(
                 "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it "
                 "(%s). Without --mech it is estimated here",
                 *(name, value, nominal, flag),
             )
-    return {**changes, **{f"parameters.{name}.fixed": value for name, value in held.items()}}
+    if missing:
+        hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
+        what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
+        raise SettingsError(what, where=str(mech or ""), hint=hint)
+    return {**changes, **held}
 
 
 def _inherited(folder: Path, config: ConfigSource, logs: Sequence[str]) -> dict[str, Any]:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import HydroidError, RunError
-from hydroid.estimate import NAME, FitSummary, read_estimate
+from hydroid.estimate import NAME, FitSummary
 from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import difference
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load
 
 _log = logging.getLogger(__name__)
 
@@ -118,7 +119,7 @@ def _read(path: Path) -> Run:
     if identity.get("status") != "done":
         raise RunError(f"is not finished ({identity.get('status')})", where=str(path), hint="resume it")
     folder.refuse_changes()
-    settings, summary = folder.settings(), read_estimate(file)
+    settings, summary = folder.settings(), load(file, FitSummary)
     final = summary.estimates.get(summary.final or "")
     if final is None or final.rms_deg is None:
         raise RunError("has no final estimate that could be simulated", where=str(file))

@@ -18,7 +18,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from hydroid.advice.proposals import Advice
 from hydroid.errors import RunError
-from hydroid.estimate import NAME, FitSummary, read_estimate
+from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction, fitted
@@ -29,6 +29,7 @@ from hydroid.problem.problem import Problem
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load
 
 RESULT, VALIDATIONS = "result.npz", "validations"
 """names of the file of arrays, and of the folder of unseen logs"""
@@ -191,7 +192,7 @@ def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:
     """
     path = Path(folder)
     identity = RunFolder(path).identity()
-    settings, summary = RunFolder(path).settings(), read_estimate(path / NAME)
+    settings, summary = RunFolder(path).settings(), load(path / NAME, FitSummary)
     if summary.final == "joint":
         settings = settings.freed()
     files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))

@@ -11,10 +11,11 @@ import hydroid
 from hydroid import load_settings
 from hydroid.commands.fit import FitResult
 from hydroid.errors import RunError
-from hydroid.estimate import read_estimate
+from hydroid.estimate import FitSummary
 from hydroid.posterior.posterior import stored_posterior
 from hydroid.prediction import simulate_log
 from hydroid.reporting.quantities_report import curves_csv, quantity_table
+from hydroid.settings.load import load
 
 TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
 FIXED = {"I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2}
@@ -38,7 +39,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
 
 def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fitted):
     summary = fitted.summary
-    assert read_estimate(fitted.folder / "estimate.yaml") == summary
+    assert load(fitted.folder / "estimate.yaml", FitSummary) == summary
     json.dumps(summary.plain(), allow_nan=False)
     ratio = summary.quantities["joint2_area_ratio"]
     values = summary.values

@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 from command_line import Ended, Run, run
 
+import hydroid
+from hydroid.reporting import drawing
+
 LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
 
@@ -14,6 +17,25 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "short.csv"
     path.write_text("\n".join(LOG.read_text().splitlines()[:1001]) + "\n")
     return path
+
+
+SMALL: dict[str, object] = {
+    "search.algorithm": "ga",
+    "search.ga": {"population": 6, "generations": 2},
+    "refinement.iterations": 1,
+    "design": {"effort": 3, "poses": "any"},
+}
+
+
+@pytest.fixture(scope="session")
+def array(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, hydroid.FitResult]]:
+    """Four seconds of the log, a.csv; beside it three small runs of it, seed-1 to seed-3; their results."""
+    folder = tmp_path_factory.mktemp("array")
+    (folder / "a.csv").write_text("\n".join(LOG.read_text().splitlines()[:401]) + "\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "write_page", lambda *_: [])  # figures take longest
+        done = hydroid.fit_mech(folder / "a.csv", runs=3, set=SMALL, out=folder)
+    return folder, {one.problem.settings.search.seed: one for one in done.results}
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from conftest import step_log
 
 from hydroid import load_settings
 from hydroid.log import Log
-from hydroid.problem.problem import Problem, Spread
+from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
 PASSIVE = {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.segments": {"equal": 3}}
@@ -36,19 +36,3 @@ def assert_same(spread: Problem, plain: Problem, theta: np.ndarray) -> None:
     np.testing.assert_array_equal(ours.segments, theirs.segments)
     np.testing.assert_array_equal(ours.overall, theirs.overall)
     np.testing.assert_array_equal(spread.residuals(theta), plain.residuals(theta))
-
-
-class CountingSpread:
-    """Computes in this process what workers would, and counts the candidates by method."""
-
-    def __init__(self) -> None:
-        self.counts: dict[str, int] = {}
-
-    def __call__(self, target: object, method: str, theta: np.ndarray, columns: int) -> np.ndarray:
-        self.counts[method] = self.counts.get(method, 0) + len(theta)
-        rows = getattr(target, method)(theta)
-        assert rows.shape == (len(theta), columns)
-        return rows
-
-
-_: type[Spread] = CountingSpread

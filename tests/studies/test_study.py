@@ -89,6 +89,12 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
     assert [row.failed for row in run(written(tmp_path), tmp_path).rows].count("") == 3
 
 
+def test_a_check_of_the_fitted_log_is_its_own_error(tmp_path: Path):
+    for row in run(written(tmp_path, checks={"again": {"log": "short.csv"}}, seeds=1), tmp_path).rows:
+        assert row.values["mean absolute error"] <= row.values["rms error"] <= row.values["largest error"]
+        assert row.values["check again"] == pytest.approx(row.values["mean absolute error"])
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -43,11 +43,11 @@ def slide(plant: Plant) -> Sliders:
 
 
 class FakeViewer:
-    """A window that stays open for some pictures; `at` does what a hand does before the k-th."""
+    """A window that stays open for some pictures."""
 
-    def __init__(self, playback: Any, pictures: int, at=lambda k, data: None) -> None:
-        self.playback, self.left, self.at = playback, pictures, at
-        self.times, self.drawn = list[float](), list[int]()
+    def __init__(self, playback: Any, pictures: int) -> None:
+        self.playback, self.left = playback, pictures
+        self.times = list[float]()
         self.user_scn = mujoco.MjvScene(playback.model, 1000)
         self.cam = mujoco.MjvCamera()
         self.texts: list[tuple] = []
@@ -61,13 +61,11 @@ class FakeViewer:
 
     def sync(self) -> None:
         self.times.append(self.playback.time)
-        self.drawn.append(self.user_scn.ngeom)
-        self.at(len(self.times), self.playback.data)
 
 
-def played(playback: Any, pictures: int, cost: float = 0.0, at=lambda k, data: None) -> FakeViewer:
+def played(playback: Any, pictures: int, cost: float = 0.0) -> FakeViewer:
     """Some pictures of a playback; time passes in sleep, and in `cost` seconds of work a look."""
-    viewer, looks, slept = FakeViewer(playback, pictures, at), count(), list[float]()
+    viewer, looks, slept = FakeViewer(playback, pictures), count(), list[float]()
     play(playback, viewer, lambda: 100.0 + cost * next(looks) + sum(slept), slept.append)
     return viewer
 
@@ -82,6 +80,15 @@ def test_a_log_is_shown_as_the_plant_steps(nominal: IdentifiedModel, study_log: 
         assert sample == min(int(moment / study_log.period), len(expected) - 1)
         np.testing.assert_array_equal(shown.data.qpos, expected[sample])
     assert np.ptp(np.array(expected)[:, SHOULDER]) > 0.05  # it does move
+
+
+def test_a_slider_moves_its_joint(slide: Sliders):
+    start = slide.plant.angle
+    slide.plant.data.ctrl[SHOULDER] = 60.0
+    slide.advance(1.0)
+    moved = slide.plant.angle - start
+    assert moved[SHOULDER] > np.radians(5)
+    assert np.abs(np.delete(moved, SHOULDER)).max() < 0.1 * moved[SHOULDER]
 
 
 def test_the_picture_keeps_pace_with_the_clock(slide: Sliders):

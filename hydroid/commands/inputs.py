@@ -92,6 +92,6 @@ def refuse_overwriting(source: Any, out: Source | None) -> None:
 
 def as_list(sources: Any) -> list[Any]:
     """Return one or several sources as a list; an empty one for none."""
-    if sources is None:
-        return []
-    return list(sources) if isinstance(sources, Sequence) and not isinstance(sources, str) else [sources]
+    if isinstance(sources, Sequence) and not isinstance(sources, str):
+        return list(sources)
+    return [] if sources is None else [sources]

@@ -101,11 +101,10 @@ def read_arms(
         raise SettingsError(f"{arm!r} is no arm of a pair", where="--arm", hint=hint)
     moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
     columns = settings.log.angles_only() if angles else settings.log
-    layouts = {moving[0]: columns}
-    if isinstance(log, str | Path) and arm is not None:
-        prefixes = tuple(f"{side}_" for side in SIDES)
-        if any(name.startswith(prefixes) for name in open_table(Path(log), settings.log).names):
-            layouts = {side: columns.of_arm(side) for side in moving}
+    layouts, prefixes = {moving[0]: columns}, tuple(f"{side}_" for side in SIDES)
+    names = open_table(Path(log), settings.log).names if isinstance(log, str | Path) and arm else ()
+    if any(name.startswith(prefixes) for name in names):
+        layouts = {side: columns.of_arm(side) for side in moving}
     stand = None if pose is None else settings.arm.pose(pose)
     logs: dict[str, Log] = {}
     for side, layout in layouts.items():

@@ -164,9 +164,9 @@ def _fit(
         "search.algorithm": algorithm,
         "search.pymoo.algorithm": pymoo,
         "search.seed": options.get("seed"),
+        "simulation.threads": options.get("threads"),
     }
-    given |= {"simulation.threads": options.get("threads"), **more}
-    changes = setting_changes(options.get("set"), given)
+    changes = setting_changes(options.get("set"), given | dict(more))
     if options.get("refinement") is False:
         changes["refinement"] = None
     runs, resume, out = options.get("runs", 1), options.get("resume", False), options.get("out", NAMED)
@@ -184,13 +184,9 @@ def _fit(
     with _workers(options) as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):
             search = settings.search.model_copy(update={"seed": seed})
-            seeded, folder = (
-                settings.model_copy(update={"search": search}),
-                None if out is None else Path(out),
-            )
-            if folder and runs > 1:
-                folder /= f"seed-{seed}"
-            with FitProgress(seeded, f"seed {seed}" if runs > 1 else "") as watcher:
+            seeded = settings.model_copy(update={"search": search})
+            name, folder = ("", out) if runs == 1 else (f"seed {seed}", out and Path(out) / f"seed-{seed}")
+            with FitProgress(seeded, name) as watcher:
                 how: Any = {"resume": resume, "progress": watcher, "workers": workers, "findings": findings}
                 results.append(fit(seeded, read, folder, **how))
     return (

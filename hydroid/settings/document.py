@@ -73,8 +73,6 @@ def read_document(text: str, source: str) -> tuple[Any, Lines]:
         raise SettingsError(f"is not YAML: {plain}", where=where) from None
     except RecursionError:
         raise SettingsError("is not YAML: it is nested too deeply", where=source) from None
-    except ValueError:
-        raise SettingsError("is not YAML: a value does not fit its type", where=source) from None
 
 
 def _value(node: yaml.Node, path: tuple[str, ...], lines: Lines, source: str) -> Any:

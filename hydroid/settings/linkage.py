@@ -216,8 +216,7 @@ def sides_of(
     bodies = int(data.model.body_parentid[child]), child
     local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
     parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    near, far = ends - axis.xanchor
-    return triangle_of(near, far, axis.xaxis), (parent, moved)
+    return _triangle(ends - axis.xanchor, axis.xaxis), (parent, moved)
 
 
 def make_cylinder(
@@ -248,19 +247,15 @@ def make_cylinder(
     return replace(cylinder, stroke=stroke)
 
 
-def triangle_of(parent: Array, child: Array, axis: Array) -> Triangle:
-    """Return the triangle of two pivots, seen from the joint at angle 0 [m], and the joint's axis, (3,) each.
-
-    Raises:
-        ValueError: a pivot on the axis, or a cylinder that does not lie across it.
-    """
-    heights = float(parent @ axis), float(child @ axis)
-    near, far = parent - heights[0] * axis, child - heights[1] * axis
-    a, b = float(np.linalg.norm(near)), float(np.linalg.norm(far))
+def _triangle(ends: Array, axis: Array) -> Triangle:
+    """The triangle of two pivots, (2, 3), seen from the joint at angle 0 [m], and the joint's axis, (3,)."""
+    heights = ends @ axis
+    near, far = flat = ends - np.outer(heights, axis)
+    a, b = np.linalg.norm(flat, axis=1).tolist()
     if min(a, b) < 1e-6:
         which = "parent" if a < 1e-6 else "child"
         raise ValueError(f"the pivot on the {which} lies on the joint's axis, so it has no moment arm")
-    length, skew = float(np.linalg.norm(near - far)), abs(heights[0] - heights[1])
+    length, skew = float(np.linalg.norm(near - far)), float(np.ptp(heights))
     if skew > 0.1 * length:  # the triangle is flat, and errs by half the square of this part
         raise ValueError(
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "

@@ -116,15 +116,11 @@ def validate(
     # the fault may lie in an override, below it, or in what it is a part of
     at = next((o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), None)
     if at is not None:
-        below = key[len(at) + 1 :]
-        what, where = f"{below}: {problem}" if below else problem, f"--set {at}"
+        name, where = key[len(at) + 1 :], f"--set {at}"
     else:
-        named = first["type"] in ("extra_forbidden", "missing") or not key  # the problem names the setting
-        what, where = (
-            problem if named else f"{_shown(key)[1:-1]}: {problem}",
-            source + _line(key, lines or {}),
-        )
-    raise SettingsError(what, where=where, hint=hint)
+        named = first["type"] in ("extra_forbidden", "missing")  # the problem names the setting
+        name, where = "" if named else _shown(key)[1:-1], source + _line(key, lines or {})
+    raise SettingsError(f"{name}: {problem}" if name else problem, where=where, hint=hint)
 
 
 def parse_override(text: str) -> tuple[str, Any]:

@@ -90,21 +90,21 @@ def make_parameter(
 
 
 def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
+    word = "within" if own.sd is None else "sd"
     if not own.has_prior:
         return None
     if nominal is None:
-        word = "sd" if own.within is None else "within"
         raise ValueError(
             f"{word}: needs a nominal value; the settings and the arm's file have none for this "
             f"{own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
         )
     if own.bounds is not None and not own.bounds[0] <= nominal <= own.bounds[1]:
         raise ValueError(f"the nominal value {nominal:g} {own.unit} lies outside the bounds")
-    if own.within is None:
-        return Prior(nominal, own.sd or math.inf)
+    if own.sd is not None:
+        return Prior(nominal, own.sd)
     if nominal <= 0:
         raise ValueError("within: factor needs a nominal value above 0; give sd: instead")
-    return Prior(nominal, math.log(own.within) / QUANTILE, log=True)
+    return Prior(nominal, math.log(own.within or 1.0) / QUANTILE, log=True)
 
 
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:

@@ -165,7 +165,7 @@ class SegmentSettings(Settings):
             raise ValueError(
                 f"give exactly one of equal, turning_points, times, not {' and '.join(given) or 'none'}"
             )
-        if self.times is not None and any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+        if self.times is not None and self.times != tuple(sorted({*self.times})):
             raise ValueError("times must increase")
         return self
 

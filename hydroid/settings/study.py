@@ -92,17 +92,12 @@ def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None
         try:
             cells[name] = load(config, FitSettings, every)
         except SettingsError as error:
-            raise _in_study(error, path, every) from None
+            key = error.where.removeprefix("--set ")
+            if key not in every:
+                raise
+            # the study's file and line in place of `--set KEY`
+            line = next((n for place, n in read_yaml(path)[1].items() if place and place[-1] == key), None)
+            where = f"{path}, line {line}" if line else str(path)
+            what = error.what if key in error.what else f"{key}: {error.what}"
+            raise SettingsError(what, where=where, hint=error.hint) from None
     return cells
-
-
-def _in_study(error: SettingsError, path: Path, changes: Changes) -> SettingsError:
-    """Return an error of a replaced setting with the study's file and line in place of `--set KEY`."""
-    key = error.where.removeprefix("--set ")
-    if key not in changes:
-        return error
-    _, lines = read_yaml(path)
-    line = next((number for place, number in lines.items() if place and place[-1] == key), None)
-    where = f"{path}, line {line}" if line else str(path)
-    what = error.what if key in error.what else f"{key}: {error.what}"
-    return SettingsError(what, where=where, hint=error.hint)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydroid import load_settings
-from hydroid.advice.commands import limited, violation
+from hydroid.advice.commands import violation
 from hydroid.advice.design import Design, design
 from hydroid.advice.information import forecast, measured, sensor_noise
 from hydroid.arm.model import load_machine
@@ -13,7 +13,6 @@ from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.design_report import design_table
-from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
@@ -70,18 +69,6 @@ def test_experiments_keep_clear_where_others_collide():
     assert len(checked) >= 3
 
 
-def test_a_limited_command_rises_at_its_rate_and_arrives():
-    start = np.array([10, 40])
-    jumps = np.zeros(60)
-    jumps[10:40], jumps[40:] = 50.0, -20.0
-    slow = limited(jumps, start, 5.0)
-    assert np.abs(np.diff(slow)).max() == pytest.approx(5.0)
-    assert slow[:10] == pytest.approx(np.zeros(10))
-    assert (slow[10], slow[19], slow[39], slow[53], slow[59]) == pytest.approx((5, 50, 50, -20, -20))
-    # it goes on from where it is when it had no time to arrive
-    assert limited(jumps, start, 1.0)[[39, 40]] == pytest.approx([30, 29])
-
-
 def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSettings, Design]):
     settings, result = designed
     assert keeps_limits(settings, result)
@@ -97,14 +84,6 @@ def test_a_design_keeps_its_limits_when_simulate_runs_it(designed: tuple[FitSett
 def test_tight_limits_are_kept_too(tight: dict[str, object]):
     settings = configured(**{"effort": 3} | tight)
     assert keeps_limits(settings, design(settings, THETA, [], 1))
-
-
-def test_a_violation_is_found_where_it_is(arm: Arm):
-    limits = DesignSettings(margin_deg=5, speed_deg_s=10)
-    angle = np.tile(arm.pose("study"), (100, 1))
-    assert violation(angle, 0.01, arm, limits) is None
-    angle[60:, 1] += np.radians(0.11)  # 11 deg/s for one sample
-    assert violation(angle, 0.01, arm, limits) == (60, 1, True)
 
 
 def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[FitSettings, Design]):

@@ -96,13 +96,6 @@ def test_an_unchanged_term_changes_nothing_and_a_changed_one_what_it_sets(late: 
     np.testing.assert_allclose(changed, right, atol=1e-12)
 
 
-def test_a_limit_that_is_switched_off_changes_by_its_reciprocal(late: tuple[Problem, Uncertainty]):
-    (limit,) = (term for term in terms(late[0]) if term.name == "flow_limit")
-    assert limit.value == np.inf
-    assert limit.at(0.0) == np.inf
-    assert limit.at(0.5) == pytest.approx(2 * limit.span[0])
-
-
 def test_a_missing_delay_is_named_with_its_value_and_a_line_that_frees_it(late: tuple[Problem, Uncertainty]):
     result = missing_terms(*late)
     first = result.tests[0]

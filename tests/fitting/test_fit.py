@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import step_log
 from small_fits import TRUTH, Study, Watcher
 
 import hydroid
@@ -129,37 +128,6 @@ def test_an_algorithm_that_cannot_begin_leaves_no_folder(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_seed_decides_every_bit(tmp_path):
-    problems = [Study(tmp_path, **{"search.seed": n}).problem for n in (1, 1, 2)]
-    same, again, other = (search(p, lambda row: None, lambda n, rms: None, {}) for p in problems)
-    np.testing.assert_array_equal(same.history, again.history)
-    assert not np.array_equal(same.history, other.history)
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"parameters.M1.link": "link9"}, "link9"),
-        ({"parameters.K.joints": [8]}, "joints 1 to 7"),
-        (
-            {"parameters.X": {"quantity": "gain", "joints": [2], "bounds": [0, 1]}},
-            "K and X both set the gain",
-        ),
-    ],
-)
-def test_parameters_that_do_not_fit_the_arm_are_refused(change, says):
-    settings = load_settings("article-mech", change)
-    with pytest.raises(SettingsError, match=says):
-        Bindings(settings)
-
-
-def test_all_parameters_fixed_is_refused():
-    changes = {f"parameters.{name}.fixed": value for name, value in TRUTH.items()}
-    settings = load_settings("article-mech", changes)
-    with pytest.raises(SettingsError, match="free"):
-        Problem(settings, [step_log(settings.arm.pose("study"), [60.0])])
-
-
 def test_a_fixed_parameter_stays_and_the_others_move(tmp_path):
     result = Study(tmp_path, **{"parameters.M3.fixed": 22.5}).fit()
     assert all(estimate.theta[5] == 22.5 for estimate in result.estimates.values())
@@ -187,10 +155,3 @@ def test_error_indices_against_their_definitions():
     assert pooled_indices([(measured, measured)]).fit == 100
     assert pooled_indices([(measured, np.full(500, measured.mean()))]).fit == pytest.approx(0, abs=1e-9)
     assert np.isnan(pooled_indices([(np.ones(5), np.zeros(5))]).fit)
-
-
-def test_a_joint_that_nothing_drives_is_refused(tmp_path):
-    log = Study(tmp_path).log
-    elsewhere = load_settings("article-mech", {"parameters.K.joints": [3]})
-    with pytest.raises(SettingsError, match=r"joint 2 .* gain"):
-        Problem(elsewhere, [log])

@@ -9,7 +9,6 @@ from small_fits import TRUTH
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine
-from hydroid.fitting.search import search
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.checkpoint import CheckpointFile
@@ -77,19 +76,3 @@ def test_another_refinement_has_a_checkpoint_of_its_own(problem, tmp_path):
     refine(problem, begin(problem), SHORT, lambda n, rms: None, checkpoints, "one")
     other = refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None, checkpoints, "another")
     assert equal(other, refine(problem, 1.1 * begin(problem), SHORT, lambda n, rms: None))
-
-
-def test_a_start_that_was_interrupted_goes_on_within_it(problem, tmp_path):
-    changes = {"starts": 1, "iterations": 3, "horizons": (0.25,)}
-    settings = problem.settings.search
-    multistart = settings.multistart.model_copy(update=changes)
-    settings = settings.model_copy(update={"algorithm": "multistart", "multistart": multistart})
-    problem = Counted(problem.settings.model_copy(update={"search": settings}), problem.logs)
-    whole = search(problem, lambda row: None, lambda n, rms: None, {})
-    stored = CheckpointFile(tmp_path / "parts.npz", "a")
-    with pytest.raises(KeyboardInterrupt):
-        search(problem, lambda row: None, stop_after(30), stored)
-    stored = CheckpointFile(tmp_path / "parts.npz", "a")
-    parts = search(problem, lambda row: None, lambda n, rms: None, stored)
-    np.testing.assert_array_equal(parts.theta, whole.theta)
-    np.testing.assert_array_equal(parts.history, whole.history)

@@ -1,6 +1,6 @@
 """The laws of the whole actuator, on one joint under MuJoCo."""
 
-from math import cos, radians
+from math import cos
 
 import numpy as np
 import pytest
@@ -24,14 +24,11 @@ from hydraulic_reference import (
 
 from hydroid.hydraulics.actuator import Observation
 from hydroid.hydraulics.cylinder import triangle
-from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY, has_force_curve
-from hydroid.hydraulics.solenoid import force_curve
+from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY
 from hydroid.settings.hydraulics import HydraulicSettings
 
 SETTINGS = HydraulicSettings()
 TIGHT = HydraulicSettings(leakage=0.0)
-DAY = np.zeros(6000)  # 60 s of rest
-
 Seen = list[tuple[Observation, np.ndarray]]
 
 
@@ -43,28 +40,6 @@ def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def weight(angle: float) -> float:
     """Torque of gravity and spring on the pendulum [N·m]."""
     return MASS * GRAVITY * CENTRE * cos(angle + TILT) + STIFFNESS * (angle - START)
-
-
-def test_shut_valves_hold_the_arm_for_a_minute():
-    seen: Seen = []
-    angle = simulate(parameters(TIGHT), DAY, TIGHT, observe=seen)
-    assert abs(angle - START).max() < 1e-9
-    first, last = seen[0][0].pressure, seen[-1][0].pressure
-    np.testing.assert_allclose(last, first, atol=10.0)
-
-
-def test_a_kick_dies_out_where_it_started():
-    """No drift: shut chambers keep their oil through motion, so the joint comes back to its angle."""
-    command = np.zeros(1500)
-    p = parameters(TIGHT)
-    rest = simulate(p, command, TIGHT)
-    start = START + radians(2.0)
-    # held at another angle by pressures for START's weight: swings, then settles where oil balances
-    seen: Seen = []
-    moved = simulate(p, command, TIGHT, start=start, observe=seen)
-    assert abs(np.diff(rest[0, -200:])).max() < 1e-12
-    assert abs(np.diff(moved[0, -200:])).max() < 1e-9
-    assert abs(seen[-1][1]).max() < 1e-7
 
 
 def test_shut_chambers_keep_their_oil_through_any_motion_and_cavitation():
@@ -172,34 +147,6 @@ def test_rest_after_motion_is_rest():
     assert abs(speed).max() < 1e-6
 
 
-def test_force_and_stroke_act_through_two_numbers_only():
-    """First two null directions: other points of the same force-stroke curve give the same motion."""
-    coil, gap = force_curve(8.0, 0.7, 0.8, 12.0, 0.9)
-    other = [coil * 0.81 / (x + gap) ** 2 for x in (1.7, 9.0)]
-    command = pulses(np.random.default_rng(5), 300)
-    both = parameters(
-        SETTINGS,
-        force_1=np.array([8.0, other[0]]),
-        force_2=np.array([0.7, other[1]]),
-        stroke_1=np.array([0.8, 1.7]),
-        stroke_2=np.array([12.0, 9.0]),
-    )
-    angle = simulate(both, command, SETTINGS)
-    np.testing.assert_allclose(angle[1], angle[0], atol=1e-11)
-    assert np.ptp(angle[0]) > 0.05
-
-
-def test_currents_trade_with_forces():
-    """Third null direction: both currents times s and both forces over s² give the same motion."""
-    s = np.array([1.0, 1.3])
-    command = pulses(np.random.default_rng(6), 300)
-    both = parameters(
-        SETTINGS, current_max=0.9 * s, current_min=0.3 * s, force_1=8 / s**2, force_2=0.7 / s**2
-    )
-    angle = simulate(both, command, SETTINGS)
-    np.testing.assert_allclose(angle[1], angle[0], atol=1e-11)
-
-
 def test_delay_shifts_the_response():
     fine = HydraulicSettings(leakage=0.0, substeps=10)
     command = pulses(np.random.default_rng(7), 300)
@@ -221,16 +168,6 @@ def test_dry_friction_takes_its_share_of_the_force():
     arm = cylinder(angle[-1])[1]
     needed = (weight(angle[-1]) + DAMPING * velocity[0, 0]) / arm
     assert measured.force[0, 0] - needed == pytest.approx(2000.0, rel=0.05)
-
-
-def test_an_infeasible_member_stands_still_and_harms_nobody():
-    p = parameters(TIGHT, stroke_1=np.array([0.8, 13.0, 0.8]))
-    command = pulses(np.random.default_rng(9), 200)
-    angle = simulate(p, command, TIGHT)
-    assert has_force_curve(p).tolist() == [True, False, True]
-    assert abs(angle[1] - START).max() < 1e-9
-    np.testing.assert_array_equal(angle[0], angle[2])
-    np.testing.assert_array_equal(simulate(p[[0]].view(np.recarray), command, TIGHT)[0], angle[0])
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():

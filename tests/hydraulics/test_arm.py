@@ -38,12 +38,6 @@ def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
     assert np.median(speed.max(axis=(1, 2))) > 0.2
 
 
-def test_the_arm_holds_its_pose_without_command(arm: Arm):
-    tight = HydraulicSettings(leakage=0.0)
-    angle = DrivenArm(arm, candidates(arm, 4, tight), np.zeros((500, 7)), tight).run()
-    assert abs(angle - angle[:, :1]).max() < 1e-8
-
-
 def test_seven_joints_converge_with_mujocos_step(arm: Arm):
     """Against the same arm at sixteen steps a sample, all joints driven."""
     p, command = nominal(arm, SETTINGS), commands(200, ALL, seed=3)

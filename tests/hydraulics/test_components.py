@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hydroid.hydraulics.cylinder import (
-    friction_damping,
     holding_pressures,
     stop_damping,
     triangle,
@@ -44,11 +43,6 @@ def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
     np.testing.assert_allclose(voltage, [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
     command = np.linspace(-100, 100, 201)
     np.testing.assert_array_equal(side_voltage(command, 1.4, 0.0), side_voltage(command, 1.4))
-
-
-def test_components_broadcast_over_a_population():
-    onset = np.array([[1.4], [0.7]])
-    assert side_voltage(np.linspace(-100, 100, 11), onset).shape == (2, 11)
 
 
 def test_current_is_a_line_between_its_limits():
@@ -203,11 +197,6 @@ def test_stops_oppose_motion_into_them_only():
     travel, speed = np.array([-1e-3, -1e-3, 0.05, 0.136, 0.136]), np.array([-0.1, 0.1, 1.0, 0.1, -0.1])
     damping = stop_damping(travel, speed, 0.135, 1e10)
     np.testing.assert_allclose(damping, [1e7, 0, 0, 1e7, 0], rtol=1e-9)
-
-
-def test_friction_force_saturates_at_its_value():
-    speed = np.array([1e-6, 0.01, 1.0])
-    np.testing.assert_allclose(friction_damping(speed, 200.0) * speed, [0.2, 199.0, 200.0], rtol=1e-2)
 
 
 def test_holding_pressures_balance_and_stay_between_tank_and_supply_where_they_can():

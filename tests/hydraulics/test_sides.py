@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hydraulic_reference import changed, simulate
 from hydraulic_reference import wheel as lone_wheel
-from recovery import recover, settings_of
 
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY, nominal_joints
-from hydroid.quantity_table import QUANTITIES, ROWS, TARGETS
+from hydroid.quantity_table import TARGETS
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import validate
@@ -48,17 +47,3 @@ def test_a_name_without_side_sets_both(name: str):
     assert one == both
     with pytest.raises(SettingsError, match=f"{name}_b is given twice"):
         validate({name: 0.7, f"{name}_b": 0.7}, HydraulicSettings, "here")
-
-
-def test_every_side_has_its_other():
-    for row in ROWS:
-        a, b = (QUANTITIES[name] for name in TARGETS[row.name]) if row.sides else (QUANTITIES[row.name],) * 2
-        assert (a.unit, a.factor, a.span) == (b.unit, b.factor, b.span)
-        assert "{" not in a.meaning + b.meaning + a.plain
-
-
-def test_two_parameters_for_one_side_are_refused():
-    bounds = {"bounds": [0.0, 1.0], "joints": [2]}
-    settings = settings_of({"d": {"quantity": "delay", **bounds}, "d_B": {"quantity": "delay_b", **bounds}})
-    with pytest.raises(SettingsError, match="d and d_B both set the delay_b"):
-        recover(settings, [], {}, {})

@@ -38,23 +38,6 @@ def test_logs_that_excite_alike_give_the_cluster_sandwich_of_statsmodels():
     np.testing.assert_allclose(found.interval, np.stack([theta - half, theta + half], axis=1), rtol=1e-6)
 
 
-def test_the_spread_is_that_of_refits_without_each_log():
-    """Two draws of the noise differ by what refits say: the expected sum is that of both."""
-    sums, variances = [], []
-    for draw in (2, 3):
-        problem, _, groups = several(4, np.random.default_rng(7))
-        rng = np.random.default_rng(draw)
-        problem.measured = THETA @ problem.columns + rng.normal(0, LEVEL, groups.size)
-        theta = least_squares(problem.columns, problem.measured)
-        kept = [groups != log for log in range(4)]
-        refits = [least_squares(problem.columns[:, k], problem.measured[k]) for k in kept]
-        sums.append(np.sum((np.array(refits) - theta) ** 2, axis=0))
-        found = by_log(problem, uncertainty(problem, theta))
-        assert found is not None
-        variances.append((found.relative * theta) ** 2)
-    np.testing.assert_allclose(variances[0] / variances[1], sums[0] / sums[1], rtol=1e-5)
-
-
 def test_one_log_has_no_spread_and_a_log_alone_leaves_a_parameter_unknown():
     rng = np.random.default_rng(4)
     problem, theta, groups = several(3, rng)

@@ -13,12 +13,9 @@ from hydroid.posterior.flags import Flag
 from hydroid.posterior.jacobian import jacobian
 from hydroid.posterior.noise import (
     MIN_LEVEL,
-    STEP,
     Noise,
     channel_noise,
     fit_noise,
-    neighbours,
-    unbiased,
 )
 from hydroid.posterior.profile import THRESHOLD, better_optimum, profile
 
@@ -172,34 +169,6 @@ def test_noise_is_taken_from_settings_residual_or_floor():
         replace(channel, weight=3.0), residual, how.model_copy(update={"noise_deg": 0.7})
     )
     assert weighted.level == pytest.approx(2.1 * DEG)
-
-
-def test_what_a_fit_absorbs_comes_back():
-    """Three slow effects take a part of slow noise out of a residual; the corrected process has it again."""
-    samples, phi = 4000, np.exp(-0.01 / 0.5)  # eighty correlation times
-    effects = np.linalg.svd(slow(3, samples, seed=3), full_matrices=False)[2]
-    rng, raw, restored = np.random.default_rng(4), [], []
-    for _ in range(100):
-        noise = ar1(rng, samples, phi, 0.1 * DEG)
-        process = fit_noise(noise - effects.T @ (effects @ noise))
-        raw.append(process.covariance_of(effects).trace())
-        process = unbiased(process, effects, process.covariance_of(effects))
-        restored.append(process.covariance_of(effects).trace())
-    true = Noise(samples, 0.1 * DEG, np.array([-phi])).covariance_of(effects).trace()
-    assert np.mean(raw) < 0.95 * true
-    assert np.mean(restored) == pytest.approx(true, rel=0.1)
-
-
-def test_the_errors_of_a_process_are_those_of_its_estimates():
-    """Variances that follow from estimated processes scatter as the delta method says."""
-    samples, rng, rows = 4000, np.random.default_rng(5), slow(2, 4000)
-    true = Noise(samples, 1.0, np.array([-AR1]))
-    seen = [fit_noise(ar1(rng, samples, AR1, 1.0), 1).covariance_of(rows).diagonal() for _ in range(400)]
-    base = true.covariance_of(rows).diagonal()
-    moved = [(other.covariance_of(rows).diagonal() / base - 1) / STEP for other in neighbours(true)]
-    expected = np.sqrt(np.sum(np.square(moved), axis=0))
-    np.testing.assert_allclose(np.std(np.log(seen), axis=0), expected, rtol=0.1)
-    assert neighbours(replace(true, source="settings")) == []
 
 
 def test_the_quantile_covers_an_estimate_whose_variance_is_log_normal():

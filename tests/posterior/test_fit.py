@@ -14,7 +14,6 @@ from hydroid.errors import RunError
 from hydroid.estimate import FitSummary
 from hydroid.posterior.posterior import stored_posterior
 from hydroid.prediction import simulate_log
-from hydroid.reporting.quantities_report import curves_csv, quantity_table
 from hydroid.settings.load import load
 
 TRUTH = {"A_A": 1000, "A_B": 750, "F2": 0.7, "x2": 12.0}
@@ -87,15 +86,6 @@ def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):
     hydroid.load_plant(fitted.folder).save(tmp_path / "plant")
     saved = hydroid.quantity(tmp_path / "plant", speeds)
     np.testing.assert_array_equal(saved.interval, found.interval)
-
-
-def test_the_report_has_the_quantities_that_are_determined(fitted):
-    quantities = fitted.fit.quantities
-    table = quantity_table(fitted.summary, fitted.problem.settings.arm.joint_names)
-    known = [q.label for q in quantities.scalars.values() if q.within <= 1.0]
-    assert [row[1] for row in table.rows] == known
-    rows = curves_csv(quantities.curves).splitlines()
-    assert len(rows) == 1 + sum(len(curve.at) for curve in quantities.curves.values())
 
 
 def test_the_curves_of_an_identified_actuator_have_bands(fitted, tmp_path):

@@ -53,18 +53,6 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
     assert problem.rms(rows[None])[0] < 1e-12  # the error of angles alone
 
 
-def test_pressures_depend_on_the_areas_level(hydraulic):
-    """With both areas changed in proportion the angle hardly changes, but the pressures do."""
-    settings, log = hydraulic
-    problem = Problem(settings, [log])
-    truth = problem.parameters.vector(HYDRAULIC, "truth")
-    moved = truth.copy()
-    names = problem.parameters.names
-    moved[[names.index("A_A"), names.index("A_B")]] *= 1.1
-    rows = problem.residuals(moved[None])[0]
-    assert all(np.abs(rows[c.rows]).max() > np.deg2rad(0.1) for c in problem.channels[1:])
-
-
 def test_pressures_do_not_change_the_angles(hydraulic):
     settings, log = hydraulic
     without = settings.model_copy(

@@ -204,9 +204,3 @@ def test_each_segment_is_scored_by_its_own_samples():
 def test_settings_that_cannot_be_used_are_named(values, message):
     with pytest.raises(SettingsError, match=message):
         validate(values, ObjectiveSettings, "fit.yaml")
-
-
-def test_settings_default_to_the_articles():
-    how = validate({}, ObjectiveSettings, "fit.yaml")
-    assert (how.norm, how.relative, how.segments.equal) == ("inf", False, 8)
-    assert validate({"norm": float("inf")}, ObjectiveSettings, "fit.yaml").norm == "inf"

@@ -59,11 +59,6 @@ def test_a_search_stays_where_every_prior_nearly_holds():
     assert np.all(moved[:, 2] == 2.0)
 
 
-def test_a_constraint_holds_to_a_ten_thousandth():
-    moved = priors(sum={"of": ["a", "b"], "value": 8.0}).project(random_candidates(100))
-    assert moved[:, 0] + moved[:, 1] == pytest.approx(8.0, abs=1e-3)
-
-
 def test_projection_is_idempotent_and_row_by_row():
     known = priors(sum={"of": ["a", "b"], "value": 8.0, "sd": 0.1}, d={"of": "d", "value": 300, "sd": 1})
     candidates = random_candidates(50)
@@ -120,10 +115,3 @@ def test_a_refinement_weighs_priors_against_the_logs():
     theta = problem.parameters.from_unit(result.point[None])
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)
     assert np.rad2deg(problem.rms(problem.residuals(theta))[0]) < 0.105
-
-
-def test_a_search_stays_at_a_prior_of_the_total_mass():
-    known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 42.5, "sd": 0.1}}
-    problem, _ = masses_problem(known)
-    unit = np.random.default_rng(1).random((30, 9))
-    assert problem.theta(unit)[:, 3:].sum(axis=1) == pytest.approx(42.5, abs=0.21)

@@ -32,23 +32,6 @@ def test_neighbouring_values_differ_in_one_bit():
     assert (np.count_nonzero(bits[1:] != bits[:-1], axis=1) == 1).all()
 
 
-def test_the_first_bit_is_the_highest():
-    coding = GrayCoding(1)
-    assert coding.encode(np.array([[1.0]]))[0].tolist() == [1] + [0] * 15
-    assert np.flatnonzero(np.diff(coding.encode(EVERY)[:, 0].astype(int))).tolist() == [32767]
-
-
-def test_elements_are_decoded_each_by_itself():
-    coding = GrayCoding(3)
-    rng = np.random.default_rng(0)
-    chromosomes = coding.random(50, rng)
-    changed = chromosomes.copy()
-    changed[:, 16:32] = coding.random(50, rng)[:, 16:32]
-    same = coding.decode(chromosomes) == coding.decode(changed)
-    assert same[:, [0, 2]].all()
-    assert not same[:, 1].all()
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_points_are_uniform(kind):
     coding = kind(2)

@@ -9,9 +9,8 @@ import pytest
 from search_runs import advance, same
 
 from hydroid.errors import SettingsError
-from hydroid.search.algorithm import Population
 from hydroid.search.cmaes import cmaes
-from hydroid.search.library import UNSCALED, LibraryAlgorithm
+from hydroid.search.library import LibraryAlgorithm
 from hydroid.search.moo import ALGORITHMS, directions, pymoo
 from hydroid.search.nsga2 import crowded_order
 from hydroid.settings.load import validate
@@ -113,35 +112,6 @@ def test_what_diverged_never_reaches_a_library_nor_the_result(name: str):
     assert all(np.isfinite(values).all() for values in told)
     assert population.feasible.all()
     assert (population.chromosomes <= 0.75).all()
-
-
-def test_infeasible_candidates_are_told_worse_than_all_feasible_ones_so_far():
-    algorithm = build("NSGA3")
-    told = []
-
-    class Engine:
-        def ask(self):
-            return np.zeros((3, 3))
-
-        def tell(self, values):
-            told.append(values)
-
-    algorithm.begin = lambda rng: Engine()
-    algorithm.ask(None, np.random.default_rng(0))
-    nan, inf = np.nan, np.inf
-    for values in (
-        [[nan, 1], [1, inf], [nan, nan]],
-        [[1.0, -10], [3, -30], [nan, -50]],
-        [[2.0, -20], [1e200, 0], [-inf, 0]],
-    ):
-        algorithm.tell(None, scored(values))
-    np.testing.assert_array_equal(told[0], UNSCALED)  # no scale is known yet
-    np.testing.assert_array_equal(told[1], [[1, -10], [3, -30], [5, 10]])
-    np.testing.assert_array_equal(told[2], [[2, -20], [5, 10], [5, 10]])
-
-
-def scored(values):
-    return Population(np.zeros((len(values), 3)), np.array(values, dtype=float))
 
 
 @pytest.mark.parametrize("name", ["cmaes", *ALGORITHMS])

@@ -78,12 +78,6 @@ def test_a_tournament_gives_every_candidate_two_chances_and_the_better_wins():
     assert counts.sum() == 10
 
 
-def test_the_candidate_with_the_least_room_wins_no_tournament_on_its_front():
-    front = np.array([[0.0, 9], [1, 5], [2, 4], [9, 0]])  # room: inf, 7/9, 13/9, inf
-    wins = np.concatenate([tournament(front, 4, np.random.default_rng(k)) for k in range(50)])
-    assert set(wins) == {0, 2, 3}
-
-
 def test_roomier_candidates_win_among_equals():
     angle = np.concatenate((np.linspace(0, 0.2, 10), [0.8, np.pi / 2]))
     front = np.stack((np.cos(angle), np.sin(angle)), axis=1)

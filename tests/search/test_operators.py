@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from hydroid.search.coding import GrayCoding, IntegerCoding
 from hydroid.search.operators import (
-    GeneticAlgorithm,
     crossover,
     mutate,
     pointwise_swaps,
@@ -117,10 +116,3 @@ def test_the_mutation_rate_is_per_element(kind):
     assert genes.max() == 1
     assert abs((genes > 0).mean() - 0.2) < 5 * np.sqrt(0.16 / genes.size)
     assert (mutate(parents, 0.0, coding, rng) == parents).all()
-
-
-@pytest.mark.parametrize("count", [7, 8])
-def test_breeding_without_operators_is_cloning(count):
-    algorithm = GeneticAlgorithm(GeneticSettings(crossover_rate=0, mutation_rate=0), 3)
-    parents = algorithm.coding.random(8, np.random.default_rng(0))
-    assert (algorithm.breed(parents, count, np.random.default_rng(0)) == parents[:count]).all()

@@ -62,6 +62,10 @@ def test_ranks_by_their_definition(objectives):
     for i, a in enumerate(objectives):
         above = [rank[j] for j, b in enumerate(objectives) if dominates(b, a)]
         assert rank[i] == (max(above) + 1 if above else 0)
+    feasible = np.isfinite(objectives).all(axis=1)
+    assert (crowding(objectives, rank)[~feasible] == 0).all()
+    assert not non_dominated(objectives)[~feasible].any()
+    assert non_dominated(objectives).any() == feasible.any()
 
 
 @given(objectives=populations, data=st.data())
@@ -71,17 +75,6 @@ def test_ranks_do_not_depend_on_order_unit_or_zero(objectives, data):
     rank = ranks(objectives)
     assert (ranks(objectives[order]) == rank[order]).all()
     assert (ranks(objectives[:, columns] * 3 + 7) == rank).all()
-
-
-@given(objectives=populations)
-def test_the_infeasible_come_last_without_room(objectives):
-    feasible = np.isfinite(objectives).all(axis=1)
-    rank = ranks(objectives)
-    if feasible.any() and not feasible.all():
-        assert rank[~feasible].min() > rank[feasible].max()
-    assert (crowding(objectives, rank)[~feasible] == 0).all()
-    assert not non_dominated(objectives)[~feasible].any()
-    assert non_dominated(objectives).any() == feasible.any()
 
 
 @given(seed=st.integers(0, 2**32))

@@ -12,7 +12,6 @@ from conftest import replaced, step_log
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import Candidates, Simulation
-from hydroid.simulation.rollout import compile_rollout
 from hydroid.simulation.scenario import Scenario
 
 SHOULDER = [1]
@@ -38,22 +37,6 @@ def steps(arm):
     return step_log(arm.pose("study"), [60.0, -80.0, 0.0, 30.0, -40.0])
 
 
-def test_with_shut_valves_and_no_leakage_the_arm_stands_for_a_minute(spec, arm):
-    log = step_log(arm.pose("study"), [0.0], dwell=60.0)
-    everyone = candidates(arm, 3, leakage=0.0)
-    response = simulation(spec, arm, log, other_joints="passive").simulate(everyone)
-    assert response.feasible.all()
-    assert np.abs(response.angle[:, :, 0] - arm.pose("study")[1]).max() < 1e-6
-
-
-def test_the_answer_converges_with_mujocos_step(spec, arm, steps):
-    everyone = candidates(arm, 4)
-    angle = [simulation(spec, arm, steps, steps_per_sample=s).simulate(everyone).angle for s in (1, 2, 4, 16)]
-    errors = [np.abs(a - angle[-1]).max() for a in angle[:-1]]
-    assert errors[0] < np.deg2rad(0.3)
-    assert errors[2] < 0.5 * errors[0]
-
-
 def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, steps):
     everyone = candidates(arm, 2)
     held = {"stiffness": 1e5, "damping": 1e4}
@@ -77,13 +60,6 @@ def test_the_trace_explains_the_motion(spec, arm, steps):
     oil = np.cumsum(trace.flow[:, 0, 0]) * steps.period / one.joints.area_a[0, 1]
     assert np.ptp(way) > 2e-3
     np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
-
-
-def test_reading_the_compiled_loop_from_the_cache_is_not_announced(caplog):
-    compile_rollout()
-    compile_rollout.cache_clear()
-    compile_rollout()
-    assert "compiling" not in caplog.text
 
 
 @pytest.mark.slow

@@ -6,6 +6,8 @@ from hydroid.viewer.opengl import choose_platform
 
 choose_platform()
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -16,6 +18,9 @@ from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.simulation import Candidates
+
+TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+"""the article's values of stage 1"""
 
 # an example's time says nothing on a machine that is busy with something else
 settings.register_profile("hydroid", deadline=None)
@@ -46,6 +51,14 @@ def step_log(pose: np.ndarray, levels: list[float], dwell: float = 1.0, joint: i
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
+def noisy(log: Log, level_deg: float, seed: int = 0, exact_start: bool = True) -> Log:
+    """The log with white noise on all angles, but for its first sample."""
+    noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(level_deg), log.angle.shape)
+    if exact_start:
+        noise[0] = 0.0
+    return replace(log, angle=log.angle + noise)
+
+
 def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | None = None) -> Candidates:
     """Random candidates around the article's true values; every joint shares gain, damping and stiffness."""
     rng = np.random.default_rng(seed)
@@ -54,6 +67,14 @@ def candidates(arm: Arm, n: int, seed: int = 0, hydraulics: HydraulicSettings | 
     for name, value in (("gain", 0.2), ("damping", 231.8), ("stiffness", 53.4)):
         values[name] = rng.uniform(0.5, 2.0, (n, 1)) * value * joints
     return Candidates(values, rng.uniform(0.5, 2.0, (n, len(arm.masses))) * arm.masses)
+
+
+def scattered(arm: Arm, n: int, **hydraulics: float) -> Candidates:
+    """Random arms whose areas, currents and calibration differ too."""
+    rng, everyone = np.random.default_rng(0), candidates(arm, n, hydraulics=HydraulicSettings(**hydraulics))
+    for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
+        everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
+    return everyone
 
 
 def replaced(candidates: Candidates, **joints: np.ndarray | float) -> Candidates:

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import step_log
-from small_fits import TRUTH
+from conftest import TRUTH, step_log
 
 from hydroid import load_settings
 from hydroid.errors import HydroidError
@@ -12,7 +11,7 @@ from hydroid.fitting.findings import fit_findings
 from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Evaluation, Problem
+from hydroid.problem.problem import Problem
 
 STEPS = 2**16 - 1
 """of a parameter's 16 bits"""
@@ -36,13 +35,8 @@ class Fragile(Problem):
 
 
 def make(kind=Fragile, **changes) -> Problem:
-    small = {
-        "search.ga.population": 10,
-        "search.ga.generations": 5,
-        "search.nsga2.population": 10,
-        "search.nsga2.generations": 5,
-        "objective.segments": {"equal": 3},
-    }
+    small = {f"search.{algorithm}": {"population": 10, "generations": 5} for algorithm in ("ga", "nsga2")}
+    small |= {"objective.segments": {"equal": 3}}
     settings = load_settings("article-mech", small | changes)
     log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH, "truth")
     return kind(settings, [log])
@@ -87,25 +81,3 @@ def test_where_everything_diverges_the_run_says_so():
     for algorithm in ("ga", "nsga2"):
         with pytest.raises(HydroidError, match="no candidate of the population could be simulated"):
             fit(make(Hopeless, **{"search.algorithm": algorithm}))
-
-
-def test_a_member_that_is_infinite_somewhere_is_infeasible_throughout_the_memo():
-    problem = make()
-    theta = problem.parameters.from_unit(np.random.default_rng(0).random((6, 9)))
-
-    class Blind(Problem):
-        """Half of the sets have an objective that is no number: the lowest of all, were it compared."""
-
-        def evaluate(self, theta):
-            found = np.arange(1.0, len(theta) + 1)
-            found[::2] = [np.nan, np.inf, -np.inf][: len(found[::2])]
-            return Evaluation(np.tile(found[:, None], (1, 4)))
-
-    memo = Memo(make(Blind))
-    memo.evaluate(theta)
-    assert memo.infeasible == 3
-    np.testing.assert_array_equal(memo.best, theta[1])
-    again = Memo(memo.problem, memo.arrays())
-    again.evaluate(theta)
-    assert again.infeasible == 3
-    np.testing.assert_array_equal(again.best, theta[1])

@@ -2,7 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_fits import TRUTH, Study, Watcher
+from conftest import TRUTH
+from small_fits import Study, Watcher
 
 import hydroid
 from hydroid import load_settings
@@ -126,6 +127,24 @@ def test_an_algorithm_that_cannot_begin_leaves_no_folder(tmp_path):
     with pytest.raises(SettingsError, match="minimises several objectives"):
         hydroid.fit(settings, [study.log], tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"parameters.M1.link": "link9"}, "link9"),
+        ({"parameters.K.joints": [8]}, "joints 1 to 7"),
+        ({"parameters.K.joints": [3]}, r"joint 2 .* gain"),
+        (
+            {"parameters.X": {"quantity": "gain", "joints": [2], "bounds": [0, 1]}},
+            "K and X both set the gain",
+        ),
+        ({f"parameters.{name}.fixed": value for name, value in TRUTH.items()}, "free"),
+    ],
+)
+def test_parameters_that_do_not_fit_the_arm_are_refused(change, says, study_log):
+    with pytest.raises(SettingsError, match=says):
+        Problem(load_settings("article-mech", change), [study_log])
 
 
 def test_a_fixed_parameter_stays_and_the_others_move(tmp_path):

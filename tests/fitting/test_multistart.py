@@ -39,15 +39,6 @@ def unit(problem: Problem, n: int) -> np.ndarray:
     return np.random.default_rng(1).random((n, len(problem.parameters.names)))
 
 
-def test_the_first_seconds_count_from_the_first_command(exact):
-    (log,) = exact.logs
-    part = log.first(1.0)
-    assert part.time[-1] == pytest.approx(0.5 + 1.0)
-    np.testing.assert_array_equal(part.command, log.command[:151])
-    np.testing.assert_array_equal(part.angle, log.angle[:151])
-    assert len(log.first(1e3).time) == len(log.time)
-
-
 def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time(exact):
     theta = exact.theta(unit(exact, 1))
     part = exact.varied(exact.settings.in_one_segment(), [exact.logs[0].first(1.0)])

@@ -1,11 +1,8 @@
 """A refinement that goes on where it was stopped."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from conftest import step_log
-from small_fits import TRUTH
+from conftest import TRUTH, noisy, step_log
 
 from hydroid import load_settings
 from hydroid.fitting.refinement import refine
@@ -33,8 +30,7 @@ def problem(request, arm):
     priors = {} if request.param == "no prior" else {"link 3": {"of": "M3", "value": 22.0, "sd": 0.5}}
     settings = load_settings("article-mech", {"priors": priors})
     log = simulate_log(settings, step_log(arm.pose("study"), [60.0, -80.0]), TRUTH, "truth")
-    noise = np.random.default_rng(0).normal(0, 1e-3, log.angle.shape)
-    return Counted(settings, [replace(log, angle=log.angle + noise)])
+    return Counted(settings, [noisy(log, 0.06, exact_start=False)])
 
 
 def begin(problem) -> np.ndarray:

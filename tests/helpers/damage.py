@@ -1,11 +1,9 @@
-"""Damaged files from a seed: edits of bytes, lines and tokens, and of values in a tree of YAML or JSON."""
+"""Damaged files from a seed: edits of bytes, lines and tokens."""
 
 import codecs
-import copy
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from random import Random
-from typing import Any
 
 NUMBERS = (
     """0 -0 1e308 -1e308 1e999 1e-320 nan inf -inf .nan .inf 1e3 0x1F 010 1_0 1,5 1:30 2024-01-01 1.5.2"""
@@ -18,26 +16,6 @@ TOKENS = (
     *("../../etc/passwd", "/", "..", "~root", "file:///etc/passwd", "<script>alert(1)</script>", "&x;"),
     *("!!python/object/apply:os.mkdir [made]", "!!python/name:os.system", "!!set {a, b}", "!!int x"),
 )
-VALUES: tuple[Any, ...] = (
-    *(None, True, False, 0, -0.0, 1, -1, 2, 1.5, 1e308, 1e-320, 10**18, 10**320, float("nan"), float("inf")),
-    *(
-        "",
-        "x",
-        "1",
-        "1e3",
-        "../../etc",
-        "a" * 5000,
-        "\x1b[0m",
-        "<b>",
-        "{joint}",
-        "\ud800",
-        "\0",
-        "ratio",
-        "hyd",
-    ),
-    *([], {}, [0, 0], [1, 2], [2, 1], [1] * 100, {"x": 1}, [[1], [2]], {1: {2: 3}}, [None]),
-)
-
 Edit = Callable[[Random, bytes], bytes]
 
 
@@ -46,30 +24,6 @@ def damage(rng: Random, data: bytes) -> bytes:
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         data = rng.choice(EDITS)(rng, data)
     return data
-
-
-def change_tree(rng: Random, tree: Any) -> Any:
-    """Replace, remove, rename or add one to three values of nested mappings and lists."""
-    tree = copy.deepcopy(tree)
-    for _ in range(rng.choice((1, 1, 2, 3))):
-        holder, key = rng.choice([*_holders(tree)] or [({"x": 1}, "x")])
-        match rng.randrange(5):
-            case 0:
-                del holder[key]
-            case 1 if isinstance(holder, dict):
-                holder[rng.choice(("of", "fixed", "gain", "99", 1, None))] = holder.pop(key)
-            case 2 | 3 if isinstance(holder[key], int | float) and abs(holder[key]) < 1e300:
-                holder[key] = type(holder[key])(holder[key] * rng.choice((0.5, 2, -1, 3, 1.01, 1e6)))
-            case _:
-                holder[key] = copy.deepcopy(rng.choice(VALUES))
-    return tree
-
-
-def _holders(tree: Any) -> Iterator[tuple[Any, Any]]:
-    items = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    for key, value in items:
-        yield tree, key
-        yield from _holders(value)
 
 
 def _flip(rng: Random, data: bytes) -> bytes:

@@ -1,11 +1,10 @@
 """Small fits for tests: the article's true values, a watcher, and fits of a simulated log in folders."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from conftest import step_log
+from conftest import TRUTH, noisy, step_log
 
 from hydroid import load_settings, read_logs
 from hydroid.fitting.fit import Fit, fit
@@ -15,8 +14,6 @@ from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
-
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
 def steps_of(
@@ -30,10 +27,7 @@ def steps_of(
     for joint, duties in levels.items():
         command[50:, joint - 1] = np.repeat(duties, 400 // len(duties))
     log = Log("steps", np.arange(450) * 0.01, command, np.tile(settings.arm.pose("study"), (450, 1)), 0.01)
-    log = simulate_log(settings, log, truth, "truth")
-    noise = np.random.default_rng(0).normal(0.0, np.deg2rad(noise_deg), log.angle.shape)
-    noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
+    return noisy(simulate_log(settings, log, truth, "truth"), noise_deg)
 
 
 class Watcher:

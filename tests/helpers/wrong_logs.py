@@ -20,16 +20,20 @@ Table = dict[str, np.ndarray]
 class Wrong:
     """One way in which logs are wrong.
 
-    how: in words, for the table. level and said: of the finding that must be there. make: the logs.
+    how: in words, for the table. said: level and words of the finding that must be there. make: the logs.
     settings: of `log`. header: what stands between the names and the numbers.
     """
 
     how: str
-    level: str
     said: str
     make: Callable[[], list[Table]]
     settings: Mapping[str, Any] = field(default_factory=dict)
     header: str = ""
+
+    def line(self, folder: Path) -> str:
+        """Return the line of the finding that `hydroid check` says of the logs."""
+        level, words = self.said.split(": ", 1)
+        return next(line for line in told(self, folder) if line.startswith(level) and words in line)
 
 
 def rig(name: str = "rig_all_joints_1", rows: int = 4000) -> Table:
@@ -89,138 +93,110 @@ def wrapped(table: Table) -> Table:
 
 UNITS = "\n" + ",".join(["s"] + ["V"] * 7 + ["deg", "rad"] + ["deg"] * 5)
 WRONG = (
-    Wrong(
-        "commands from −1 to 1", "warning", "set log.command.scale: 100", lambda: of("u", lambda u: u / 100)
-    ),
-    Wrong("commands in ±10 V", "warning", "set log.command.scale: 10", lambda: of("u", lambda u: u / 10)),
-    Wrong("commands in ±1000", "error", "set log.command.scale: 0.1", lambda: of("u", lambda u: u * 10)),
+    Wrong("commands from −1 to 1", "warning: set log.command.scale: 100", lambda: of("u", lambda u: u / 100)),
+    Wrong("commands in ±10 V", "warning: set log.command.scale: 10", lambda: of("u", lambda u: u / 10)),
+    Wrong("commands in ±1000", "error: set log.command.scale: 0.1", lambda: of("u", lambda u: u * 10)),
     Wrong(
         "commands in 4 to 20 mA",
-        "warning",
-        "set log.command.scale: 12.5 and log.command.offset: -150",
+        "warning: set log.command.scale: 12.5 and log.command.offset: -150",
         lambda: of("u2", lambda u: 12 + 0.08 * u),
     ),
     Wrong(
         "a joystick of 0 to 5 V",
-        "warning",
-        "set log.command.scale: 40 and log.command.offset: -100",
+        "warning: set log.command.scale: 40 and log.command.offset: -100",
         lambda: of("u2", lambda u: 2.5 + 0.025 * u),
     ),
-    Wrong("angles in rad, read as deg", "warning", "set log.angle.unit: rad", lambda: of("q", np.deg2rad)),
+    Wrong("angles in rad, read as deg", "warning: set log.angle.unit: rad", lambda: of("q", np.deg2rad)),
     Wrong(
         "angles in deg, read as rad",
-        "error",
-        "set log.angle.unit: deg",
+        "error: set log.angle.unit: deg",
         lambda: of("", np.asarray),
         {"angle": {"unit": "rad"}},
     ),
     Wrong(
         "the file's own row of units says rad and V",
-        "warning",
-        "the file says that q2_deg is in rad",
+        "warning: the file says that q2_deg is in rad",
         lambda: of("q", np.deg2rad, rig("rig_shoulder_1")),
         header=UNITS,
     ),
-    Wrong("time in ms, read as s", "error", "set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
+    Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
     Wrong(
-        "a clock in days, read as s",
-        "error",
-        "set log.time.unit: day",
-        lambda: of("time", lambda t: t / 86400),
+        "a clock in days, read as s", "error: set log.time.unit: day", lambda: of("time", lambda t: t / 86400)
     ),
     Wrong(
         "an angle that counts the other way",
-        "error",
-        "set log.joints.3.angle.scale: -1",
+        "error: set log.joints.3.angle.scale: -1",
         lambda: of("q3", np.negative),
     ),
     Wrong(
         "a command wired the other way",
-        "warning",
-        "angle of joint 2 moves against the command (for 99% of",
+        "warning: angle of joint 2 moves against the command (for 99% of",
         lambda: of("u2", np.negative),
     ),
     Wrong(
         "one of three logs wired the other way",
-        "warning",
-        "joint 2 moves against its command in 1 of 3 logs",
+        "warning: joint 2 moves against its command in 1 of 3 logs",
         lambda: [*of("u2", np.negative), rig(), rig("rig_shoulder_2")],
     ),
     Wrong(
         "a command that is logged 0.3 s early",
-        "note",
-        "looks 0.33 s early against the angle; set log.delay_s: 0.33",
+        "note: looks 0.33 s early against the angle; set log.delay_s: 0.33",
         lambda: shifted(30),
     ),
     Wrong(
-        "clocks that differ by 0.2 s",
-        "warning",
-        "before the command, as no machine does",
-        lambda: shifted(-20),
+        "clocks that differ by 0.2 s", "warning: before the command, as no machine does", lambda: shifted(-20)
     ),
     Wrong(
-        "0.4 s without a sample",
-        "error",
-        "cut the log into two files there",
-        lambda: without(*range(900, 940)),
+        "0.4 s without a sample", "error: cut the log into two files there", lambda: without(*range(900, 940))
     ),
-    Wrong("a dropped sample", "error", "fill it with --repair", lambda: without(900)),
+    Wrong("a dropped sample", "error: fill it with --repair", lambda: without(900)),
     Wrong(
         "a sample that stands twice",
-        "error",
-        "time does not increase",
+        "error: time does not increase",
         lambda: of("", lambda v: np.insert(v, 900, v[900])),
     ),
     Wrong(
         "a cell that holds no number",
-        "error",
-        "'nan' is not a number",
+        "error: 'nan' is not a number",
         lambda: of("q2", lambda q: np.where(np.arange(len(q)) == 700, np.nan, q)),
     ),
     Wrong(
         "a dead sensor",
-        "warning",
-        "angle of joint 2 never changes",
+        "warning: angle of joint 2 never changes",
         lambda: of("q2", lambda q: np.full_like(q, q[0])),
     ),
     Wrong(
         "the angle of another joint",
-        "warning",
-        "strong commands hardly move joint 2",
+        "warning: strong commands hardly move joint 2",
         lambda: [{**(t := rig("rig_shoulder_1")), "q2_deg": t["q1_deg"]}],
     ),
     Wrong(
         "an encoder that wraps",
-        "note",
-        "angle of joint 6 wraps by 360 deg and was joined",
+        "note: angle of joint 6 wraps by 360 deg and was joined",
         lambda: [wrapped(rig())],
     ),
     Wrong(
         "a misspelt column",
-        "error",
-        "did you mean 'U2_pct'?",
+        "error: did you mean 'U2_pct'?",
         lambda: [{n.replace("u2", "U2"): v for n, v in rig().items()}],
     ),
     Wrong(
         "a joint that is pushed against its stop",
-        "note",
-        "joint 2 is driven against the end of its travel for",
+        "note: joint 2 is driven against the end of its travel for",
         lambda: [boom([60, -60, 100, -100], seconds=8)],
     ),
     Wrong(
         "constant command levels with gaps",
-        "note",
-        "between 40 and 60, between 60 and 80",
+        "note: between 40 and 60, between 60 and 80",
         lambda: [boom([40, 60, 80, -40, -60, -80])],
     ),
     Wrong(
         "commands in one direction only",
-        "note",
-        "never commanded: joint 2 negative",
+        "note: never commanded: joint 2 negative",
         lambda: [boom([30, 40, 50])],
     ),
     Wrong(
-        "no rest before the first command", "note", "begins with a command", lambda: of("", lambda v: v[100:])
+        "no rest before the first command", "note: begins with a command", lambda: of("", lambda v: v[100:])
     ),
 )
 
@@ -249,8 +225,7 @@ def table() -> str:
     rows = ["| the log | what `hydroid check` says |", "| --- | --- |"]
     for wrong in WRONG:
         with tempfile.TemporaryDirectory() as folder:
-            lines = told(wrong, Path(folder))
-        line = next(line for line in lines if line.startswith(wrong.level) and wrong.said in line)
+            line = wrong.line(Path(folder))
         rows.append(f"| {wrong.how} | {line.replace('|', chr(92) + '|')} |")
     return "\n".join(rows) + "\n"
 

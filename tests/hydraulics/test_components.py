@@ -12,7 +12,6 @@ from hydroid.hydraulics.cylinder import (
 )
 from hydroid.hydraulics.records import has_force_curve, linkages, nominal_joints
 from hydroid.hydraulics.solenoid import (
-    coil_current,
     coil_force,
     curve_exists,
     force_curve,
@@ -21,7 +20,7 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import conductance, notched, opening, port_flow, root
+from hydroid.hydraulics.valve import notched, root
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -32,29 +31,11 @@ def plunger(gap: float, mass: float = 0.05) -> SimpleNamespace:
     return SimpleNamespace(gap=gap, plunger_mass=mass, plunger_stiffness=2000.0)
 
 
-def test_voltage_jumps_to_the_onset_and_reaches_full_scale():
-    command = np.array([-100.0, -1e-9, 0.0, 1e-9, 50.0, 100.0])
-    np.testing.assert_allclose(side_voltage(command, 1.4), [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
-    np.testing.assert_allclose(side_voltage(-command, 1.2), [10, 1.2, 0, 0, 0, 0], atol=1e-9)
-
-
 def test_nothing_passes_the_dead_band_and_the_full_command_stays_full():
     voltage = side_voltage(np.array([-50.0, 39.9, 40.0, 40.0 + 1e-9, 70.0, 100.0]), 1.4, 40.0)
     np.testing.assert_allclose(voltage, [0, 0, 0, 1.4, 5.7, 10], atol=1e-9)
     command = np.linspace(-100, 100, 201)
     np.testing.assert_array_equal(side_voltage(command, 1.4, 0.0), side_voltage(command, 1.4))
-
-
-def test_current_is_a_line_between_its_limits():
-    voltage = np.array([-1.0, 0.0, 5.0, 10.0, 12.0])
-    np.testing.assert_allclose(coil_current(voltage, 0.9, 0.3), [0.3, 0.3, 0.6, 0.9, 0.9])
-
-
-def test_force_curve_runs_through_both_points():
-    coil, gap = force_curve(*ARTICLE)
-    np.testing.assert_allclose(coil_force(coil * 0.9**2, np.array([0.8e-3, 12e-3]), gap), [8.0, 0.7])
-    assert gap == pytest.approx(3.90e-3, abs=5e-6)
-    assert coil * 0.9**2 == pytest.approx(177e-6, abs=5e-7)
 
 
 @pytest.mark.parametrize("broken", [(0.5, 0.7, 0.8, 12), (8, 0.7, 12, 0.8), (8, 0.7, 5, 12), (8, 0.7, 0, 12)])
@@ -108,20 +89,6 @@ def test_plunger_does_not_pass_its_seat():
     assert speed >= 0.0
 
 
-def test_opening_has_overlap_slope_and_ceiling_a_side():
-    spool = np.array([-3e-3, -1e-3, -0.1e-3, 0.0, 0.3e-3, 1.5e-3, 3e-3])
-    flat = {f"notch_{k}": 1.0 for k in (1, 2, 3, 4)} | {"opening_exponent": 1.0, "slot_width": 2e-3}
-    a = flat | {"opening": 4e-7, "overlap": 0.5e-3}
-    b = flat | {"opening": 2e-7, "overlap": 0.2e-3}
-
-    def area(a: dict[str, float], b: dict[str, float]) -> np.ndarray:
-        return opening(spool, SimpleNamespace(a=SimpleNamespace(**a), b=SimpleNamespace(**b)))
-
-    np.testing.assert_allclose(area(a, b), [2e-7, 0.8e-7, 0, 0, 0, 2e-7, 4e-7], atol=1e-20)
-    curved = area(a | {"opening_exponent": 2.0}, b | {"slot_width": 1e-3})
-    np.testing.assert_allclose(curved[[1, 5]], [1.6e-7, 1e-7])
-
-
 def test_notches_bend_the_opening_between_its_ends():
     def curve(*factors: float) -> np.ndarray:
         return notched(share, SimpleNamespace(**{f"notch_{k}": f for k, f in enumerate(factors, start=1)}))
@@ -144,29 +111,6 @@ def test_flow_law_is_the_orifice_law_away_from_zero_and_smooth_through_it():
     behind, _ = root(drop - 1.0, 0.2e5)
     np.testing.assert_allclose(slope, (ahead - behind) / 2.0, rtol=1e-5)
     assert root(0.0, 0.2e5)[0] == 0.0
-
-
-def test_port_flow_against_equation_7_and_its_limit():
-    c = SimpleNamespace(
-        supply_pressure=150e5,
-        tank_pressure=5e5,
-        conductance=conductance(0.7),
-        transition_pressure=0.2e5,
-        flow_limit=np.inf,
-        backflow=-np.inf,
-        anticavitation=0.0,
-    )
-    flow, slope, pumped, _ = port_flow(50e5, 150e5, 0.4e-6, 0.0, c)
-    assert pumped == flow
-    assert flow == pytest.approx(0.7 * 0.4e-6 * np.sqrt(2 * 100e5 / 860), rel=1e-5)
-    assert slope > 0
-    c.flow_limit = 1e-5
-    limited, slope, *_ = port_flow(50e5, 150e5, 0.4e-6, 0.0, c)
-    assert limited == 1e-5
-    assert slope == 0.0
-    assert port_flow(60e5, 50e5, 0.4e-6, 0.0, c)[0] < 0
-    c.backflow = 0.0  # with a check valve
-    assert port_flow(60e5, 50e5, 0.4e-6, 0.0, c) == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_triangle_is_a_derivative_chain():

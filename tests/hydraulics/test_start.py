@@ -18,13 +18,6 @@ STOPPED = np.radians([0, -30, -60, 0, 0, 0, 20])
 TIGHT = HydraulicSettings(leakage=0.0, substeps=10)
 
 
-def dead_time(command: float, trapped: float | None) -> float:
-    """Time [s] until the shoulder has moved by 0.1 deg."""
-    values = {} if trapped is None else {"trapped_pressure": trapped}
-    angle = simulate(parameters(TIGHT, dead_volume=200.0, **values), np.full(200, command), TIGHT)[0]
-    return 0.01 * float(np.argmax(abs(angle - START) > np.radians(0.1)))
-
-
 @pytest.mark.parametrize("trapped", [0.0, 5.0, 30.0])
 def test_a_joint_stands_on_its_stop_whatever_is_trapped(trapped: float):
     angle = simulate(parameters(TIGHT, trapped_pressure=trapped), np.zeros(1000), TIGHT)
@@ -44,12 +37,6 @@ def test_the_oil_must_first_be_pressed():
     swept = 1e-3 * (ends[1] - ends[0])
     assert 0.01 * flow.sum() == pytest.approx(compressed + swept, rel=0.05)
     assert compressed > 3 * swept
-
-
-def test_dead_time_depends_on_the_command_only_where_oil_is_trapped():
-    slow, fast = dead_time(20.0, 1.0), dead_time(100.0, 1.0)
-    assert slow > 2 * fast
-    assert dead_time(20.0, None) < 0.5 * slow
 
 
 def test_a_stop_lets_go_and_holds_again():

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from log_files import RIG_RANGES
-from wrong_logs import ROOT, WRONG, Wrong, boom, rig, save, told
+from wrong_logs import ROOT, WRONG, Wrong, boom, rig, save
 
 import hydroid
 from hydroid.log import check_log
@@ -16,13 +16,13 @@ SETTINGS = hydroid.load_settings("fit-mech")
 
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong.how)
 def test_it_is_said_and_the_page_shows_it(wrong: Wrong, tmp_path: Path) -> None:
-    line = next(x for x in told(wrong, tmp_path) if x.startswith(wrong.level) and wrong.said in x)
+    line = wrong.line(tmp_path)
     page = (ROOT / "docs" / "logs.md").read_text()
     assert f"| {wrong.how} | {line} |\n" in page, "python tests/helpers/wrong_logs.py prints the table"
 
 
 def findings(folder: Path, *tables: dict) -> list[tuple[str, str]]:
-    result = hydroid.check(save(Wrong("", "", "", lambda: [*tables]), folder), config=SETTINGS).result
+    result = hydroid.check(save(Wrong("", "", lambda: [*tables]), folder), config=SETTINGS).result
     every = [f for log in result.logs for f in log.findings] + result.findings
     return [(finding.level, finding.kind) for finding in every]
 
@@ -40,7 +40,7 @@ def test_a_stop_is_neither_a_delay_nor_another_sign(duties: list[float], stop: f
 
 
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
-    (path,) = save(Wrong("", "", "", lambda: [boom([50])]), tmp_path)
+    (path,) = save(Wrong("", "", lambda: [boom([50])]), tmp_path)
     (log,) = hydroid.check([path], config=SETTINGS).result.logs
     angle = log.log.angle[:, 1]
     assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}

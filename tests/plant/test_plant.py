@@ -16,6 +16,7 @@ from hydroid.plant import Plant, load_plant
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings
+from hydroid.simulation import Response
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 MECHANICAL = {"K": 0.21, "D": 250.0, "S": 40.0}
@@ -46,12 +47,12 @@ def log_of(settings: FitSettings, joints: list[int], seconds: float = 4.0) -> Lo
     return Log("steps", time, command, np.tile(pose, (len(time), 1)), period)
 
 
-def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray:
-    """The angles that the population simulation gives [rad], shape (T, K)."""
-    settings = fitted.settings
-    spec = load_model(settings.arm)
-    simulation = make_simulation(spec, log, [j - 1 for j in joints], settings)
-    return simulation.simulate(Bindings(settings).candidates(fitted.theta[None])).angle[0]
+def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> Response:
+    """What the population simulation gives, pressures too where the stage has them."""
+    settings, columns = fitted.settings, [j - 1 for j in joints]
+    pressures = columns if settings.stage == "hyd" else []
+    simulation = make_simulation(load_model(settings.arm), log, columns, settings, pressures)
+    return simulation.simulate(Bindings(settings).candidates(fitted.theta[None]))
 
 
 @pytest.mark.parametrize("joints", [[2], [2, 3, 5], [1, 2, 3, 4, 5, 6, 7]], ids=len)
@@ -68,13 +69,19 @@ def response(fitted: IdentifiedModel, log: Log, joints: list[int]) -> np.ndarray
 def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints):
     fitted = model(stage, **changes)
     log = log_of(fitted.settings, joints)
-    expected = response(fitted, log, joints)
-    plant = Plant(fitted, joints=joints)
+    found = response(fitted, log, joints)
+    expected, plant = found.angle[0], Plant(fitted, joints=joints)
     columns = [j - 1 for j in joints]
     angle: list[np.ndarray] = []
     for _ in range(2):  # and again after a reset
-        angle = [plant.reset()] + [plant.step(command) for command in log.command[:-1]]
+        angle, pressure = [plant.reset()], [plant.pressure]
+        for command in log.command[:-1]:
+            angle.append(plant.step(command))
+            pressure.append(plant.pressure)
         np.testing.assert_array_equal(np.array(angle)[:, columns], expected)
+        if found.pressure is not None:
+            np.testing.assert_array_equal(np.array(pressure)[:, columns], found.pressure[0])
+        assert np.isnan(np.delete(pressure[-1], columns if stage == "hyd" else [], axis=0)).all()
     assert plant.time == pytest.approx(log.time[-1])
     assert np.ptp(expected, axis=0).min() > np.deg2rad(0.2)
     if changes.get("simulation.other_joints") != "passive":
@@ -109,35 +116,6 @@ def test_an_external_force_acts_as_in_plain_mujoco(tmp_path):
     assert fitted.settings.arm.pose("study")[1] - plant.angle[1] > np.deg2rad(1)
     plant.data.xfrc_applied[:] = 0.0
     assert plant.reset()[1] == fitted.settings.arm.pose("study")[1]
-
-
-def test_looking_at_positions_between_steps_changes_no_bit():
-    plant = Plant(model("hyd"), joints=[2, 3])
-    command = np.array([0, 60.0, -50.0, 0, 0, 0, 0])
-    expected = [plant.step(command) for _ in range(150)]
-    plant.reset()
-    for angle in expected:
-        mujoco.mj_kinematics(plant.model, plant.data)
-        mujoco.mj_crb(plant.model, plant.data)
-        np.testing.assert_array_equal(plant.step(command), angle)
-
-
-def test_pressures_are_those_of_the_simulation():
-    fitted = model("hyd")
-    log = log_of(fitted.settings, [2], 1.0)
-    settings = fitted.settings
-    spec = load_model(settings.arm)
-    simulation = make_simulation(spec, log, [1], settings, [1])
-    expected = simulation.simulate(Bindings(settings).candidates(fitted.theta[None])).pressure
-    assert expected is not None
-    plant = Plant(fitted)
-    pressure = [plant.pressure]
-    for command in log.command[:-1]:
-        plant.step(command)
-        pressure.append(plant.pressure)
-    np.testing.assert_array_equal(np.array(pressure)[:, 1], expected[0, :, 0])
-    assert np.isnan(np.delete(pressure[-1], 1, axis=0)).all()
-    assert np.isnan(Plant(model()).pressure).all()
 
 
 def test_resets_to_other_poses_are_plants_made_there():
@@ -178,7 +156,7 @@ def test_plain_mujoco_steps_the_exported_mjcf_to_the_fits_response(joints, tmp_p
     fitted = model()
     (log,) = read_logs([RIG], fitted.settings)
     log.command[:, 4] = 0.3 * log.command[:, 1] if 5 in joints else 0.0
-    expected = response(fitted, log, joints)
+    expected = response(fitted, log, joints).angle[0]
     plant = Plant(fitted, joints=joints)
     plant.reset(log.start)
     plant.save(tmp_path)
@@ -250,8 +228,12 @@ def test_a_plant_that_diverges_says_when(stage, capfd, tmp_path, monkeypatch):
         (lambda: Plant(model()).reset("nowhere"), "no pose 'nowhere'"),
         (lambda: load_plant("fit-hyd", overrides={"parameters.F1.fixed": 500}), "force-stroke curve"),
         (lambda: load_plant("fit-mech"), "no nominal gain"),
+        (lambda: Plant(model()).step([0, 1]), "command"),
+        (lambda: Plant(model()).step(5.0), "command"),
+        (lambda: Plant(model()).step([0, np.nan, 0, 0, 0, 0, 0]), "command"),
+        (lambda: Plant(model()).step([1, 0, 0, 0, 0, 0, 0]), "command"),
     ],
 )
-def test_what_no_plant_can_be_is_refused(refused, says):
-    with pytest.raises(SettingsError, match=says):
+def test_what_no_plant_can_be_or_do_is_refused(refused, says):
+    with pytest.raises((SettingsError, ValueError), match=says):
         refused()

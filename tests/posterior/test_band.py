@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import TRUTH as ARTICLE
+from conftest import noisy, step_log
 
 import hydroid
 from hydroid.fitting.validation import Prediction
@@ -13,7 +15,7 @@ from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.comparison import validation_page
 
-TRUTH = {"K": 1.0, "D": 60.0, "S": 100.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+TRUTH = ARTICLE | {"K": 1.0, "D": 60.0, "S": 100.0}
 CHANGES = {
     "simulation.other_joints": "locked",
     **{f"parameters.{name}.bounds": [0.2 * TRUTH[name], 5 * TRUTH[name]] for name in ("K", "D", "S")},
@@ -23,29 +25,22 @@ CHANGES = {
 }
 
 
-def noisy(settings, levels, seed: int, values=TRUTH) -> Log:
+def driven(settings, levels, seed: int, values=TRUTH) -> Log:
     """A log of steps of the shoulder with white noise of 0.1 deg, but for its first sample."""
-    pose, period = settings.arm.pose("study"), 0.01
-    command = np.zeros((100 * len(levels), len(pose)))
-    command[:, 1] = np.repeat(levels, 100)
-    time = period * np.arange(len(command))
-    drive = Log(f"steps{seed}.csv", time, command, np.tile(pose, (len(time), 1)), period)
-    log = simulate_log(settings, drive, values, "test")
-    noise = np.random.default_rng(seed).normal(0, np.deg2rad(0.1), log.angle.shape)
-    noise[0] = 0.0
-    return replace(log, angle=log.angle + noise)
+    drive = replace(step_log(settings.arm.pose("study"), levels), source=f"steps{seed}.csv")
+    return noisy(simulate_log(settings, drive, values, "test"), 0.1, seed)
 
 
 @pytest.fixture(scope="module")
 def fitted():
     settings = hydroid.load_settings("article-mech", CHANGES)
-    return settings, hydroid.fit(settings, [noisy(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
+    return settings, hydroid.fit(settings, [driven(settings, [60.0, -80.0, 30.0, 0.0, -40.0], 1)]).model
 
 
 @pytest.mark.parametrize(("factor", "limits"), [(1.0, False), (1.5, True)])
 def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
     settings, model = fitted
-    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH | {"S": factor * TRUTH["S"]})
+    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH | {"S": factor * TRUTH["S"]})
     response = predict(model, log, settings.outputs)
     band = prediction_bands(model, log, response)[2]
     assert band.model_limits is limits
@@ -62,7 +57,7 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
 
 def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
     settings, model = fitted
-    log, rng = noisy(settings, [-30.0, 50.0], 2), np.random.default_rng(4)
+    log, rng = driven(settings, [-30.0, 50.0], 2), np.random.default_rng(4)
     off = []
     for _ in range(60):
         angle = log.angle.copy()
@@ -76,7 +71,7 @@ def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
 def test_leaving_out_each_log_predicts_it(fitted):
     settings, model = fitted
     logs = [
-        noisy(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
+        driven(settings, levels, i) for i, levels in enumerate(([60, -80, 30], [-30, 50, 20], [40, -60, 50]))
     ]
     study = hydroid.validate(logs, fit=model, out=None, leave_one_out=True)
     assert len(study.result) == 3
@@ -93,7 +88,7 @@ def test_leaving_out_each_log_predicts_it(fitted):
 
 def test_without_a_band_nothing_is_called_as_expected(fitted):
     settings, model = fitted
-    log = noisy(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
+    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
     response = predict(model, log, settings.outputs)
     band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf, limit=np.inf)
     one = Prediction("one", log, (2,), {"one": response}, {2: band})

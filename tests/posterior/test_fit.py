@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import noisy, step_log
 
 import hydroid
 from hydroid import load_settings
@@ -30,9 +30,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
     """A small fit of stage 2 to six simulated seconds with noise."""
     settings = load_settings("article-hyd", SMALL)
     steps = step_log(settings.arm.pose("study"), [0.0, 60.0, -40.0, 90.0, -80.0, 30.0])
-    clean = simulate_log(settings, steps, TRUTH | FIXED, "truth")
-    noise = np.random.default_rng(0).normal(0, np.deg2rad(0.05), clean.angle.shape)
-    log = replace(clean, angle=clean.angle + noise)
+    log = noisy(simulate_log(settings, steps, TRUTH | FIXED, "truth"), 0.05, exact_start=False)
     return hydroid.fit(settings, log, tmp_path_factory.mktemp("fit") / "run")
 
 

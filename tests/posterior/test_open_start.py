@@ -4,30 +4,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import noisy, step_log
 
 from hydroid import load_settings
 from hydroid.log import Log
-from hydroid.posterior.jacobian import jacobian
 from hydroid.posterior.open_start import sensor_noise, start_deviations, with_open_start
 from hydroid.prediction import simulate_log
+from hydroid.problem.free_start import StartSlopes, start_slopes
 from hydroid.problem.problem import Problem
 
 NOISE = np.radians(0.1)
 
 
-def noisy_log(level: float = NOISE) -> Log:
+def noisy_log(level_deg: float = 0.1) -> Log:
     settings = load_settings("article-mech")
     values = settings.parameter_set().mapping(settings.parameter_set().start)
     log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -40.0, 80.0]), values, "start")
-    return replace(log, angle=log.angle + np.random.default_rng(2).normal(0, level, log.angle.shape))
+    return noisy(log, level_deg, 2, exact_start=False)
 
 
 def test_a_reading_has_the_noise_of_the_residual_but_not_the_error_of_the_model():
     log = noisy_log()
     assert sensor_noise(log, 2, NOISE) == NOISE
     assert np.degrees(sensor_noise(log, 2, 0.1)) == pytest.approx(0.2)
-    loud = noisy_log(np.radians(0.5))
+    loud = noisy_log(0.5)
     assert np.degrees(sensor_noise(loud, 2, 0.1)) == pytest.approx(0.5, rel=0.1)
     assert np.degrees(sensor_noise(replace(log, angle=log.angle[:2]), 2, 0.1)) == pytest.approx(0.2)
 
@@ -59,12 +59,20 @@ def test_a_wrong_start_leaves_little_error_where_it_is_open():
     assert more[0] > 5 * more[1]
 
 
-def test_the_uncertainty_of_the_start_is_no_information_about_parameters():
-    log = noisy_log()
-    held, opened = (
-        jacobian(Problem(load_settings("article-mech", {"free_start": free}), [log]), theta)
-        for free in (False, True)
-        for theta in [load_settings("article-mech").parameter_set().start]
-    )
-    lengths = [np.linalg.norm(at.slopes[:3], axis=1) for at in (held, opened)]
-    assert np.all(lengths[1] < lengths[0])
+def test_an_open_start_whitens_the_residuals_for_a_random_start():
+    """By T = (1 + B' B)^-1/2, rows B being what one standard deviation of each start angle does."""
+    rng = np.random.default_rng(1)
+    slopes, weights, rows = rng.normal(size=(2, 30)), np.array([0.5, 2.0]), rng.normal(size=(3, 40))
+    effect = np.zeros((2, 40))
+    effect[:, 5:35] = weights[:, None] * slopes
+    closed = rows.copy()
+    StartSlopes(0, slice(5, 35), (2, 3), slopes).opened(weights)(closed)
+    values, axes = np.linalg.eigh(np.eye(40) + effect.T @ effect)
+    np.testing.assert_allclose(closed, rows @ (axes / np.sqrt(values)) @ axes.T, atol=1e-12)
+
+
+def test_joints_that_follow_the_log_have_no_start_of_their_own():
+    settings = load_settings("article-mech", {"free_start": True, "simulation.other_joints": "measured"})
+    problem = Problem(settings, [noisy_log()])
+    (slopes,) = start_slopes(problem, problem.parameters.start)
+    assert slopes.joints == (2,)

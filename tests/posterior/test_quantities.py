@@ -1,11 +1,9 @@
 """Quantities of an arm by laws: ratios, gravity, symmetry, the plant, analytic dead bands, delays."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
-from conftest import replaced, step_log
+from conftest import TRUTH, replaced, step_log
 
 from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
@@ -15,18 +13,15 @@ from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.posterior.statics import actuator
 from hydroid.problem.bindings import Bindings
-from hydroid.settings.arm import make_arm
 from hydroid.simulation import Candidates
 
 TRUE = {"A_A": 1000, "A_B": 750, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2, "F2": 0.7, "x2": 12}
-MECHANICAL = {"K": 0.2, "D": 231.8, "S": 53.4}
-MECHANICAL |= {"M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
 def model(stage: str = "hyd", **changes: object) -> IdentifiedModel:
     springs = {"parameters.S.fixed": 0.0} if stage == "hyd" else {}
     settings = load_settings(f"article-{stage}", springs | changes)
-    return identified(settings, TRUE if stage == "hyd" else MECHANICAL, "test")
+    return identified(settings, TRUE if stage == "hyd" else TRUTH, "test")
 
 
 def shoulder_bench(one: IdentifiedModel, joint: int = 2) -> tuple[Bench, Candidates]:
@@ -80,11 +75,7 @@ def test_a_speed_is_that_of_the_plant_when_it_passes_the_pose(shoulder):
         plant.reset(pose)
         angle = [plant.step([0, sign * 50.0, 0, 0, 0, 0, 0])[1] for _ in range(200)]
         speed = sign * np.degrees(np.gradient(angle, 0.01))
-        passes = (
-            np.interp(bench.angle, angle, speed)
-            if sign > 0
-            else np.interp(-bench.angle, -np.array(angle), speed)
-        )
+        passes = np.interp(sign * bench.angle, sign * np.array(angle), speed)
         assert found[f"joint2_speed_50_{name}"] == [pytest.approx(passes, rel=0.02)]
 
 
@@ -105,19 +96,13 @@ def test_the_dead_band_is_the_command_that_moves_the_spool_over_its_overlap():
 
     def spool(command: float, onset: float) -> float:
         current = coil_current(side_voltage(command, onset), c.current_max[0], c.current_min[0])
-        rest = (
-            resting_stroke(c.coil[0] * i**2, c.gap[0], c.plunger_stiffness[0])
-            for i in (current, c.current_min[0])
-        )
-        moved, resting = rest
+        currents = np.array([current, c.current_min[0]])
+        moved, resting = resting_stroke(c.coil[0] * currents**2, c.gap[0], c.plunger_stiffness[0])
         return float(moved - resting)
 
     commands = np.linspace(1, 60, 1000)
-    for name, onset, overlap in (
-        ("positive", c.a.onset[0], c.a.overlap[0]),
-        ("negative", c.b.onset[0], c.b.overlap[0]),
-    ):
-        opens = np.interp(overlap, [spool(u, onset) for u in commands], commands)
+    for name, side in (("positive", c.a), ("negative", c.b)):
+        opens = np.interp(side.overlap[0], [spool(u, side.onset[0]) for u in commands], commands)
         (band,) = found[f"joint2_dead_band_{name}"]
         assert opens < band < opens + 5.0  # 2 % of full speed needs a little more
 
@@ -159,22 +144,3 @@ def test_quantities_are_smooth_in_the_parameters(shoulder):
     for column, value in measure(Bindings(one.settings).candidates(rows)):
         near, far = (value[3] - value[1]) / 2, (value[4] - value[0]) / 20
         assert near == pytest.approx(far, rel=0.2, abs=2e-5 * (abs(value[2]) + 1)), column.label
-
-
-def test_a_cylinder_that_runs_out_towards_negative_angles_only_turns_the_signs(shoulder):
-    one = model()
-    arm = one.settings.arm
-    cylinder = arm.joints[1].actuator
-    changes = {"extends": "negative", "theta0": 180 - cylinder.triangle.theta0}
-    turned = {
-        "triangle": cylinder.triangle.model_copy(update=changes), "area_a": 750.0, "area_b": 1000.0,
-        "stroke": None,
-    }  # fmt: skip
-    actuators = arm.file.actuators | {"shoulder": cylinder.settings.model_copy(update=turned)}
-    arm = make_arm(arm.file.model_copy(update={"actuators": actuators}), "here")
-    settings = one.settings.model_copy(update={"arm": arm})
-    found = measured(*shoulder_bench(replace(one, settings=settings)))
-    assert all(speed > 0 for name, (speed, *_) in found.items() if "_speed_50" in name)
-    speed = np.array(found["joint2_speed"])
-    assert np.all(np.diff(speed) < 0)
-    assert found["joint2_full_flow_positive"][0] > 0

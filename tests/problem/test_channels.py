@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import TRUTH, step_log
 
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
@@ -14,7 +14,7 @@ from hydroid.log import read_log, write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
-MECHANICAL = {"D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
+MECHANICAL = {name: value for name, value in TRUTH.items() if name != "K"}
 HYDRAULIC = MECHANICAL | {
     "A_A": 1000.0, "A_B": 750.0, "I_max": 0.9, "I_min": 0.3, "A": 1.4, "C": 1.2,
     "F1": 8.0, "F2": 0.7, "x1": 0.8, "x2": 12.0,
@@ -79,7 +79,7 @@ def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
 def mechanical(**changes):
     settings = load_settings("article-mech", {"objective.segments": {"equal": 2}} | changes)
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0])
-    return settings, log, {"K": 0.2} | MECHANICAL
+    return settings, log, TRUTH
 
 
 def test_weights_scale_the_residuals_of_their_joint():
@@ -111,12 +111,7 @@ def test_a_payload_slows_the_arm_of_its_log_alone():
     assert abs(loaded - log.angle[0, 1]) < abs(empty - log.angle[0, 1])
     bare = replace(settings.arm, file=settings.arm.file.model_copy(update={"payload": None}))
     with pytest.raises(SettingsError, match="no place for a payload"):
-        simulate_log(
-            settings.model_copy(update={"arm": bare}),
-            log,
-            truth,
-            "t",
-        )
+        simulate_log(settings.model_copy(update={"arm": bare}), log, truth, "t")
 
 
 def test_a_payload_of_no_log_is_refused(tmp_path):

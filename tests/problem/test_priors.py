@@ -1,10 +1,8 @@
 """Priors hold in the search, and count as measurements in the refinement."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import TRUTH, noisy, step_log
 
 from hydroid import load_settings
 from hydroid.errors import SettingsError
@@ -24,7 +22,6 @@ PARAMETERS = ParameterSet(
         Parameter("d", "N", 100.0, 1000.0),
     )
 )
-TRUTH = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
 def priors(**settings) -> Priors:
@@ -95,22 +92,13 @@ def test_an_incomplete_prior_is_refused(prior):
         PriorSettings.model_validate(prior)
 
 
-def masses_problem(known: dict) -> tuple[Problem, np.ndarray]:
-    """Stage 1 from the shoulder alone: K, D, S and the masses but for the jaws have a common scale."""
+def test_a_refinement_weighs_priors_against_the_logs():
+    """K, D, S and the masses but for the jaws have a common scale, which only the prior decides."""
+    known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
     settings = load_settings("article-mech", {"priors": known, "objective.segments": {"equal": 2}})
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0])
-    log = simulate_log(settings, log, TRUTH, "truth")
-    noise = np.random.default_rng(0).normal(0.0, np.deg2rad(0.1), log.angle.shape)
-    noise[0] = 0.0  # the start pose is known
-    log = replace(log, angle=log.angle + noise)
-    problem = Problem(settings, [log])
-    return problem, problem.parameters.vector(TRUTH, "truth")
-
-
-def test_a_refinement_weighs_priors_against_the_logs():
-    """Along a direction that the logs do not determine, the prior decides."""
-    known = {"total": {"of": ["M1", "M2", "M3", "M4", "M5", "M6"], "value": 30.0, "sd": 0.3}}
-    problem, truth = masses_problem(known)
+    problem = Problem(settings, [noisy(simulate_log(settings, log, TRUTH, "truth"), 0.1)])
+    truth = problem.parameters.vector(TRUTH, "truth")
     result = refine(problem, 0.9 * truth, RefinementSettings(iterations=30), lambda n, rms: None)
     theta = problem.parameters.from_unit(result.point[None])
     assert theta[0, 3:].sum() == pytest.approx(30.0, abs=0.3)

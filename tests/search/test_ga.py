@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from search_runs import advance, evaluate
 
-from hydroid.search.algorithm import Population
 from hydroid.search.ga import SimpleGa
 from hydroid.settings.search import GeneticSettings
 
@@ -39,15 +38,3 @@ def test_the_best_one_is_kept_and_not_evaluated_again():
         best = np.sort(population.objectives[:, 0])[:1]  # numpy sorts nan last
         assert np.array_equal(successor.objectives[:1, 0], best, equal_nan=True)
         population = successor
-
-
-def test_survives_a_population_without_a_feasible_candidate():
-    ga = SimpleGa(GeneticSettings(population=70), 3)
-    population = advance(ga, lambda x: np.full((len(x), 1), np.nan), None, np.random.default_rng(0), 3)
-    assert len(population) == 70
-    assert not population.feasible.any()
-
-
-def test_objectives_that_do_not_belong_to_the_chromosomes_are_a_mistake():
-    with pytest.raises(ValueError, match="for 3 chromosomes"):
-        Population(np.zeros((3, 4)), np.zeros((2, 1)))

@@ -162,15 +162,6 @@ def test_a_failing_forward_step_is_taken_backwards():
     np.testing.assert_allclose(result.point, truth, atol=1e-9)
 
 
-@pytest.mark.filterwarnings("error")
-def test_failing_trial_steps_are_rejected():
-    truth = np.array([0.9, 0.75])
-    residuals = fails_where(lambda x: x[:, 0] > 0.6, linear([1.0, 0.7], truth)[0])
-    result = least_squares(np.array([0.1, 0.1]), residuals, SETTINGS)
-    assert result.cost < 0.3 * result.cost_before
-    assert result.point[0] <= 0.6
-
-
 def test_a_state_that_was_stored_goes_on_to_the_same_bits():
     truth = np.array([0.4, 0.3, 0.7, 0.6, 0.5])
     measured = oscillator(truth[None]) + 0.01 * np.random.default_rng(1).normal(size=300)

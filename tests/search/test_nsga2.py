@@ -70,14 +70,6 @@ def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_th
     assert (wins % 2 == 0).mean() == pytest.approx(0.25 * 9 / 9.5, abs=0.03)
 
 
-def test_a_tournament_gives_every_candidate_two_chances_and_the_better_wins():
-    objectives = np.arange(10.0)[:, None]  # a strict order
-    counts = np.bincount(tournament(objectives, 10, np.random.default_rng(0)), minlength=10)
-    assert counts[0] == 2
-    assert counts[9] == 0
-    assert counts.sum() == 10
-
-
 def test_roomier_candidates_win_among_equals():
     angle = np.concatenate((np.linspace(0, 0.2, 10), [0.8, np.pi / 2]))
     front = np.stack((np.cos(angle), np.sin(angle)), axis=1)

@@ -9,7 +9,6 @@ from hydroid.search.operators import (
     mutate,
     pointwise_swaps,
     roulette,
-    uniform_swaps,
 )
 from hydroid.settings.search import GeneticSettings
 
@@ -66,18 +65,6 @@ def test_n_point_crossover_makes_n_cuts(pairs, length, points, seed):
     cuts = np.count_nonzero(swaps[:, 1:] != swaps[:, :-1], axis=1)
     assert (cuts == min(points, length - 1)).all()
     assert not swaps[:, 0].any()
-
-
-def test_cuts_are_placed_uniformly():
-    swaps = pointwise_swaps(30_000, 11, 1, np.random.default_rng(2))
-    counts = np.bincount(swaps.argmax(axis=1), minlength=11)[1:]
-    expected = 3000
-    assert ((counts - expected) ** 2 / expected).sum() < 27.9  # 9 degrees, p = 0.001
-
-
-def test_uniform_crossover_swaps_half():
-    share = uniform_swaps(1000, 144, np.random.default_rng(0)).mean(axis=0)
-    assert np.abs(share - 0.5).max() < 5 * np.sqrt(0.25 / 1000)
 
 
 @pytest.mark.parametrize("kind", [GrayCoding, IntegerCoding])

@@ -4,23 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import candidates, replaced
+from conftest import replaced, scattered
 
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
-from hydroid.simulation import Candidates, Simulation
+from hydroid.simulation import Simulation
 from hydroid.simulation.scenario import Scenario
 
 KINDS = {"mech": None, "hyd": HydraulicSettings().substeps}
 each_kind = pytest.mark.parametrize("kind", KINDS)
-
-
-def population(arm, n: int) -> Candidates:
-    """Random arms whose areas, currents and calibration differ too."""
-    rng, everyone = np.random.default_rng(0), candidates(arm, n)
-    for name in ("area_a", "area_b", "current_max", "onset_a", "onset_b", "force_1"):
-        everyone.joints[name] *= rng.uniform(0.7, 1.4, (n, 1))
-    return everyone
 
 
 @pytest.fixture
@@ -35,7 +27,7 @@ def simulation(spec, arm, study_log):
 @each_kind
 @pytest.mark.parametrize("other", ["locked", "passive", "measured"])
 def test_threads_and_neighbours_change_no_bit(arm, simulation, kind, other):
-    everyone = population(arm, 7)
+    everyone = scattered(arm, 7)
     together = simulation(kind, other_joints=other, threads=1).simulate(everyone).angle
     assert np.ptp(together, axis=1).min() > np.deg2rad(0.2)
     for threads in (2, 5):
@@ -59,7 +51,7 @@ def test_a_set_that_cannot_be_simulated_is_marked_and_harms_nobody(
     arm, simulation, kind, other, spoiled, capfd, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    everyone = population(arm, 4)
+    everyone = scattered(arm, 4)
     run = simulation(kind, other_joints=other).simulate
     healthy = run(everyone).angle
     columns = {name: everyone.joints[name].copy() for name in spoiled}

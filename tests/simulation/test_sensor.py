@@ -25,8 +25,3 @@ def test_a_lagging_sensor_follows_a_ramp_late():
 def test_a_scale_acts_on_the_turn_since_the_start():
     angle = 0.3 + 0.2 * np.sin(TIME)[:, None]
     np.testing.assert_allclose(reading(angle, sensors(1.1, 0.0), 0.01), 0.3 + 1.1 * (angle - 0.3))
-
-
-def test_lags_far_below_the_period_vanish():
-    angle = np.sin(TIME)[:, None]
-    assert abs(reading(angle, sensors(1.0, 1e-6), 0.01) - angle).max() < 1e-5

@@ -1,11 +1,17 @@
+"""The simulation against plain MuJoCo and Radau, and what both stages have in common."""
+
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
-from conftest import candidates, replaced, step_log
+from conftest import candidates, replaced, scattered, step_log
 from scipy.integrate import solve_ivp
 
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.simulation import SimulationSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.scenario import Scenario
@@ -13,18 +19,22 @@ from hydroid.simulation.scenario import Scenario
 SHOULDER = [1]
 
 
-def simulation(spec, arm, log, outputs=SHOULDER, **settings) -> Simulation:
-    chosen = SimulationSettings(**settings)
-    return Simulation(Scenario(spec, arm, log, list(outputs), chosen), arm, None)
+def simulation(spec, arm, log, outputs=SHOULDER, kind="mech", **settings) -> Simulation:
+    scenario = Scenario(spec, arm, log, list(outputs), SimulationSettings(**settings))
+    return Simulation(scenario, arm, HydraulicSettings().substeps if kind == "hyd" else None)
 
 
-@pytest.mark.parametrize("other", ["locked", "passive"])
-def test_without_commands_the_arm_stands_for_a_minute(spec, arm, other):
+@pytest.mark.parametrize(
+    ("kind", "other", "drift"),
+    [("mech", "locked", 1e-9), ("mech", "passive", 1e-9), ("hyd", "passive", 1e-6)],
+)
+def test_without_commands_and_leakage_the_arm_stands_for_a_minute(spec, arm, kind, other, drift):
     log = step_log(arm.pose("study"), [0.0], dwell=60.0)
-    response = simulation(spec, arm, log, range(7), other_joints=other).simulate(candidates(arm, 5))
+    everyone = scattered(arm, 3, leakage=0.0)
+    response = simulation(spec, arm, log, range(7), kind, other_joints=other).simulate(everyone)
     assert response.feasible.all()
     # gravity's gradient is a spring that may be unstable; rounding must not have grown to anything
-    assert np.abs(response.angle - arm.pose("study")).max() < 1e-9
+    assert np.abs(response.angle - arm.pose("study")).max() < drift
 
 
 def test_passive_arm_equals_a_plain_mujoco_loop(spec, arm, study_log):
@@ -138,3 +148,45 @@ def test_dry_friction_holds_the_arm_against_small_commands(spec, arm):
     run = simulation(spec, arm, log).simulate
     moved = np.ptp(run(parameters).angle)
     assert np.ptp(run(holding).angle) < 0.05 * moved
+
+
+def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(spec, arm, study_log):
+    everyone, shoulder = scattered(arm, 2), np.arange(7) == 1
+    held = {"stiffness": 1e5, "damping": 1e4}
+    stiff = {k: np.where(shoulder, everyone.joints[k], value) for k, value in held.items()}
+    locked, passive = (
+        simulation(spec, arm, study_log, kind="hyd", other_joints=other) for other in ("locked", "passive")
+    )
+    found = passive.simulate(replaced(everyone, **stiff)).angle
+    np.testing.assert_allclose(found, locked.simulate(everyone).angle, atol=np.deg2rad(0.1))
+
+
+def test_the_trace_explains_the_motion(spec, arm, study_log):
+    """Oil into chamber A over its area is the rod's way; no pressure is below vapour."""
+    one = scattered(arm, 1, leakage=0.0, bulk_modulus=8e5)
+    run = simulation(spec, arm, study_log, kind="hyd")
+    angle = run.simulate(one).angle[0, :, 0]
+    trace = run.trace(one)
+    assert list(run.joints) == [1]
+    assert trace.pressure.shape == (len(study_log.time), 1, 2)
+    assert trace.pressure.min() >= 0
+    cylinder = arm.joints[1].actuator
+    way = cylinder.length(angle) - cylinder.length(angle[:1])
+    oil = np.cumsum(trace.flow[:, 0, 0]) * study_log.period / one.joints.area_a[0, 1]
+    assert np.ptp(way) > 2e-3
+    np.testing.assert_allclose(oil, way, atol=0.03 * np.ptp(way))
+
+
+@pytest.mark.slow
+def test_compiling_is_announced_only_where_the_cache_is_empty(tmp_path):
+    """The message follows numba's cache, not the time that reading it takes."""
+    program = "from hydroid.simulation.rollout import compile_rollout; compile_rollout()"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True
+        ).stderr
+        for _ in range(2)
+    ]
+    assert said[0].count("compiling the simulation") == 1
+    assert said[1] == ""

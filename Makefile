@@ -18,8 +18,9 @@ check: setup  ## formatter, linter, type checker
 test: setup  ## the fast tests
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
+# in the order of their folders: by the number of tests, a file with one long test would come last, alone
 test-slow: setup  ## killed processes, clusters, thousands of files
-	$(BIN)/pytest -n 2 --dist loadfile -m slow
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m slow
 
 demo: setup  ## both stages on one log of the virtual rig, and the other log to judge them by
 	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."

@@ -3,12 +3,14 @@
 import argparse
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hydroid.advice.pseudo_random import pseudo_random_log
+from hydroid.estimate import read_values
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
@@ -17,32 +19,22 @@ from hydroid.search.descent import Descent
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
 
-OFF = 0.05
-"""distance from the stops [rad]"""
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+ARTICLE_TRUTH = read_values(EXAMPLES / "article" / "truth.yaml")[0]
 
 
 def options(text: str | None, **defaults: Any) -> Any:
-    """Parse the flags of a benchmark whose docstring is `text`.
-
-    A default's type is its flag's. Of a list several may be given, of a list of names only these; of a tuple
-    of names some may be given, none by default.
-    """
+    """Parse the flags of a benchmark whose docstring is `text`; a list takes several, of names only these."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in defaults.items():
-        how: dict[str, Any] = {"type": type(default), "default": default}
-        if isinstance(default, bool):
-            how = {"action": "store_true"}
-        elif isinstance(default, tuple):
-            how = {"nargs": "*", "default": [], "choices": default}
-        elif isinstance(default, list):
-            kind = type(default[0])
-            how = {
-                "nargs": "*",
-                "type": kind,
-                "default": default,
-                "choices": default if kind is str else None,
-            }
-        parser.add_argument(f"--{name.replace('_', '-')}", **how)
+        first, nargs = (default[0], "*") if isinstance(default, list) else (default, None)
+        how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs}
+        if nargs and isinstance(first, str):
+            how["choices"] = default
+        parser.add_argument(
+            f"--{name.replace('_', '-')}", **{"action": "store_true"} if default is False else how
+        )
     return parser.parse_args()
 
 
@@ -53,9 +45,9 @@ def table(header: str, line: str = "", *columns: Iterable[Any]) -> None:
         row(line.format(*cells))
 
 
-def row(line: str) -> None:
+def row(*cells: Any) -> None:
     """Print one row of a table."""
-    print(f"| {line} |", flush=True)
+    print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
 
 class Clock:
@@ -73,7 +65,7 @@ def true_log(
     settings: FitSettings, truth: Mapping[str, float], joints: Iterable[int], seconds: float, seed: int = 3
 ) -> Log:
     """Return the response to pseudo-random commands of some joints that keeps off the stops."""
-    low, high = settings.arm.lower + OFF, settings.arm.upper - OFF
+    low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
 
     def off_the_stops(log: Log) -> bool:
         angle = simulate_log(settings, log, truth, "truth").angle
@@ -106,37 +98,20 @@ def refined(
     problem: Problem, start: np.ndarray, how: RefinementSettings | None = None
 ) -> tuple[np.ndarray, Descent]:
     """Refine an estimate, by default as the settings say; return where it ended, shape (P,), and how."""
-    how = how or problem.settings.refinement
-    assert how is not None
-    result = refine(problem, start, how)
+    result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
     return problem.parameters.from_unit(result.point), result
 
 
-@dataclass
 class Coverage:
-    """What fits say of values that are known: lists of arrays, shapes (P,), (P,) and (P, 2)."""
+    """What fits say of values that are known, shape (P,): a row of each array for every fit."""
 
-    truth: np.ndarray
-    values: list[np.ndarray] = field(default_factory=list[np.ndarray])
-    sds: list[np.ndarray] = field(default_factory=list[np.ndarray])
-    intervals: list[np.ndarray] = field(default_factory=list[np.ndarray])
-
-    def add(self, value: np.ndarray, sd: np.ndarray, interval: np.ndarray) -> None:
-        """Add what one fit says."""
-        self.values.append(value)
-        self.sds.append(sd)
-        self.intervals.append(interval)
-
-    @property
-    def hits(self) -> np.ndarray:
-        """Whether each interval holds the truth, shape (n, P)."""
-        low, high = np.moveaxis(np.array(self.intervals), 2, 0)
-        return (low <= self.truth) & (self.truth <= high)
-
-    @property
-    def spread(self) -> np.ndarray:
-        """Standard deviation of the estimates, shape (P,)."""
-        return np.std(self.values, axis=0, ddof=1)
+    def __init__(self, truth: np.ndarray, fits: Iterable[tuple[np.ndarray, ...]]) -> None:
+        """Take values, standard deviations, and intervals, shape (P, 2), of every fit."""
+        self.truth = truth
+        self.values, self.sds, self.intervals = map(np.array, zip(*fits, strict=True))
+        low, high = np.moveaxis(self.intervals, 2, 0)
+        self.hits = (low <= truth) & (truth <= high)
+        self.spread = np.std(self.values, axis=0, ddof=1)
 
 
 def named(names: Sequence[str], chosen: np.ndarray) -> list[str]:

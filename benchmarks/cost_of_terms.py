@@ -11,11 +11,11 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from subprocess import PIPE
 
 import numpy as np
+from common import ROOT
 
-ROOT = Path(__file__).parents[1]
 CASES = {"the shoulder's hydraulics": [2], "all seven joints'": list(range(1, 8))}
 WORKER = """
 import sys, time
@@ -41,20 +41,20 @@ for line in sys.stdin:
 """times one case for each line of its input; it runs on both commits, so it uses what both have"""
 
 
-class Worker:
-    """A process that times cases with the code of one tree."""
+def worker(tree: Path) -> "subprocess.Popen[str]":
+    """Return a process that times cases with the code of one tree."""
+    command = [sys.executable, "-c", WORKER, str(list(CASES.values()))]
+    return subprocess.Popen(
+        command, cwd=tree, env={"PYTHONPATH": str(tree)}, stdin=PIPE, stdout=PIPE, text=True
+    )
 
-    def __init__(self, tree: Path) -> None:
-        command, pipe = [sys.executable, "-c", WORKER, str(list(CASES.values()))], subprocess.PIPE
-        where: dict[str, Any] = {"cwd": tree, "env": {"PYTHONPATH": str(tree)}}
-        self.process = subprocess.Popen(command, **where, stdin=pipe, stdout=pipe, text=True)
 
-    def seconds(self, case: int) -> float:
-        """CPU seconds of one case."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        print(case, file=self.process.stdin, flush=True)
-        return float(self.process.stdout.readline())
+def seconds(one: "subprocess.Popen[str]", case: int) -> float:
+    """CPU seconds of one case."""
+    assert one.stdin is not None
+    assert one.stdout is not None
+    print(case, file=one.stdin, flush=True)
+    return float(one.stdout.readline())
 
 
 def main(commit: str, rounds: int = 21) -> None:
@@ -62,14 +62,11 @@ def main(commit: str, rounds: int = 21) -> None:
         older, git = Path(folder) / "older", ["git", "-C", str(ROOT), "worktree"]
         subprocess.run([*git, "add", "--quiet", "--detach", str(older), commit], check=True)
         try:
-            both = Worker(ROOT), Worker(older)
-            for number, name in enumerate(CASES):
-                # the first round compiles and warms up
-                took = [[one.seconds(number) for one in both] for _ in range(1 + rounds)][1:]
-                low, median, high = np.quantile(np.divide(*np.transpose(took)), [0.25, 0.5, 0.75])
-                print(f"{name:28}{median:7.3f}  ({low:.3f} to {high:.3f})", flush=True)
-            for one in both:
-                one.process.communicate()
+            with worker(ROOT) as new, worker(older) as old:
+                for case, name in enumerate(CASES):  # the first round compiles and warms up
+                    took = [(seconds(new, case), seconds(old, case)) for _ in range(1 + rounds)][1:]
+                    low, median, high = np.quantile(np.divide(*np.transpose(took)), [0.25, 0.5, 0.75])
+                    print(f"{name:28}{median:7.3f}  ({low:.3f} to {high:.3f})", flush=True)
         finally:
             subprocess.run([*git, "remove", "--force", str(older)], check=True)
 

@@ -4,13 +4,11 @@
 
 Nothing in the shipped fit is random: seed 1 is the shipped start, and every other seed moves all start values
 by half a standard deviation of their priors. Prints time, simulations and, by joint, the mean absolute error
-over whole logs [deg], beside the throw-away models that were tried before.
+over whole logs [deg].
 """
 
-from pathlib import Path
-
 import numpy as np
-from common import Clock, options, refined
+from common import EXAMPLES, Clock, options, refined, row, table
 
 import hydroid
 from hydroid.fitting.search import search
@@ -18,14 +16,8 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 
-FOLDER = Path(__file__).parents[1] / "examples" / "excavator"
+FOLDER = EXAMPLES / "excavator"
 JOINTS = {2: "boom", 3: "arm", 4: "bucket", 1: "swing"}
-MOVED = 0.5
-"""standard deviations of its prior by which a start value is moved"""
-BEFORE = {
-    "a table of speeds, 24 bins per joint, with a delay": (2.1, 2.5, 8.6, 5.0),
-    "dead band, power law, lag, delay, gravity per joint": (1.9, 3.2, 10.0, 4.7),
-}
 
 
 def starts(seed: int) -> dict[str, object]:
@@ -35,17 +27,9 @@ def starts(seed: int) -> dict[str, object]:
         if seed > 1 and p.fixed is None and p.start is not None and p.prior is not None:
             # the distance between the bounds, in standard deviations
             sd = p.prior.score(np.array(p.upper)) - p.prior.score(np.array(p.lower))
-            place = np.clip(p.position(p.start) + rng.normal(0, MOVED) / sd, 0.0, 1.0)
+            place = np.clip(p.position(p.start) + rng.normal(0, 0.5) / sd, 0.0, 1.0)
             moved[f"parameters.{p.name}.start"] = float(p.at(place))
     return moved
-
-
-def errors(model: IdentifiedModel, logs: list[hydroid.Log]) -> list[float]:
-    """Mean absolute error over all logs [deg], by joint in the order of JOINTS."""
-    outputs = model.settings.outputs
-    error = [np.abs(log.angle[:, [j - 1 for j in outputs]] - predict(model, log, outputs)) for log in logs]
-    mean = dict(zip(outputs, np.rad2deg(np.concatenate(error).mean(axis=0)), strict=True))
-    return [float(mean[joint]) for joint in JOINTS]
 
 
 def study(seed: int) -> None:
@@ -56,16 +40,22 @@ def study(seed: int) -> None:
     searched = search(problem, lambda row: None, lambda simulated, rms: None, {})
     theta, result = refined(problem, searched.theta[0])
     simulations = int(searched.history[-1, 2]) + result.evaluations
-    print(f"seed {seed}: {clock}, {simulations} simulations, {result.ending.value}")
-    model = IdentifiedModel(settings, theta, "a fit")
+    model, joints = IdentifiedModel(settings, theta, "a fit"), settings.outputs
     for kind, those in logs.items():
-        print(f"{f'   {kind}_*':54}" + "".join(f"{e:9.2f}" for e in errors(model, those)), flush=True)
+        error = [np.abs(log.angle[:, [j - 1 for j in joints]] - predict(model, log, joints)) for log in those]
+        mean = dict(zip(joints, np.degrees(np.concatenate(error).mean(axis=0)), strict=True))
+        row(
+            seed,
+            f"{kind}_*",
+            *(f"{mean[joint]:.2f}" for joint in JOINTS),
+            simulations,
+            result.ending.value,
+            clock,
+        )
 
 
 if __name__ == "__main__":
     seeds = options(__doc__, seeds=[1, 2, 3, 4, 5]).seeds
-    print(f"{'':54}" + "".join(f"{name:>9}" for name in JOINTS.values()))
-    for name, before in BEFORE.items():
-        print(f"{name:54}" + "".join(f"{e:9.1f}" for e in before))
+    table(f"seed | logs | {' | '.join(JOINTS.values())} | simulations | ending | time")
     for seed in seeds:
         study(seed)

@@ -8,12 +8,11 @@
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
-from common import Clock, options, table
+from common import ROOT, Clock, options, table
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
 from hydraulic_arm import DrivenArm, nominal, scatter
 from hydraulic_reference import draw, parameters, pulses, reference, simulate

@@ -15,7 +15,7 @@ noise. "bound" is the Cramér-Rao bound of the true noise at the true parameters
 from dataclasses import replace
 
 import numpy as np
-from common import Clock, Coverage, named, near, noisy, options, refined, row, table, true_log
+from common import Clock, Coverage, named, near, noisy, options, refined, table, true_log
 from scipy.linalg import solve_toeplitz
 
 from hydroid import load_settings
@@ -52,43 +52,43 @@ def study(correlation_time: float, logs: int, seconds: float, *, start: bool, op
     phi = float(np.exp(-clean.period / correlation_time)) if correlation_time else 0.0
     problem = Problem(settings.model_copy(update={"free_start": False}), [clean])
     truth, free = problem.parameters.vector(TRUTH, "truth"), problem.parameters.free
-    at, true = (
-        jacobian(problem, truth),
-        Noise(len(clean.time), np.deg2rad(0.1), np.array([-phi] if phi else [])),
-    )
+    at, true = jacobian(problem, truth), Noise(len(clean.time), np.deg2rad(0.1), np.array([-phi] * bool(phi)))
     noise = (replace(true, source="settings"),) * len(problem.channels)
     least = bound(problem, at, noise)
-    known = 2 * quantile(0.0) * uncertainty_from(problem, truth, at, noise).standard_deviation[free]
-    fits = Coverage(truth[free])
+    width = 2 * quantile(0.0) * uncertainty_from(problem, truth, at, noise).standard_deviation[free]
+    fits: list[tuple[np.ndarray, ...]] = []
     for seed in range(logs):
         rng = np.random.default_rng([seed, int(1000 * phi)])
         one = Problem(settings, [noisy(clean, rng, phi=phi, start=start)])
         theta, _ = refined(one, near(one, truth, rng))
         result = uncertainty(one, theta)
-        fits.add(theta[free], result.standard_deviation[free], result.interval[free])
+        fits.append((theta[free], result.standard_deviation[free], result.interval[free]))
+    seen = Coverage(truth[free], fits)
     kind = f"correlation time {correlation_time:g} s" if phi else "white noise"
     print(f"\n{kind}, {logs} logs of {seconds:g} s, {clock}{', the start pose with noise' * start}")
-    spread, predicted = fits.spread, np.mean(fits.sds, axis=0)
-    width = np.mean(np.diff(fits.intervals, axis=2)[:, :, 0], axis=0) / known
-    ratios = width, 100 * spread / truth[free], spread / least, predicted / spread
+    columns = np.array(
+        [
+            100 * np.mean(seen.hits, axis=0),
+            np.mean(np.diff(seen.intervals, axis=2)[:, :, 0], axis=0) / width,
+            100 * seen.spread / truth[free],
+            seen.spread / least,
+            np.mean(seen.sds, axis=0) / seen.spread,
+        ]
+    )
     table(
         "parameter | covered | width | spread [%] | spread / bound | predicted / spread",
         "{} | {:.1f} % | {:.2f} | {:.3f} | {:.2f} | {:.2f}",
-        *(named(problem.parameters.names, free), 100 * np.mean(fits.hits, axis=0), *ratios),
+        *(
+            [*named(problem.parameters.names, free), "mean"],
+            *np.column_stack([columns, columns.mean(axis=1)]),
+        ),
     )
-    means = f"{np.mean(spread / least):.2f} | {np.mean(predicted / spread):.2f}"
-    row(f"all | {100 * np.mean(fits.hits):.1f} % | {np.mean(width):.2f} | | {means}")
 
 
 if __name__ == "__main__":
-    given = options(
-        __doc__,
-        logs=200,
-        seconds=[20.0, 75.0],
-        correlation_times=[0.0, 0.15, 1.0, 4.0],
-        noisy_start=False,
-        free_start=False,
-    )
+    times = [0.0, 0.15, 1.0, 4.0]
+    flags = {"noisy_start": False, "free_start": False}
+    given = options(__doc__, logs=200, seconds=[20.0, 75.0], correlation_times=times, **flags)
     for seconds in given.seconds:
         for time in given.correlation_times:
             study(time, given.logs, seconds, start=given.noisy_start, open_start=given.free_start)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from common import Clock, named, options, row, table
+from common import EXAMPLES, Clock, named, options, row, table
 
 import hydroid
 from hydroid.log import Log
@@ -22,7 +22,7 @@ from hydroid.posterior.covariance import uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
-LOGS = Path(__file__).parents[1] / "examples" / "logs"
+LOGS = EXAMPLES / "logs"
 PIECES = [("rig_shoulder_1", 0), ("rig_shoulder_1", 2200), ("rig_shoulder_2", 0), ("rig_shoulder_2", 3300)]
 PIECES += [("rig_all_joints_1", 0)]
 """logs, and the samples at which they rest where a piece begins"""

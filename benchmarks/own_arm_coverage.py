@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import Clock, Coverage, near, options, refined, row, table
+from common import EXAMPLES, Clock, Coverage, near, options, refined, row, table
 
 import hydroid
 from hydroid.identified_model import IdentifiedModel, identified
@@ -25,7 +25,7 @@ from hydroid.posterior.covariance import uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "urdf"
+EXAMPLE = EXAMPLES / "urdf"
 sys.path.insert(0, str(EXAMPLE))
 example: Any = importlib.import_module("make_example")
 
@@ -52,15 +52,16 @@ def study(truth: IdentifiedModel, settings: FitSettings, fits: int) -> None:
     names, clock = np.array(settings.parameter_set().names), Clock()
     true = np.array([truth.values[name] for name in names])
     inner = true > 0
-    seen = Coverage(true[inner])
+    fitted: list[tuple[np.ndarray, ...]] = []
     for number in range(fits):
         problem = Problem(settings, [new_log(truth, 1000 + 2 * number + k) for k in (0, 1)])
         theta, _ = refined(problem, near(problem, true, np.random.default_rng(number)))
         known = uncertainty(problem, theta)
-        seen.add(theta[inner], known.standard_deviation[inner], known.interval[inner])
+        fitted.append((theta[inner], known.standard_deviation[inner], known.interval[inner]))
     print(f"{fits} fits, {clock}")
+    seen = Coverage(true[inner], fitted)
     hits = np.where(np.isnan(seen.intervals).any(axis=2), np.nan, seen.hits)
-    error = np.sqrt(np.mean(np.square(np.array(seen.values) - seen.truth), axis=0))
+    error = np.sqrt(np.mean(np.square(seen.values - seen.truth), axis=0))
     predicted = np.mean(seen.sds, axis=0)
     table(
         "parameter | truth | predicted sd [%] | predicted / spread | covered",

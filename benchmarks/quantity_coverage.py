@@ -40,35 +40,35 @@ def study(logs: int, seconds: float) -> None:
     def values(theta: np.ndarray) -> np.ndarray:
         return np.stack([value for _, value in measure(problem.bindings.candidates(theta))], axis=1)
 
-    fits, unknown = Coverage(np.array([float(value[0]) for value in actual])), []
+    fits, unknown = [], []
     for seed in range(logs):
         rng = np.random.default_rng(seed)
         one = Problem(settings, [noisy(clean, rng)])
         theta, _ = refined(one, near(one, truth, rng))
         result = uncertainty(one, theta)
         known = result.posterior.propagate(values, positive)
-        fits.add(known.value, known.sd, known.interval)
+        fits.append((known.value, known.sd, known.interval))
         unknown.append(~np.isfinite(result.relative[free]))
     print(f"{logs} logs of {seconds:g} s, {clock}")
     shares = zip(named(problem.parameters.names, free), np.mean(unknown, axis=0), strict=True)
     print("not identifiable in:", ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares))
-    spread, sd = fits.spread, np.array(fits.sds)
-    finite = np.isfinite(sd)
+    seen = Coverage(np.array([float(value[0]) for value in actual]), fits)
+    spread, sd, finite = seen.spread, seen.sds, np.isfinite(seen.sds)
     stated = np.any(finite & (sd > 0), axis=0)
 
     def mean(of: np.ndarray) -> np.ndarray:
         """Over the fits that determine a quantity."""
         return np.sum(of, axis=0, where=finite)[stated] / np.sum(finite, axis=0)[stated]
 
-    bias = (np.mean(fits.values, axis=0) - fits.truth) / np.where(spread > 0, spread, 1.0)
+    bias = (np.mean(seen.values, axis=0) - seen.truth) / np.where(spread > 0, spread, 1.0)
     table(
         "quantity | true | covered | spread [%] | predicted / spread | bias / spread | determined",
         "{} | {:.4g} | {:.1f} % | {:.2f} | {:.2f} | {:.2f} | {:.0f} %",
-        *(labels[stated], fits.truth[stated], 100 * mean(fits.hits)),
-        *(100 * (spread / abs(fits.truth))[stated], mean(sd) / spread[stated], bias[stated]),
+        *(labels[stated], seen.truth[stated], 100 * mean(seen.hits)),
+        *(100 * (spread / abs(seen.truth))[stated], mean(sd) / spread[stated], bias[stated]),
         100 * np.mean(finite, axis=0)[stated],
     )
-    row(f"all | | {100 * np.mean(fits.hits[:, stated]):.1f} % | | | |")
+    row("all", "", f"{100 * np.mean(seen.hits[:, stated]):.1f} %", "", "", "", "")
 
 
 if __name__ == "__main__":

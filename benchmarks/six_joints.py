@@ -6,14 +6,12 @@ Each joint is fitted alone while the others follow their logged motion, then all
 values are those of the arm's file and of `START`, none of them tuned to this log. --seconds cuts the log.
 """
 
-from pathlib import Path
-
 import numpy as np
-from common import Clock, options
+from common import EXAMPLES, Clock, options
 
 import hydroid
 
-LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_all_joints_1.csv"
+LOG = EXAMPLES / "logs" / "rig_all_joints_1.csv"
 START = {
     "A_A": {"quantity": "area_a", "within": 2},
     "A_B": {"quantity": "area_b", "within": 2},

@@ -1,53 +1,39 @@
-"""The size and shape of the code, beside what it may be at most: `make bench B=structure`.
+"""The size and shape of the code, beside what it may be at most.
 
-    python benchmarks/structure.py [FOLDER ...]
+    python benchmarks/structure.py
 
-Each folder is a checkout; the default is this one. One column per checkout. Tokens are names, operators,
-numbers and strings: comments and the packing of lines do not count. Statements are those of Python's syntax
-tree, docstrings left out. A function's arguments are all but `self` and `cls`; a command's arguments are its
-options, and are not counted. Constants are names in capitals at the top level of a file.
+Tokens are names, operators, numbers and strings: comments and the packing of lines do not count. Statements
+are those of Python's syntax tree, docstrings left out. A function's arguments are all but `self` and `cls`; a
+command's are its options, and are not counted. Constants are names in capitals at the top level of a file.
 """
 
 import ast
-import io
-import os
 import re
 import statistics
-import subprocess
-import sys
 import tokenize
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 from scipy.sparse.csgraph import connected_components
 
-MOST = {
-    "files": 160,
-    "lines": 17_500,
-    "tokens": 130_000,
-    "constants": 280,
-    "settings": 130,
-    "commands": 14,
-    "make targets": 14,
-    "functions with more than 6 arguments": 0,
-    "import cycles": 0,
-    "lines of tests": 12_000,
-    "lines of benchmarks": 2_000,
-}
-TOKENS = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
+from hydroid.commands.app import COMMANDS
+from hydroid.settings.arm import ArmFile
+from hydroid.settings.fit import FitSettings
+
+ROOT = Path(__file__).parents[1]
+MOST = {"files": 160, "lines": 17_500, "tokens": 130_000, "constants": 280, "settings": 130, "commands": 14,
+        "make targets": 14, "functions with more than 6 arguments": 0, "import cycles": 0,
+        "lines of tests": 12_000, "lines of benchmarks": 2_000}  # fmt: skip
 
 
-def tokens(text: str) -> int:
+def tokens(path: Path) -> int:
     """Return the number of tokens of a file."""
-    return sum(kind.type in TOKENS for kind in tokenize.generate_tokens(io.StringIO(text).readline))
-
-
-def statements(tree: ast.Module) -> int:
-    """Return the number of statements of a file."""
-    every = (node for node in ast.walk(tree) if isinstance(node, ast.stmt))
-    return sum(not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)) for s in every)
+    kinds = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
+    with path.open("rb") as file:
+        return sum(token.type in kinds for token in tokenize.tokenize(file.readline))
 
 
 def constants(tree: ast.Module) -> int:
@@ -59,112 +45,82 @@ def constants(tree: ast.Module) -> int:
 
 def arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     """Return how many arguments a function takes besides `self` or `cls`."""
-    given = function.args
-    named = [*given.posonlyargs, *given.args, *given.kwonlyargs]
-    return len(named) - (bool(named) and named[0].arg in ("self", "cls"))
+    names = [a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+    return len(names) - (names[:1] in (["self"], ["cls"]))
 
 
-def imports(tree: ast.Module) -> set[str]:
-    """Return the modules that a file imports, inside functions and for type checks included."""
-    found: set[str] = set()
+def imports(tree: ast.Module) -> Iterator[str]:
+    """Yield the modules that a file imports, inside functions and for type checks included."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         elif isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-    return found
+            yield from (alias.name for alias in node.names)
 
 
-def cycles(package: Path, trees: dict[Path, ast.Module]) -> int:
+def cycles(trees: dict[Path, ast.Module]) -> int:
     """Return the number of groups of files that import each other (strongly connected components)."""
-    paths = (path.relative_to(package.parent).with_suffix("").as_posix() for path in trees)
-    names = [path.replace("/", ".").removesuffix(".__init__") for path in paths]
-    graph = np.array([[name in imports(tree) and name != own for name in names]
-                      for own, tree in zip(names, trees.values(), strict=True)])  # fmt: skip
-    groups = np.bincount(connected_components(graph, connection="strong")[1])
-    return int(np.count_nonzero(groups > 1))
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in trees]
+    names = [name.removesuffix(".__init__") for name in names]
+    taken = [set(imports(tree)) - {own} for own, tree in zip(names, trees.values(), strict=True)]
+    graph = np.array([[name in some for name in names] for some in taken])
+    return int(np.sum(np.bincount(connected_components(graph, connection="strong")[1]) > 1))
 
 
-COUNT_SETTINGS = """
-from pydantic import BaseModel
-from hydroid.settings import arm
-from hydroid.settings.fit import FitSettings
+def settings() -> int:
+    """Return the settings of a fit and of an arm, as their classes declare them."""
+    seen, waiting = set[type[BaseModel]](), [FitSettings, ArmFile]
 
-def models(annotation):
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in getattr(annotation, "__args__", ()):
-        yield from models(part)
+    def models(annotation: object) -> Iterator[type[BaseModel]]:
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield annotation
+        for part in getattr(annotation, "__args__", ()):
+            yield from models(part)
 
-seen, waiting = set(), [FitSettings, getattr(arm, "ArmFile", None) or arm.Arm]
-while waiting:
-    model = waiting.pop()
-    if model not in seen:
-        seen.add(model)
-        waiting += [inner for field in model.model_fields.values() for inner in models(field.annotation)]
-print(sum(len(model.model_fields) for model in seen))
-"""
-"""settings of a fit and of an arm, as their classes declare them"""
-COUNT_COMMANDS = """
-import subprocess, sys
-text = subprocess.run([sys.executable, "-m", "hydroid", "--help"], capture_output=True, text=True).stdout
-groups = text[text.index("Show this message"):].splitlines()[1:]
-print(sum(line[:2] == "  " and line[2:3].islower() and "  " in line.strip() for line in groups))
-"""
+    while waiting:
+        model = waiting.pop()
+        if model not in seen:
+            seen.add(model)
+            waiting += [inner for field in model.model_fields.values() for inner in models(field.annotation)]
+    return sum(len(model.model_fields) for model in seen)
 
 
-def counted(checkout: Path, program: str) -> int:
-    """Return the number that a program prints about a checkout."""
-    environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
-    how: dict[str, Any] = {
-        "cwd": checkout,
-        "env": environment,
-        "capture_output": True,
-        "text": True,
-        "check": True,
-    }
-    return int(subprocess.run([sys.executable, "-c", program], **how).stdout)
-
-
-def lines(folder: Path) -> int:
+def lines(folder: str) -> int:
     """Return the lines of Python below a folder."""
-    return sum(len(path.read_text().splitlines()) for path in folder.rglob("*.py"))
+    return sum(len(path.read_text().splitlines()) for path in (ROOT / folder).rglob("*.py"))
 
 
-def measure(checkout: Path) -> dict[str, float]:
-    """Return the figures of one checkout, by name."""
-    package = checkout / "hydroid"
-    texts = {path: path.read_text() for path in sorted(package.rglob("*.py"))}
-    trees = {path: ast.parse(text) for path, text in texts.items()}
-    sizes = [len(text.splitlines()) for text in texts.values()]
+def measures() -> dict[str, float]:
+    """Return all figures, by name."""
+    trees = {path: ast.parse(path.read_text()) for path in sorted((ROOT / "hydroid").rglob("*.py"))}
+    sizes = [len(path.read_text().splitlines()) for path in trees]
     nodes = [(path, node) for path, tree in trees.items() for node in ast.walk(tree)]
+    strings = sum(isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant) for _, n in nodes)
     functions = [(p, f) for p, f in nodes if isinstance(f, ast.FunctionDef | ast.AsyncFunctionDef)]
-    wide = [f for path, f in functions if arguments(f) > 6 and not {"cli", "commands"} & set(path.parts)]
-    targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (checkout / "Makefile").read_text(), re.MULTILINE)
+    targets = re.findall(r"^([a-z][a-z-]*):(?!=)", (ROOT / "Makefile").read_text(), re.MULTILINE)
     return {
         "files": len(trees),
         "lines": sum(sizes),
-        "tokens": sum(map(tokens, texts.values())),
-        "statements": sum(map(statements, trees.values())),
+        "tokens": sum(map(tokens, trees)),
+        "statements": sum(isinstance(node, ast.stmt) for _, node in nodes) - strings,
         "constants": sum(map(constants, trees.values())),
-        "settings": counted(checkout, COUNT_SETTINGS),
-        "commands": counted(checkout, COUNT_COMMANDS),
+        "settings": settings(),
+        "commands": len(COMMANDS),
         "make targets": len(set(targets)),
         "classes": sum(isinstance(node, ast.ClassDef) for _, node in nodes),
         "functions": len(functions),
-        "functions with more than 6 arguments": len(wide),
-        "import cycles": cycles(package, trees),
+        "functions with more than 6 arguments": sum(
+            arguments(f) > 6 and "commands" not in p.parts for p, f in functions
+        ),
+        "import cycles": cycles(trees),
         "median file": statistics.median(sizes),
         "largest file": max(sizes),
         "largest function": max((f.end_lineno or f.lineno) - f.lineno + 1 for _, f in functions),
-        "lines of tests": lines(checkout / "tests"),
-        "lines of benchmarks": lines(checkout / "benchmarks"),
+        "lines of tests": lines("tests"),
+        "lines of benchmarks": lines("benchmarks"),
     }
 
 
 if __name__ == "__main__":
-    checkouts = [Path(name) for name in sys.argv[1:]] or [Path(__file__).parents[1]]
-    columns = [measure(checkout) for checkout in checkouts]
-    for name in columns[0]:
-        most = f"{MOST[name]:,}" if name in MOST else ""
-        print(f"{name:36}", *(f"{column[name]:9,g}" for column in columns), f"   {most}")
+    for name, value in measures().items():
+        print(f"{name:36} {value:9,g}    {MOST.get(name, '')}")

@@ -1,4 +1,6 @@
-"""What a simulation costs, and what hydroid adds to it: ratios inside one run (`make bench B=throughput`).
+"""What a simulation costs, and what hydroid adds to it: ratios inside one run.
+
+    python benchmarks/throughput.py
 
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
 on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
@@ -6,35 +8,35 @@ search's own share of the wall time; and how fast a plant steps, as a multiple o
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import mujoco
 import numpy as np
-from common import row, table
+from common import ARTICLE_TRUTH, row, table
 from mujoco.batch import Batch
 
 from hydroid import load_settings
 from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.estimate import read_values
 from hydroid.fitting.search import search
 from hydroid.plant import load_plant
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
-TRUTH = Path(__file__).parents[1] / "examples" / "article" / "truth.yaml"
 CANDIDATES, REPEATS = 70, 9
 ALL = list(range(1, 8))
 
 
-def make_problem(other_joints: str, algorithm: str = "ga") -> Problem:
+def make_problem(config: str, joints: list[int], other_joints: str, algorithm: str = "ga") -> Problem:
+    """A problem whose data are commands of some joints, and stage 1's response to them at the truth."""
     changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
-    settings = load_settings("article-mech", changes)
-    log = pseudo_random_log(settings.arm.pose("study"), [2], duration=75.01)
-    return Problem(settings, [simulate_log(settings, log, read_values(TRUTH)[0], str(TRUTH))])
+    settings = load_settings(config, changes)
+    log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
+    if config == "article-mech":
+        log = simulate_log(settings, log, ARTICLE_TRUTH, "truth")
+    return Problem(settings, [log])
 
 
 def population(problem: Problem) -> np.ndarray:
@@ -43,14 +45,18 @@ def population(problem: Problem) -> np.ndarray:
     return problem.parameters.from_unit(unit)
 
 
-def bare_rollout(problem: Problem, theta: np.ndarray) -> Callable[[], object]:
+def bare_rollout(problem: Problem) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
-    log, candidates, arm = problem.logs[0], problem.bindings.candidates(theta), problem.settings.arm
+    log, candidates, arm = (
+        problem.logs[0],
+        problem.bindings.candidates(population(problem)),
+        problem.settings.arm,
+    )
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
     reduced.model.qpos_spring[:] = log.angle[0, moving]
-    batch = Batch(reduced.model, nsim=len(theta))
+    batch = Batch(reduced.model, nsim=CANDIDATES)
     for name, value in reduced.inertials(candidates.mass).items():
         batch.expand(name)[:] = value
     batch.expand("dof_damping")[:] = candidates.joints.damping[:, moving]
@@ -59,10 +65,10 @@ def bare_rollout(problem: Problem, theta: np.ndarray) -> Callable[[], object]:
     steps = len(log.time) - 1
     batch.reset()
     batch.bind("qpos")[:] = log.angle[0, moving]
-    bias = batch.bind("qfrc_bias")
     batch.forward()
-    torque = bias[:, None] + candidates.joints.gain[:, None, moving] * log.command[:-1, moving]
-    out = {"qpos": np.empty((len(theta), steps, len(moving)))}
+    gained = candidates.joints.gain[:, None, moving] * log.command[:-1, moving]
+    torque = batch.bind("qfrc_bias")[:, None] + gained
+    out = {"qpos": np.empty((CANDIDATES, steps, len(moving)))}
 
     def roll() -> float:
         batch.reset()
@@ -74,7 +80,7 @@ def bare_rollout(problem: Problem, theta: np.ndarray) -> Callable[[], object]:
     return roll
 
 
-def in_turn(calls: Mapping[str, Callable[[], object]]) -> dict[str, np.ndarray]:
+def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
     """Seconds of each call in every round, shape (REPEATS,); a call may time itself."""
     rounds = dict[str, list[float]]()
     for _ in range(1 + REPEATS):  # the first one compiles and warms up
@@ -86,40 +92,9 @@ def in_turn(calls: Mapping[str, Callable[[], object]]) -> dict[str, np.ndarray]:
     return {name: np.array(times[1:]) for name, times in rounds.items()}
 
 
-def against_mujoco() -> None:
-    """Print evaluation against bare rollout, and locked against passive."""
-    calls: dict[str, Callable[[], object]] = {}
-    for mode in ("passive", "locked"):
-        problem = make_problem(mode)
-        theta = population(problem)
-        calls |= {mode: partial(problem.evaluate, theta), f"{mode}, bare": bare_rollout(problem, theta)}
-    took = in_turn(calls)
-    table("other joints | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s")
-    for mode in ("passive", "locked"):
-        ours, bare = took[mode], took[f"{mode}, bare"]
-        middle, ratio = np.median(ours), np.median(bare / ours)
-        row(f"{mode} | {middle:.3f} | {np.median(bare):.3f} | {ratio:.3f} | {CANDIDATES / middle:.0f}")
-    print(f"locked against passive: {np.median(took['passive'] / took['locked']):.2f} times the throughput")
-
-
-def hydraulic_cost() -> None:
-    """Print stage 2's evaluation against stage 1's on the same seven-joint model."""
-    problems = {"mechanical": make_problem("passive")}
-    for what, joints in (("the shoulder's hydraulics", [2]), ("all seven joints'", ALL)):
-        settings = load_settings("article-hyd", {"simulation.other_joints": "passive"})
-        log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
-        problems[what] = Problem(settings, [log])
-    took = in_turn({what: partial(p.evaluate, population(p)) for what, p in problems.items()})
-    ratios = [np.median(times / took["mechanical"]) for times in took.values()]
-    medians = [np.median(times) for times in took.values()]
-    table(
-        "evaluation of the seven-joint model | seconds | ratio", "{} | {:.3f} | {:.2f}", took, medians, ratios
-    )
-
-
 def search_share(algorithm: str) -> float:
     """Return the share of a search's wall time [%] that is not spent in evaluating populations."""
-    problem, spent = make_problem("locked", algorithm), []
+    problem, spent = make_problem("article-mech", [2], "locked", algorithm), []
     evaluate = problem.evaluate
 
     def timed(theta: np.ndarray) -> object:
@@ -134,8 +109,8 @@ def search_share(algorithm: str) -> float:
     return 100 * (1 - sum(spent) / (time.perf_counter() - started))
 
 
-def plant_speed(joints: list[int], steps: int = 2000) -> None:
-    """Print how long a step of a plant with hydraulics on some joints takes, at 0.01 s."""
+def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
+    """Return the seconds that a step of a plant with hydraulics on some joints takes, and its period."""
     plant = load_plant("article-hyd", overrides={"start_pose": "study"}, joints=joints)
     commands = 30.0 * np.isin(ALL, joints) * np.sin(np.arange(steps)[:, None] / 50 + np.arange(7))
 
@@ -144,15 +119,28 @@ def plant_speed(joints: list[int], steps: int = 2000) -> None:
         for command in commands:
             plant.step(command)
 
-    step = min(in_turn({"plant": run})["plant"]) / steps
-    row(f"{len(joints)} | {1e6 * step:.0f} | {plant.period / step:.0f}")
+    return min(in_turn({"plant": run})["plant"]) / steps, plant.period
 
 
 if __name__ == "__main__":
-    against_mujoco()
-    hydraulic_cost()
+    problems = {name: make_problem("article-mech", [2], name) for name in ("passive", "locked")}
+    problems |= {
+        f"hydraulics of {len(some)}": make_problem("article-hyd", some, "passive") for some in ([2], ALL)
+    }
+    calls = {name: partial(p.evaluate, population(p)) for name, p in problems.items()}
+    bare = {f"{name}, bare": bare_rollout(problems[name]) for name in ("passive", "locked")}
+    took = in_turn(calls | bare)
+    table("joints besides the shoulder | evaluation [s] | Batch.rollout alone [s] | ratio | evaluations/s")
+    for name in ("passive", "locked"):
+        middle, alone = np.median(took[name]), took[f"{name}, bare"]
+        ratio, rate = np.median(alone / took[name]), CANDIDATES / middle
+        row(f"{name} | {middle:.3f} | {np.median(alone):.3f} | {ratio:.3f} | {rate:.0f}")
+    table("evaluation of the seven-joint model | seconds | against passive")
+    for name in problems:
+        row(f"{name} | {np.median(took[name]):.3f} | {np.median(took[name] / took['passive']):.2f}")
     for algorithm in ("ga", "nsga2"):
         print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
     table("joints with hydraulics | step [µs] | times real time")
-    plant_speed([2])
-    plant_speed(ALL)
+    for some in ([2], ALL):
+        step, period = plant_steps(some)
+        row(f"{len(some)} | {1e6 * step:.0f} | {period / step:.0f}")

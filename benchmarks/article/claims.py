@@ -7,7 +7,7 @@ correlation: 1 if the claim holds on every seed, -1 if its opposite does.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,8 @@ from hydroid.studies.study import Row
 SIGNIFICANT = 0.05
 
 
-class Outcome(Enum):
-    """What the runs say of a claim."""
+class Outcome(StrEnum):
+    """What the runs say of a statement."""
 
     CONFIRMED = "confirmed"
     OPEN = "not confirmed"
@@ -31,30 +31,13 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """A statement and what was found of it.
-
-    Attributes:
-        says: the statement.
-        outcome: the answer.
-        detail: what it rests on, in words.
-        item: the article's table or figure that makes the statement; empty where none does.
-        ours: the statement is not the article's.
-        p: of a claim, corrected by Holm's method; nan where nothing was tested.
-        effect: of a claim: rank-biserial correlation, from -1 to 1; nan where nothing was tested.
-    """
+    """A statement, the article's item that makes it, what was found, and what that rests on."""
 
     says: str
+    item: str
     outcome: Outcome
     detail: str
-    item: str = ""
     ours: bool = False
-    p: float = np.nan
-    effect: float = np.nan
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in a sentence."""
-        return f"{self.says}: {self.outcome.value} ({self.detail})."
 
 
 def verdicts(claims: Sequence[Claim], rows: Sequence[Row]) -> list[Verdict]:
@@ -62,18 +45,28 @@ def verdicts(claims: Sequence[Claim], rows: Sequence[Row]) -> list[Verdict]:
 
     Where even a difference on every seed would not be significant after the correction, none is tested.
     """
-    pairs = [_pairs(claim, rows) for claim in claims]
-    least = np.array([2.0 ** (1 - len(p)) if len(p) else 1.0 for p in pairs])
+    every = [_pairs(claim, rows) for claim in claims]
+    least = np.array([2.0 ** (1 - len(pairs)) for pairs in every])
     able = least < SIGNIFICANT
     family = int(able.sum())
     able &= least.min(initial=1.0) * family < SIGNIFICANT
+    differences = [pairs[:, 1] - pairs[:, 0] for pairs in every]
     raw = [
-        signed_rank(p[:, 1] - p[:, 0]) if tested else (np.nan, np.nan)
-        for p, tested in zip(pairs, able, strict=True)
+        signed_rank(d) if tested else (np.nan, np.nan) for d, tested in zip(differences, able, strict=True)
     ]
-    corrected = holm(np.array([p for p, _ in raw])).tolist()
-    found = zip(claims, pairs, corrected, raw, strict=True)
-    return [_verdict(claim, pair, p, effect, family) for claim, pair, p, (_, effect) in found]
+    corrected = holm(np.array([p for p, _ in raw]))
+    made: list[Verdict] = []
+    for claim, pairs, p, (_, effect) in zip(claims, every, corrected, raw, strict=True):
+        if np.isfinite(p):
+            low, high = np.median(pairs, axis=0)
+            outcome = Outcome.CONFIRMED if effect > 0 else Outcome.CONTRADICTED
+            outcome = outcome if p < SIGNIFICANT else Outcome.OPEN
+            detail = f"median {claim.column} {low:.3g} against {high:.3g}; p = {p:.2g}, effect {effect:+.2f}"
+        else:
+            outcome, detail = Outcome.UNTESTED, claim.untested or f"too few seeds for {family} claims"
+        seeds = "" if claim.untested else f", {len(pairs)} seeds"
+        made.append(Verdict(claim.says, claim.item, outcome, detail + seeds, claim.ours))
+    return made
 
 
 def _pairs(claim: Claim, rows: Sequence[Row]) -> Array:
@@ -84,20 +77,6 @@ def _pairs(claim: Claim, rows: Sequence[Row]) -> Array:
     )
     pairs = np.array([(lower[seed], than[seed]) for seed in lower if seed in than], float).reshape(-1, 2)
     return pairs[np.isfinite(pairs).all(axis=1)]
-
-
-def _verdict(claim: Claim, pairs: Array, p: float, effect: float, family: int) -> Verdict:
-    seeds = f"{len(pairs)} seed{'s' * (len(pairs) != 1)}"
-    if not np.isfinite(p):
-        few = f"{seeds} are too few for {f'{family} claims' if family else 'any answer'}"
-        return Verdict(claim.says, Outcome.UNTESTED, claim.untested or few, claim.item, claim.ours)
-    low, high = np.median(pairs, axis=0).tolist()
-    detail = f"median {claim.column} {low:.3g} against {high:.3g}; p = {p:.2g}, effect {effect:+.2f}, {seeds}"
-    if np.array_equal(pairs[:, 0], pairs[:, 1]):
-        detail = f"{claim.column} is the same in both, seed by seed; median {low:.3g}, {seeds}"
-    outcome = Outcome.CONFIRMED if effect > 0 else Outcome.CONTRADICTED
-    outcome = outcome if p < SIGNIFICANT else Outcome.OPEN
-    return Verdict(claim.says, outcome, detail, claim.item, claim.ours, p, effect)
 
 
 def signed_rank(difference: Array) -> tuple[float, float]:

@@ -59,16 +59,11 @@ def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
 
     A run's seconds count as the median of its cell: a machine that slept would count otherwise.
     """
-    distinct = {
-        task.key(): (task.cell, result)
-        for runs in studies
-        for task, result in zip(runs.plan.tasks, runs.results, strict=True)
-    }
+    pairs = [pair for runs in studies for pair in zip(runs.plan.tasks, runs.results, strict=True)]
+    distinct = {task.key(): (task.cell, result) for task, result in pairs}
     seconds = dict[str, list[float]]()
     for cell, result in distinct.values():
         seconds.setdefault(cell, []).append(result.get("seconds", 0.0))
-    judged = {runs.plan.name: [asdict(verdict) for verdict in statements(runs)] for runs in studies}
-    kept = ("says", "outcome", "detail", "item")
     return {
         "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
@@ -77,10 +72,7 @@ def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
         "seconds": round(sum(float(np.median(times)) * len(times) for times in seconds.values())),
         "code": Counter(str(result.get("code", "not recorded")) for _, result in distinct.values()),
         "facts": {runs.plan.name: facts(runs) for runs in studies},
-        "findings": {
-            name: [{key: v[key].value if key == "outcome" else v[key] for key in kept} for v in found]
-            for name, found in judged.items()
-        },
+        "findings": {runs.plan.name: [asdict(v) for v in statements(runs)] for runs in studies},
     }
 
 

@@ -16,6 +16,7 @@ from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.errors import RunError
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.posterior.sweep import Surface, surface
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.progress import no_progress
@@ -29,8 +30,8 @@ from hydroid.studies.study import Row, make_tasks, measured, read_checks
 FOLDER = Path(__file__).parent
 DETERMINED_AT_DEG = 0.1
 """noise of the angle for which a direction counts as identifiable [deg]"""
-QUICK_S, QUICK_SEEDS, QUICK_POINTS = 15.0, 2, 7
-"""the short form: length of the data, number of seeds, values of each parameter of a surface"""
+POINTS, QUICK_S, QUICK_SEEDS, QUICK_POINTS = 31, 15.0, 2, 7
+"""values of each parameter of a surface; in the short form length of the data, seeds, and these values"""
 
 
 class Simulated(Settings):
@@ -65,7 +66,6 @@ class Figure(Settings):
     parameters: tuple[str, ...] = ()
     orders: dict[str, tuple[tuple[str, ...], ...]] = Field(default_factory=dict[str, Any])
     window_s: tuple[float, float] | None = None
-    points: int = 31
     normalized: bool = False
     actuators: dict[str, int] = Field(default_factory=dict[str, int])
 
@@ -110,8 +110,7 @@ def load_studies() -> dict[str, ArticleStudy]:
 
 def order(item: str) -> tuple[bool, int]:
     """Return what sorts tables before figures, each by number."""
-    kind, number = item.split()
-    return kind == "figure", int(number)
+    return item.startswith("figure"), int(item.split()[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,10 +144,6 @@ class Plan:
         seeds = min(self.study.seeds, QUICK_SEEDS) if self.quick else self.study.seeds
         return make_tasks(self.cells, range(1, seeds + 1), self.logs, checks)
 
-    def points(self, figure: Figure) -> int:
-        """Return how many values of each parameter a surface has."""
-        return QUICK_POINTS if self.quick else figure.points
-
     def run(self, folder: Path, executor: Executor) -> "Runs":
         """Perform the runs that `folder` does not have yet; return what all of them gave."""
         problem, truth = Problem(next(iter(self.cells.values())), self.logs), self.study.truth
@@ -179,6 +174,12 @@ class Runs:
         """Time [s] and angle [deg] of the first compared joint in the first log, shapes (T,)."""
         log = self.problem.logs[0]
         return log.time, np.degrees(log.angle[:, self.problem.outputs[0]])
+
+    def surface(self, figure: Figure) -> Surface:
+        """Return the error over the two parameters of a figure, all others at the truth."""
+        first, second = figure.parameters
+        points = QUICK_POINTS if self.plan.quick else POINTS
+        return surface(self.problem, self.theta, (first, second), points, None)
 
     def of(self, cell: str) -> list[tuple[Row, Result]]:
         """Return the runs of a cell that did not fail."""

@@ -71,7 +71,8 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
 
 
 @compilable
-def _opening(side: Any, travel: float) -> float:
+def opened(side: Any, travel: float) -> float:
+    """Opening of a side's pump edge [m²] at a spool travel towards it [m], without leakage."""
     share = slot_share(travel, side)
     if side.opening_exponent != 1.0:
         share = share**side.opening_exponent
@@ -90,11 +91,11 @@ def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> 
 def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
     """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own."""
     if displacement > 0.0:
-        area = _opening(c.a, displacement)
+        area = opened(c.a, displacement)
         _fill(c, w.a, supply, c.leakage + area, c.leakage)
         _fill(c, w.b, supply, c.leakage, c.leakage + area * c.b.return_)
     else:
-        area = _opening(c.b, -displacement)
+        area = opened(c.b, -displacement)
         _fill(c, w.a, supply, c.leakage, c.leakage + area * c.a.return_)
         _fill(c, w.b, supply, c.leakage + area, c.leakage)
 

@@ -10,6 +10,9 @@ from hydroid.settings.load import Settings
 class SimulationSettings(Settings):
     """How logs are simulated."""
 
+    model: Literal["dynamic", "quasi-static"] = "dynamic"
+    """of stage 2. dynamic: oil, inertia and stops; quasi-static: speed follows valve and load at once, in
+    steps as long as the log's period"""
     other_joints: Literal["locked", "passive", "measured"] = "locked"
     """how to treat joints that have no command in the log and are not compared. locked: they stand still,
     which is the fastest; passive: they move on their own spring and damper, as in the article; measured:

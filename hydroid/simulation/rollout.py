@@ -9,6 +9,7 @@ raising; a model that gets through `SteppedArm.start` has none to expect.
 
 import ctypes
 import logging
+from collections.abc import Callable
 from copy import copy
 from functools import cache
 from pathlib import Path
@@ -31,8 +32,8 @@ NO_ACTUATORS = Plugin(np.empty(0, COEFFICIENTS), NO_JOINTS, np.empty((0, 0), np.
 """of an arm whose joints are all pushed"""
 
 # libmujoco.so.*, libmujoco.*.dylib or mujoco.dll: the one that the bindings have loaded
-_library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
-llvmlite.binding.add_symbol("mj_step", ctypes.cast(_library.mj_step, ctypes.c_void_p).value)
+mujoco_library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+llvmlite.binding.add_symbol("mj_step", ctypes.cast(mujoco_library.mj_step, ctypes.c_void_p).value)
 _mj_step: Any = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 
 
@@ -55,6 +56,10 @@ class Handles(NamedTuple):
     """the other joints, (P,)"""
     steps: int
     """in one sample"""
+    balance: Array
+    """torques of gravity, where a rollout asks for them [N·m], (V,)"""
+    limits: Array
+    """of the angles [rad], (V, 2)"""
 
 
 class Course(NamedTuple):
@@ -85,6 +90,7 @@ class SteppedArm:
         columns: the moving joints with actuators, and those they couple with, shape (J,).
         pushed: all others, whose torques are given, shape (P,).
         steps: of MuJoCo in one sample.
+        rollout: the compiled one, with the arguments of `roll`, which it is by default.
 
     Attributes:
         model: with the values of the candidate that was started last.
@@ -97,11 +103,14 @@ class SteppedArm:
         columns: NDArray[np.intp] = NO_JOINTS,
         pushed: NDArray[np.intp] = NO_JOINTS,
         steps: int = 1,
+        rollout: Callable[..., None] | None = None,
     ) -> None:
+        self._roll = rollout or roll
         self.model, self.data = m, d = copy(model), mujoco.MjData(model)
         self._armature = own = model.dof_armature.copy()
+        limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
-        self._handles = Handles(m._address, d._address, *live, columns, own[columns], pushed, steps)
+        self._handles = Handles(m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, limits)
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
         """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest.
@@ -138,7 +147,7 @@ class SteppedArm:
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.
         """
-        roll(self._handles, plugin, state, course, record)
+        self._roll(self._handles, plugin, state, course, record)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -183,7 +192,7 @@ def compile_rollout() -> None:
     """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
     one = np.ones(1)
     warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1)
+    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, np.empty((0, 2)))
     nothing = np.empty((0, 1))
     course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
     with event.install_listener("numba:compile", _Announcement()):

@@ -20,7 +20,8 @@ from hydroid.hydraulics.records import JOINT_STATE, Array, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 from hydroid.simulation.chain import Chain
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout
+from hydroid.simulation.quasi_static import roll_quasi_static
+from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Response, Scenario
 from hydroid.simulation.sensor import reading
 
@@ -46,6 +47,7 @@ class Simulation:
     ) -> None:
         compile_rollout()
         self.scenario = scenario
+        self._quasi_static = bool(substeps) and scenario.settings.model == "quasi-static"
         pushed = scenario.prescribed.columns if substeps else np.arange(len(scenario.arm.columns))
         self._chain = Chain(arm, scenario.arm, scenario.active, substeps or 1, pushed)
         self.joints = self._chain.joints
@@ -97,7 +99,8 @@ class Simulation:
     def _stepped(self) -> SteppedArm:
         scenario, chain = self.scenario, self._chain
         steps = scenario.settings.steps_per_sample
-        return SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps)
+        rollout = roll_quasi_static if self._quasi_static else roll
+        return SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps, rollout)
 
     def _follower(self, candidates: Candidates, arm: SteppedArm, *, observed: bool) -> Follow:
         """Return what simulates each of n candidates, and observes its actuators, under the log's commands.
@@ -117,7 +120,7 @@ class Simulation:
             arm.start(values, row, pose)
             torque = gain[row] * scenario.command[:, chain.pushed] + balance[row, chain.pushed]
             if served.size:
-                torque[:, served] = servo.torque
+                torque[:, served] = servo.angle if self._quasi_static else servo.torque
             one, state = plugin.of(row), states[row]
             before = np.zeros((one.past, len(state)))
             commands = np.concatenate([before, scenario.command[:, chain.columns]])

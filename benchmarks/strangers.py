@@ -1,0 +1,294 @@
+"""Forty machines that hydroid has not seen, through the commands that `hydroid init` prints.
+
+    python benchmarks/strangers.py [--machines 40] [--seed 1] [--folder build/strangers] [--keep]
+
+Every machine is random: three to six joints, 0.2 to 20 t, rotary actuators and cylinders, dead bands to 60 %,
+exponents of 0.7 to 3, delays to 0.4 s, lags, asymmetries, friction; half of them share a pump that droops, a
+third of those draws differently in each direction; half have oil and inertia that the logs show. Their
+equations and their integrator are those of this file: nothing of hydroid simulates them. Each is recorded
+three times as with sticks, with 0.02 to 0.2 deg of noise at 10 to 100 Hz with jitter; two logs are fitted,
+and the third is predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its
+travel. A joint that is not good must be named by the verdict.
+"""
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+STEP = 0.002
+"""of the integration [s]"""
+GRAVITY = 9.81
+NAMES = ("swing", "boom", "arm", "bucket", "wrist", "tool")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A random machine of J joints; joint 0 may turn about the vertical, the others lift for positive angles.
+
+    length [m], mass [kg]: of the links, (J,). lower, upper [rad]. full: speed at full command without load in
+    both directions [rad/s], (J, 2). dead [%], exponent: (J, 2). delay, lag [s], (J,). early: whether the lag
+    is before the dead band. load: torque of gravity at which a joint stands still [N·m], (J,); friction: the
+    same as a part of it. lever: change of the moment arm over the range, 0 of a rotary actuator, (J,). droop:
+    fall of the supply at the pump's full flow, 0 without a shared pump. draw: flow of each direction at full
+    speed, as a part of the pump's, (J, 2). frequency [Hz], ratio: of oil and inertia, (J,); inf: unseen.
+    """
+
+    names: tuple[str, ...]
+    vertical: NDArray[np.bool_]
+    length: Array
+    mass: Array
+    lower: Array
+    upper: Array
+    full: Array
+    dead: Array
+    exponent: Array
+    delay: Array
+    lag: Array
+    early: NDArray[np.bool_]
+    load: Array
+    friction: Array
+    lever: Array
+    droop: float
+    draw: Array
+    frequency: Array
+    ratio: Array
+    noise: float
+    rate: float
+
+
+def random_machine(rng: Generator, number: int) -> Machine:
+    """Draw a machine."""
+    joints = int(rng.integers(3, 7))
+    swings = joints > 3 or rng.random() < 0.5
+    names = NAMES[:joints] if swings else NAMES[1 : joints + 1]
+    size = 10 ** rng.uniform(np.log10(0.2), np.log10(20))  # t
+    length = 2.2 * size ** (1 / 3) * np.array([0.3, 1.0, 0.7, 0.35, 0.3, 0.25])[: joints + (not swings)]
+    mass = 1000 * size * np.array([0.45, 0.12, 0.07, 0.04, 0.02, 0.015])[: joints + (not swings)]
+    if not swings:
+        length, mass = length[1:], mass[1:]
+    ranges = {"swing": (-120, 120), "boom": (-30, 60), "arm": (-140, -25), "bucket": (-120, 30)}
+    ends = np.radians([ranges.get(name, (-60, 60)) for name in names])
+    vertical = np.array([name == "swing" for name in names])
+    full = np.radians(rng.uniform(8, 40, (joints, 1))) * rng.uniform(0.7, 1.4, (joints, 2))
+    dead = np.clip(rng.choice([5.0, 20.0, 40.0]) + rng.normal(0, 4, (joints, 2)), 0, 60)
+    exponent = np.clip(rng.uniform(0.7, 3.0, (joints, 1)) * rng.uniform(0.9, 1.1, (joints, 2)), 0.7, 3.0)
+    shared = number % 2 == 0
+    draw = np.tile(rng.uniform(0.2, 0.6, (joints, 1)), (1, 2))
+    if rng.random() < 1 / 3:
+        draw *= rng.uniform(0.3, 1.0, (joints, 2))
+    visible = number % 4 < 2
+    own = np.zeros(joints)
+    gravity_torque(ends.mean(axis=1), vertical, length, mass, own)
+    reach = np.maximum(np.abs(own), 0.3 * GRAVITY * mass * length)
+    return Machine(
+        tuple(names),
+        vertical,
+        length,
+        mass,
+        ends[:, 0],
+        ends[:, 1],
+        full,
+        dead,
+        exponent,
+        delay=np.full(joints, rng.uniform(0, 0.4)) * rng.uniform(0.8, 1.0, joints),
+        lag=rng.uniform(0.02, 0.25, joints),
+        early=rng.random(joints) < 0.3,
+        load=reach * rng.uniform(2, 5, joints),
+        friction=rng.uniform(0, 0.1, joints),
+        lever=np.where(vertical | (rng.random(joints) < 0.4), 0.0, rng.uniform(0.1, 0.4, joints)),
+        droop=float(rng.uniform(0.2, 0.6)) if shared else 0.0,
+        draw=draw,
+        frequency=rng.uniform(0.8, 4.0, joints) if visible else np.full(joints, np.inf),
+        ratio=rng.uniform(0.1, 0.6, joints),
+        noise=np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2))),
+        rate=float(rng.choice([10, 20, 50, 100])),
+    )
+
+
+@njit(cache=True)
+def gravity_torque(angle: Array, vertical: Array, length: Array, mass: Array, torque: Array) -> None:
+    """Write the torque that holds each joint [N·m], (J,): a planar chain, each link's mass in its middle."""
+    pitch, carried, moment = 0.0, 0.0, 0.0
+    along = np.zeros(len(angle))
+    for j in range(len(angle)):
+        pitch += 0.0 if vertical[j] else angle[j]
+        along[j] = 0.0 if vertical[j] else length[j] * np.cos(pitch)
+    for j in range(len(angle) - 1, -1, -1):
+        moment += along[j] * (0.5 * mass[j] + carried)
+        carried += mass[j]
+        torque[j] = 0.0 if vertical[j] else GRAVITY * moment
+
+
+@njit(cache=True)
+def opening(signal: float, dead: Array, exponent: Array) -> float:
+    """Part of the full speed, with its sign, that a signal [%] asks for."""
+    side = 0 if signal >= 0 else 1
+    beyond = max(abs(signal) - dead[side], 0.0) / (100.0 - dead[side])
+    return np.sign(signal) * beyond ** exponent[side]
+
+
+@njit(cache=True)
+def speeds(supply: float, part: Array, lift: Array, friction: Array, turn: Array) -> Array:
+    """Part of each joint's full speed at a supply pressure, (J,)."""
+    against = np.sign(part) * lift + friction * np.abs(np.sign(part))
+    return np.abs(part) * np.sqrt(np.maximum(supply - against, 0.0)) * turn
+
+
+@njit(cache=True)
+def integrate(command: Array, start: Array, late: Array, vertical: Array, numbers: Array, droop: float) -> Array:
+    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as `Machine.numbers`."""
+    steps, joints = command.shape
+    length, mass, lower, upper, lag, early, load, friction, lever, stiff, ratio = numbers[:11]
+    full, dead, exponent, draw = numbers[11:13], numbers[13:15], numbers[15:17], numbers[17:19]
+    angle, found = start.copy(), np.empty((steps, joints))
+    held, speed, force = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    part, turn, lift, torque = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    for k in range(steps):
+        found[k] = angle
+        gravity_torque(angle, vertical, length, mass, torque)
+        for j in range(joints):
+            u = command[k - late[j], j] if k >= late[j] else 0.0
+            target = u if early[j] else opening(u, dead[:, j], exponent[:, j])
+            held[j] += (target - held[j]) * (1.0 - np.exp(-STEP / lag[j]))
+            part[j] = opening(held[j], dead[:, j], exponent[:, j]) if early[j] else held[j]
+            middle = (angle[j] - 0.5 * (lower[j] + upper[j])) / (upper[j] - lower[j])
+            turn[j] = 1.0 / (1.0 - lever[j] * (2.0 * middle) ** 2)
+            lift[j] = torque[j] / load[j]
+        low, high, supply = 0.0, 1.0, 1.0
+        if droop > 0:
+            for _ in range(30):
+                supply = 0.5 * (low + high)
+                rate, taken = speeds(supply, part, lift, friction, turn), 0.0
+                for j in range(joints):
+                    taken += rate[j] / turn[j] * draw[0 if part[j] >= 0 else 1, j]
+                if 1.0 - droop * taken > supply:
+                    low = supply
+                else:
+                    high = supply
+        rate = speeds(supply, part, lift, friction, turn)
+        for j in range(joints):
+            wanted = np.sign(part[j]) * full[0 if part[j] >= 0 else 1, j] * rate[j]
+            if stiff[j] > 0:  # oil: a spring between what the valve lets through and the arm
+                force[j] += STEP * stiff[j] * (wanted - speed[j])
+                speed[j] += STEP * (force[j] - 2.0 * ratio[j] * np.sqrt(stiff[j]) * (speed[j] - wanted))
+            else:
+                speed[j] = wanted
+            angle[j] += STEP * speed[j]
+            if angle[j] < lower[j] or angle[j] > upper[j]:
+                angle[j], speed[j], force[j] = min(max(angle[j], lower[j]), upper[j]), 0.0, 0.0
+    return found
+
+
+def simulate(m: Machine, command: Array, start: Array) -> Array:
+    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
+    stiff = np.where(np.isfinite(m.frequency), (2 * np.pi * np.minimum(m.frequency, 50)) ** 2, 0.0)
+    ends = (m.length, m.mass, m.lower, m.upper, m.lag, m.early, m.load, m.friction, m.lever, stiff, m.ratio)
+    numbers = np.array([*ends, *m.full.T, *m.dead.T, *m.exponent.T, *m.draw.T], float)
+    late = np.round(m.delay / STEP).astype(np.int64)
+    return integrate(np.ascontiguousarray(command), start, late, m.vertical, numbers, m.droop)
+
+
+def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array, Array]:
+    """Commands as a person gives them, kept off the stops, with the angles that follow and the start."""
+    steps, joints = round(seconds / STEP), len(m.names)
+    start = m.lower + (m.upper - m.lower) * rng.uniform(0.35, 0.65, joints)
+    command = np.zeros((steps, joints))
+    angle = np.tile(start, (steps, 1))
+    block = round(10.0 / STEP)
+    for first in range(0, steps, block):
+        last = min(first + block, steps)
+        for _ in range(12):
+            trial = command.copy()
+            for j in range(joints):
+                k = first + (round(1.0 / STEP) if first == 0 else 0)
+                while k < last:
+                    hold = round(rng.uniform(0.5, 3.0) / STEP)
+                    level = rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) * 100 if rng.random() < 0.6 else 0.0
+                    ramp = min(round(rng.uniform(0.05, 0.5) / STEP), hold)
+                    end = min(k + hold, last)
+                    before = trial[k - 1, j]
+                    trial[k:end, j] = level
+                    n = min(ramp, end - k)
+                    trial[k : k + n, j] = before + (level - before) * np.arange(1, n + 1) / max(ramp, 1)
+                    k = end
+            moved = simulate(m, trial[:last], start)
+            margin = 0.04 * (m.upper - m.lower)
+            bad = np.any((moved < m.lower + margin) | (moved > m.upper - margin), axis=0)
+            if not bad.any():
+                break
+            trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
+            moved = simulate(m, trial[:last], start)
+            if not np.any((moved < m.lower + margin) | (moved > m.upper - margin)):
+                break
+        command, angle[:last] = trial, moved
+    return command, angle, start
+
+
+def write_machine(folder: Path, m: Machine, rng: Generator) -> list[Path]:
+    """Write the URDF and three logs; the last is the unseen one."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "robot.urdf").write_text(urdf(m))
+    logs = list[Path]()
+    for number in (1, 2, 3):
+        command, angle, _ = stick(rng, m, float(rng.uniform(40, 120)) if number < 3 else 60.0)
+        times = np.arange(0, len(command) * STEP - STEP, 1 / m.rate)
+        times[1:] += rng.uniform(-0.1, 0.1, len(times) - 1) / m.rate
+        at = np.minimum(np.round(times / STEP).astype(int), len(command) - 1)
+        noisy = np.degrees(angle[at] + rng.normal(0, m.noise, (len(at), len(m.names))))
+        header = ["time_s", *(f"u_{n}_pct" for n in m.names), *(f"q_{n}_deg" for n in m.names)]
+        path = folder / f"log_{number}.csv"
+        table = np.column_stack([at * STEP, command[at], noisy])
+        np.savetxt(path, table, delimiter=",", header=",".join(header), comments="", fmt="%.4f")
+        logs.append(path)
+    return logs
+
+
+def urdf(m: Machine) -> str:
+    """The machine as its maker's CAD exports it: boxes of the right masses."""
+    parts = ['<robot name="stranger">', '<link name="base"/>']
+    parent, x, z = "base", 0.0, 0.0
+    for j, name in enumerate(m.names):
+        long = 0.0 if m.vertical[j] else m.length[j]
+        wide = 0.15 * m.length[j]
+        size = (wide if m.vertical[j] else long, wide, wide)
+        inertia = m.mass[j] / 12 * np.array([2 * wide**2, size[0] ** 2 + wide**2, size[0] ** 2 + wide**2])
+        parts.append(
+            f'<link name="{name}_link"><inertial><origin xyz="{long / 2:.4f} 0 0"/><mass value="{m.mass[j]:.3f}"/>'
+            f'<inertia ixx="{inertia[0]:.5g}" iyy="{inertia[1]:.5g}" izz="{inertia[2]:.5g}" ixy="0" ixz="0" '
+            f'iyz="0"/></inertial><visual><origin xyz="{long / 2:.4f} 0 0"/><geometry><box size="'
+            f'{size[0]:.4f} {size[1]:.4f} {size[2]:.4f}"/></geometry></visual></link>'
+        )
+        axis = "0 0 1" if m.vertical[j] else "0 -1 0"
+        parts.append(
+            f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>'
+            f'<origin xyz="{x:.4f} 0 {z:.4f}"/><axis xyz="{axis}"/>'
+            f'<limit lower="{m.lower[j]:.5f}" upper="{m.upper[j]:.5f}" effort="1e6" velocity="2"/></joint>'
+        )
+        parent, x, z = f"{name}_link", long, 0.0
+    return "\n".join([*parts, "</robot>\n"])
+
+
+def main() -> None:
+    """Make the machines, run the commands, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--machines", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--folder", type=Path, default=Path("build/strangers"))
+    arguments = parser.parse_args()
+    for number in range(arguments.machines):
+        rng = np.random.default_rng([arguments.seed, number])
+        machine = random_machine(rng, number)
+        began = time.perf_counter()
+        write_machine(arguments.folder / f"{number:02d}", machine, rng)
+        print(number, machine.names, f"{time.perf_counter() - began:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

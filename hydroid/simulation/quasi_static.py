@@ -1,0 +1,193 @@
+"""The quasi-static rollout: speed follows the valve and the load at once, without oil stiffness and inertia.
+
+For a cylinder that moves at speed v towards the chamber it fills, with openings a_in and a_out, areas A_in and
+A_out, k = C_q √(2/ρ), and the load F (gravity, springs and dry friction against the motion) and damping d:
+
+    p_in = P − (v A_in/(k a_in))²,   p_out = p_T + (v A_out/(k a_out))²,   p_in A_in − p_out A_out = F + d v,
+
+which is a quadratic equation in v. Where the load overruns, p_in would fall below 0: the chamber then
+cavitates, and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
+share the pump's line, whose pressure P satisfies the one equation Σ Q_i(P) = Q_P(P) of `hydroid.hydraulics.pump`.
+
+Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
+integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
+actuator stand still. Leakage is left out, so nothing sags.
+"""
+
+import ctypes
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+from numba import njit, types
+
+from hydroid.hydraulics.cylinder import four_bar, triangle
+from hydroid.hydraulics.elementwise import compilable
+from hydroid.hydraulics.joint import command, move_spool, opened
+from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
+from hydroid.hydraulics.pump import begin_line, come_up
+from hydroid.hydraulics.records import LINEAR
+from hydroid.simulation.rollout import mujoco_library
+
+for _name in ("mj_kinematics", "mj_comPos", "mj_rne"):
+    llvmlite.binding.add_symbol(_name, ctypes.cast(getattr(mujoco_library, _name), ctypes.c_void_p).value)
+_kinematics: Any = types.ExternalFunction("mj_kinematics", types.void(types.intp, types.intp))
+_com_pos: Any = types.ExternalFunction("mj_comPos", types.void(types.intp, types.intp))
+_rne: Any = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.int32, types.intp))
+
+ITERATIONS = 30
+"""for the line's pressure at most; three to five suffice"""
+SETTLED = 1e-9
+"""relative change of the pressure at which they end"""
+
+
+@compilable
+def rod_speed(c: Any, side: Any, other: Any, area: float, supply: float, load: float, drag: float) -> Any:
+    """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P.
+
+    Args:
+        c: the joint's COEFFICIENTS, `side` and `other` its sides that fill and empty.
+        area: opening of the pump's edge [m²], above 0.
+        supply: P [Pa].
+        load: against the motion [N]; of a rotary actuator a torque [N·m], as all forces.
+        drag: d [N·s/m].
+    """
+    pump_edge, tank_edge = c.conductance * area, c.conductance * area * other.return_
+    back = (other.area / tank_edge) ** 2 * other.area
+    free = supply * side.area - c.tank_pressure * other.area - load
+    if free <= 0.0:
+        return 0.0, 0.0, 0.0
+    root = np.sqrt(drag * drag + 4.0 * free * ((side.area / pump_edge) ** 2 * side.area + back))
+    speed = 2.0 * free / (drag + root)
+    flow, rise = side.area * speed, side.area * side.area / root
+    if flow * flow > supply * pump_edge * pump_edge:  # cavitates
+        falling = -c.tank_pressure * other.area - load
+        speed = 2.0 * falling / (drag + np.sqrt(drag * drag + 4.0 * falling * back))
+        flow = pump_edge * np.sqrt(supply)
+        rise = 0.5 * flow / supply
+        if flow > c.flow_limit:
+            flow, rise = c.flow_limit, 0.0
+    elif flow > c.flow_limit:
+        speed, flow, rise = c.flow_limit / side.area, c.flow_limit, 0.0
+    return speed, flow, rise
+
+
+@compilable
+def directed_speed(c: Any, w: Any, supply: float) -> Any:
+    """`rod_speed` of a joint in its direction: w.travel is its net opening [m²], w.push its load [N]."""
+    if w.travel > 0.0:
+        return rod_speed(c, c.a, c.b, w.travel, supply, w.push + w.thrust, w.drag)
+    if w.travel < 0.0:
+        return rod_speed(c, c.b, c.a, -w.travel, supply, -w.push + w.thrust, w.drag)
+    return 0.0, 0.0, 0.0
+
+
+@compilable
+def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) -> float:
+    """Pressure of the line [Pa] at which the actuators take what the pump gives, at most `full` [m³/s].
+
+    Newton's method from the last step's, within a bracket: what is taken rises with the pressure, and what is
+    given falls.
+    """
+    low, high = 0.0, some.relief
+    pressure = min(max(line.pressure, 1e-3 * high), high)
+    for _ in range(ITERATIONS):
+        given, slope = full, 0.0
+        if some.relief - pressure < some.pump_droop:
+            given, slope = full * (some.relief - pressure) / some.pump_droop, full / some.pump_droop
+        excess = line.taken - given
+        for a in range(plugin.idle, plugin.order.size):
+            j = plugin.order[a]
+            c = plugin.coefficients[j]
+            _, flow, rise = directed_speed(c, work[j], min(pressure, c.supply_pressure))
+            excess += flow
+            if pressure <= c.supply_pressure:
+                slope += rise
+        if excess > 0.0:
+            high = pressure
+        else:
+            low = pressure
+        after = pressure - excess / slope if slope > 0.0 else (low if excess > 0.0 else high)
+        if not low <= after <= high:
+            after = high if high == some.relief and excess < 0.0 else 0.5 * (low + high)
+        if abs(after - pressure) <= SETTLED * some.relief:
+            return after
+        pressure = after
+    return pressure
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def roll_quasi_static(
+    arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE
+) -> None:
+    """Roll one candidate out, as `rollout.roll` does; joints that follow a log take its angle."""
+    columns, order, idle = arm.columns, plugin.order, plugin.idle
+    joints, substeps, period = order.size, plugin.substeps, plugin.period
+    commands, followed, taken = course
+    pad = make_pad(joints)
+    work, line = pad.joints, pad.line[0]
+    start, rate = arm.angle.copy(), np.zeros(joints)
+    past = commands.shape[0] - followed.shape[0]
+    shared, step = False, period / substeps
+    if idle < joints:
+        some = plugin.coefficients[order[joints - 1]]
+        shared = some.pump_flow < np.inf
+    for k in range(followed.shape[0]):
+        now = past + k
+        for i in range(arm.pushed.size):
+            arm.angle[arm.pushed[i]] = followed[k, i]
+        for a in range(idle, joints):
+            j = order[a]
+            c, z, w = plugin.coefficients[j], state[j], work[j]
+            z.angle = arm.angle[columns[j]]
+            arm.angle[columns[j]] = z.angle + 0.5 * period * rate[j]
+            command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
+            net = 0.0
+            for i in range(substeps):
+                displacement = move_spool(c, z, w, i, step)
+                net += opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+            w.travel = net / substeps
+        _kinematics(arm.model, arm.data)
+        _com_pos(arm.model, arm.data)
+        _rne(arm.model, arm.data, 0, arm.balance.ctypes.data)
+        for a in range(idle, joints):
+            j = order[a]
+            c, w = plugin.coefficients[j], work[j]
+            middle = arm.angle[columns[j]]
+            w.arm = 1.0
+            if c.kind == LINEAR:
+                psi, first = middle, 1.0
+                if c.rocker > 0.0:
+                    psi, first, _ = four_bar(middle, c)
+                w.arm = first * triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[1]
+            lever = max(abs(w.arm), 1e-6)
+            held = arm.balance[columns[j]] + c.stiffness * (middle - start[columns[j]])
+            w.push = held / w.arm
+            w.thrust = c.dry_friction + c.friction / lever
+            w.drag = c.damping / (lever * lever)
+        pressure = np.inf
+        if shared:
+            line.taken = taken[k] if taken.size else 0.0
+            demanded = False
+            for a in range(idle, joints):
+                demanded |= commands[now, order[a]] != 0.0
+            begin_line(line, some, state[order[joints - 1]], demanded, period)
+            full = come_up(line, some, period) * some.pump_flow
+            pressure = line_pressure(plugin, work, line, full, some)
+        for a in range(idle, joints):
+            j = order[a]
+            c, z, w = plugin.coefficients[j], state[j], work[j]
+            speed, _, _ = directed_speed(c, w, min(pressure, c.supply_pressure))
+            sign = 1.0 if w.travel > 0.0 else -1.0
+            rate[j] = sign * speed / w.arm
+            after = z.angle + period * rate[j]
+            lower, upper = arm.limits[columns[j], 0], arm.limits[columns[j], 1]
+            after = min(max(after, min(lower, z.angle)), max(upper, z.angle))
+            rate[j] = (after - z.angle) / period
+            arm.angle[columns[j]] = after
+            z.velocity = rate[j]
+            if shared:
+                z.line, z.share, z.demand = pressure, line.share, line.demand
+        record.angle[k] = arm.angle
+        if record.states.size:
+            record.states[k] = state

@@ -142,7 +142,9 @@ def speeds(supply: float, part: Array, lift: Array, friction: Array, turn: Array
 
 
 @njit(cache=True)
-def integrate(command: Array, start: Array, late: Array, vertical: Array, numbers: Array, droop: float) -> Array:
+def integrate(
+    command: Array, start: Array, late: Array, vertical: Array, numbers: Array, droop: float
+) -> Array:
     """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as `Machine.numbers`."""
     steps, joints = command.shape
     length, mass, lower, upper, lag, early, load, friction, lever, stiff, ratio = numbers[:11]
@@ -277,7 +279,9 @@ def urdf(m: Machine) -> str:
 
 def main() -> None:
     """Make the machines, run the commands, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--machines", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=Path("build/strangers"))

@@ -70,6 +70,11 @@ class Quantity:
         return any(isinstance(limit, Gt) for limit in self.limits)
 
     @property
+    def lowest(self) -> float:
+        """The least value that a fit may try; 0 but for changes of a lever."""
+        return float(min([limit.ge for limit in self.limits if isinstance(limit, Ge)], default=0.0))  # pyright: ignore[reportArgumentType]
+
+    @property
     def of_the_pump(self) -> bool:
         """Whether all actuators share it, since they have one pump."""
         return self.name.startswith("pump_") or self.name == "line_volume"
@@ -143,7 +148,37 @@ ROWS = (
         "theta0: angle between both pivots at joint angle 0",
         source="arm's file",
     ),
+    Quantity(
+        "lever_slope",
+        "",
+        0.0,
+        "rise of a rotary actuator's moment arm over its range",
+        "change of a rotary actuator's moment arm from the middle of the joint's range to its upper end, as a "
+        "part of it: for stand-ins of unknown linkages",
+        limits=(Ge(-0.9), Le(0.9)),
+        span=(-0.5, 0.5),
+    ),
+    Quantity(
+        "lever_bend",
+        "",
+        0.0,
+        "bend of a rotary actuator's moment arm over its range",
+        "change of a rotary actuator's moment arm from the middle of the joint's range to both its ends, as a "
+        "part of it; below 0 for a cylinder",
+        limits=(Ge(-0.9), Le(0.9)),
+        span=(-0.5, 0.5),
+    ),
     # from the command to the current
+    Quantity(
+        "pilot_lag",
+        "s",
+        0.0,
+        "lag before the dead band",
+        "time constant with which the pilot stage of coil {side} follows the command, before the dead band",
+        limits=FROM_ZERO,
+        span=(0.0, 1.0),
+        sides=True,
+    ),
     Quantity(
         "onset",
         "V",

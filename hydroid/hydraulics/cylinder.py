@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, select
-from hydroid.hydraulics.records import LINEAR, Array
+from hydroid.hydraulics.records import LINEAR, ROTARY, Array
 from hydroid.settings import linkage
 
 SLIDING = 1e-3
@@ -38,10 +38,26 @@ def volume(travel: Any, area: Any, dead: Any) -> Any:
     return np.maximum(dead + area * travel, SMALLEST * dead)
 
 
+@compilable
+def bent(angle: Any, c: Any) -> Any:
+    """Way of a rotary actuator at an angle [rad], its moment arm, relative to that in the middle, and slope.
+
+    A joint that a linkage of unknown size turns is taken for a rotary actuator whose moment arm
+    r = 1 + slope s + bend s² depends on the place s in the joint's range, -1 to 1. The way is its integral.
+    """
+    place = (angle - c.middle) / c.half
+    way = angle + c.half * place * place * (0.5 * c.lever_slope + c.lever_bend * place / 3.0)
+    return (
+        way,
+        1.0 + place * (c.lever_slope + c.lever_bend * place),
+        (c.lever_slope + 2.0 * c.lever_bend * place) / c.half,
+    )
+
+
 def fills(angle: Array, c: Any) -> tuple[Array, Array]:
     """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
     travel, linear = rod_motion(angle, c)[0], c.kind == LINEAR
-    sides = (c.a, travel, angle), (c.b, c.stroke - travel, -angle)
+    sides = (c.a, travel, travel), (c.b, c.stroke - travel, -travel)
     a, b = (
         np.where(
             linear,
@@ -56,9 +72,11 @@ def fills(angle: Array, c: Any) -> tuple[Array, Array]:
 def rod_motion(angle: Array, c: Any) -> tuple[Array, Array, Array]:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
 
-    Of a rotary actuator x means nothing, and r is 1.
+    Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
     linear = c.kind == LINEAR
+    with np.errstate(all="ignore"):  # joints without actuator have no range here
+        rotary = bent(angle, c)
     # joints without a triangle get a harmless one
     a, b = np.where(linear, c.pivot_distance_1, 2.0), np.where(linear, c.pivot_distance_2, 1.0)
     psi, first, second = angle, 1.0, 0.0
@@ -68,7 +86,11 @@ def rod_motion(angle: Array, c: Any) -> tuple[Array, Array, Array]:
         psi, first, second = (np.where(rocks, x, y) for x, y in zip(bars, (angle, 1.0, 0.0), strict=True))
     travel, arm, slope = triangle(psi, a, b, c.theta0, c.shortest)
     slope = slope * first**2 + arm * second
-    return travel, np.where(linear, arm * first, 1.0), np.where(linear, slope, 0.0)
+    cylinder, turning = (travel, arm * first, slope), c.kind == ROTARY
+    fixed = angle, 1.0, 0.0
+    return tuple(
+        np.where(linear, x, np.where(turning, y, z)) for x, y, z in zip(cylinder, rotary, fixed, strict=True)
+    )  # pyright: ignore[reportReturnType]
 
 
 @compilable

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.hydraulics.cylinder import (
+    bent,
     contact_torque,
     four_bar,
     friction_damping,
@@ -40,16 +41,28 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
         w.a.pressure = z.a.oil - bulk * np.log(volume(w.travel, c.a.area, dead) / dead)
         w.b.pressure = z.b.oil - bulk * np.log(volume(c.stroke - w.travel, c.b.area, dead) / dead)
     elif c.kind == ROTARY:
-        w.travel, w.arm, w.slope = 0.0, 1.0, 0.0
-        w.a.pressure = z.a.oil - bulk * c.a.area * angle / dead
-        w.b.pressure = z.b.oil + bulk * c.b.area * angle / dead
+        turned, w.arm, w.slope = bent(angle, c)
+        w.travel = 0.0
+        w.a.pressure = z.a.oil - bulk * c.a.area * turned / dead
+        w.b.pressure = z.b.oil + bulk * c.b.area * turned / dead
+
+
+@compilable
+def _follow(side: Any, z: Any, delayed: float) -> float:
+    """Mean of what the pilot stage has of the command during a step, first-order behind it."""
+    if side.pilot_keep == 0.0:
+        return delayed
+    left = (z.pilot - delayed) * (1.0 - side.pilot_keep)
+    z.pilot -= left
+    return delayed - left / np.log(side.pilot_keep)
 
 
 @compilable
 def command(c: Any, z: Any, w: Any, delayed_a: float, delayed_b: float) -> None:
     """Take the delayed commands [%]: each coil's drive changes `fresh` sub-steps into this step."""
     w.a.before, w.b.before = z.a.drive, z.b.drive
-    z.a.drive, z.b.drive = drive(delayed_a, c.a, c), drive(-delayed_b, c.b, c)
+    z.a.drive = drive(_follow(c.a, z.a, delayed_a), c.a, c)
+    z.b.drive = drive(-_follow(c.b, z.b, delayed_b), c.b, c)
     w.a.after, w.b.after = z.a.drive, z.b.drive
 
 

@@ -39,8 +39,8 @@ JOINT = np.dtype([(name, np.float64) for name in QUANTITIES if name != "mass"])
 """all quantities of a joint and its actuator, in SI"""
 
 BARS = ("ground", "rocker", "coupler", "child", "phase", "branch")
-LINKAGE = np.dtype([("kind", np.int64), *_fields(" ".join(("theta0 shortest stroke", *BARS)))])
-"""how a joint is moved: kind (NONE, LINEAR or ROTARY); the pivots' angle theta0 at joint angle 0 [rad], below
+LINKAGE = np.dtype([("kind", np.int64), *_fields(" ".join(("middle half theta0 shortest stroke", *BARS)))])
+"""how a joint is moved: kind (NONE, LINEAR or ROTARY); middle of its range and half of it [rad]; the pivots' angle theta0 at joint angle 0 [rad], below
 0 if the rod runs out towards negative angles; cylinder length with the rod fully in [m], as at the end of the
 joint's range; stroke [m]; ground to branch are those of `linkage.four_bar`, and rocker is 0 without one"""
 
@@ -53,6 +53,7 @@ SIDE = np.dtype(
         *((field, np.float64) for field in _SIDE_FIELDS.values()),
         ("late", np.int64),  # whole steps of the delay,
         ("fresh", np.float64),  # and sub-steps of the rest
+        ("pilot_keep", np.float64),  # part of the pilot stage's error that a step leaves
         ("plunger_weight", np.float64),  # of its new state in a sub-step
         ("has_notches", np.bool_),
     ]
@@ -74,6 +75,7 @@ backflow is the least flow from the pump [m³/s], relief the pressure of the pum
 SIDE_STATE = np.dtype(
     _fields(
         "stroke speed drive "  # of the plunger [m, m/s], its coil at the end of the last step [N·m²]
+        "pilot "  # what the pilot stage has of the command [%]
         "oil flow"  # oil [Pa] as `cylinder` defines it; mean flow into the chamber over the last step [m³/s]
     )
 )
@@ -159,12 +161,12 @@ def linkages(arm: Arm, places: Sequence[int], driven: Sequence[int], joints: Rec
         actuator, one, p = arm.joints[j].actuator, table[:, column], joints[:, column]
         if actuator is None:
             raise without_actuator(arm, j)
-        one["kind"] = ROTARY
+        ends = np.radians(arm.joints[j].range)
+        one["kind"], one["middle"], one["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
         if isinstance(actuator, LinearActuator):
             one["kind"], one["stroke"] = LINEAR, 1e-3 * actuator.stroke
             bars = actuator.settings.four_bar
             one["theta0"] = actuator.sense * p["pivot_angle"]
-            ends = np.radians(arm.joints[j].range)
             retracted = float(ends[int(np.argmin(actuator.length(ends)))])
             if bars is not None:
                 for name in BARS:
@@ -203,6 +205,8 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)
         side["fresh"] = (side.delay / period - side.late) * substeps
+        lag = np.where(side.pilot_lag > 0.0, side.pilot_lag, 1.0)
+        side["pilot_keep"] = np.where(side.pilot_lag > 0.0, np.exp(-period / lag), 0.0)
         damping = side.plunger_damping * np.maximum(side.plunger_back, 1.0)
         side["plunger_weight"] = plunger_weight(damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)

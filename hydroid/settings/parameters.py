@@ -110,7 +110,7 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    least = SMALLEST * prior.nominal if CHOICES[own.quantity].positive else 0.0
+    least = SMALLEST * prior.nominal if CHOICES[own.quantity].positive else CHOICES[own.quantity].lowest
     return max(prior.value(-BOUND_SD), least), prior.value(BOUND_SD)
 
 

@@ -65,8 +65,9 @@ class ParameterSettings(Settings):
         lowest = min(values, default=1.0)
         if self.quantity == "mass" and lowest <= 0:
             raise ValueError("a mass must be above 0 kg")
-        if lowest < 0:
-            raise ValueError(f"a {self.quantity} cannot be negative")
+        if lowest < (least := CHOICES[self.quantity].lowest):
+            what = f"be below {least:g}" if least else "be negative"
+            raise ValueError(f"a {self.quantity} cannot {what}")
         low, high = self.bounds or (0.0, math.inf)
         for name in ("nominal", "start"):
             value = getattr(self, name)

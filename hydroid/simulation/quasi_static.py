@@ -21,7 +21,7 @@ import llvmlite.binding
 import numpy as np
 from numba import njit, types
 
-from hydroid.hydraulics.cylinder import four_bar, triangle
+from hydroid.hydraulics.cylinder import bent, four_bar, triangle
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import command, move_spool, opened
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
@@ -154,12 +154,13 @@ def roll_quasi_static(
             j = order[a]
             c, w = plugin.coefficients[j], work[j]
             middle = arm.angle[columns[j]]
-            w.arm = 1.0
             if c.kind == LINEAR:
                 psi, first = middle, 1.0
                 if c.rocker > 0.0:
                     psi, first, _ = four_bar(middle, c)
                 w.arm = first * triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[1]
+            else:
+                w.arm = bent(middle, c)[1]
             lever = max(abs(w.arm), 1e-6)
             held = arm.balance[columns[j]] + c.stiffness * (middle - start[columns[j]])
             w.push = held / w.arm

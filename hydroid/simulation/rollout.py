@@ -110,7 +110,9 @@ class SteppedArm:
         self._armature = own = model.dof_armature.copy()
         limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
-        self._handles = Handles(m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, limits)
+        self._handles = Handles(
+            m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, limits
+        )
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
         """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest.
@@ -192,7 +194,9 @@ def compile_rollout() -> None:
     """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
     one = np.ones(1)
     warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-    arm = Handles(0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, np.empty((0, 2)))
+    arm = Handles(
+        0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, np.empty((0, 2))
+    )
     nothing = np.empty((0, 1))
     course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
     with event.install_listener("numba:compile", _Announcement()):

@@ -179,7 +179,7 @@ def test_delay_shifts_the_response():
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    linkage = np.array([(ROTARY, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
+    linkage = np.array([(ROTARY, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
     p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0)
     seen: Seen = []
     command = np.repeat([60.0, 0.0], 100)

@@ -23,7 +23,7 @@ UNLIKE = {
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
     """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
-    linkage = np.array([(ROTARY, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
+    linkage = np.array([(ROTARY, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
     p = changed(nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray), damping=5.0, **values)
     return simulate(p, command, SETTINGS, start=0.0, model=lone_wheel(0.05), linkage=linkage)[0]
 

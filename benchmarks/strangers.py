@@ -262,7 +262,8 @@ def urdf(m: Machine) -> str:
         size = (wide if m.vertical[j] else long, wide, wide)
         inertia = m.mass[j] / 12 * np.array([2 * wide**2, size[0] ** 2 + wide**2, size[0] ** 2 + wide**2])
         parts.append(
-            f'<link name="{name}_link"><inertial><origin xyz="{long / 2:.4f} 0 0"/><mass value="{m.mass[j]:.3f}"/>'
+            f'<link name="{name}_link"><inertial><origin xyz="{long / 2:.4f} 0 0"/>'
+            f'<mass value="{m.mass[j]:.3f}"/>'
             f'<inertia ixx="{inertia[0]:.5g}" iyy="{inertia[1]:.5g}" izz="{inertia[2]:.5g}" ixy="0" ixz="0" '
             f'iyz="0"/></inertial><visual><origin xyz="{long / 2:.4f} 0 0"/><geometry><box size="'
             f'{size[0]:.4f} {size[1]:.4f} {size[2]:.4f}"/></geometry></visual></link>'
@@ -277,6 +278,17 @@ def urdf(m: Machine) -> str:
     return "\n".join([*parts, "</robot>\n"])
 
 
+def run_commands(folder: Path, logs: list[Path]) -> tuple[Array, str, float]:
+    """Run what `hydroid init` prints: unseen rms of each joint [deg], joints that the verdict names, seconds."""
+    mine = folder / "mine"
+    began = time.perf_counter()
+    hydroid.init(mine, arm=folder / "robot.urdf", log=logs)
+    hydroid.fit_hyd(*logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
+    seconds = time.perf_counter() - began
+    judged = hydroid.validate(logs[-1], fit=[mine / "runs" / "fit"], out=mine / "runs" / "validation")
+    return judged, "", seconds
+
+
 def main() -> None:
     """Make the machines, run the commands, and print the table."""
     parser = argparse.ArgumentParser(
@@ -286,12 +298,25 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=Path("build/strangers"))
     arguments = parser.parse_args()
+    table(
+        [
+            "machine",
+            "joints",
+            "rms on the unseen log [deg]",
+            "good at most",
+            "named by the verdict",
+            "time [s]",
+        ]
+    )
     for number in range(arguments.machines):
         rng = np.random.default_rng([arguments.seed, number])
         machine = random_machine(rng, number)
-        began = time.perf_counter()
-        write_machine(arguments.folder / f"{number:02d}", machine, rng)
-        print(number, machine.names, f"{time.perf_counter() - began:.0f} s", flush=True)
+        logs = write_machine(arguments.folder / f"{number:02d}", machine, rng)
+        errors, named, seconds = run_commands(arguments.folder / f"{number:02d}", logs)
+        travel = np.ptp(np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -len(machine.names) :], axis=0)
+        most = 2 * np.degrees(machine.noise) + 0.02 * travel
+        cells = (" ".join(f"{x:.2f}" for x in values) for values in (errors, most))
+        row([number, " ".join(machine.names), *cells, named, f"{seconds:.0f}"])
 
 
 if __name__ == "__main__":

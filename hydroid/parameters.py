@@ -164,11 +164,12 @@ def relative_error(estimate: Array, truth: Array) -> Array:
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
         raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)
-    # no quantity can be negative; the comparison is False for NaN
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < LARGEST:
+    # most quantities cannot be negative; the comparison is False for NaN
+    least = min(parameter.lower, 0.0)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < LARGEST:
         raise SettingsError(
             f"parameter {parameter.name!r} is {value!r}",
             where=source,
-            hint=f"a number from 0, in {parameter.unit}",
+            hint=f"a number from {least:g}, in {parameter.unit}",
         )
     return float(value)

@@ -153,8 +153,8 @@ ROWS = (
         "",
         0.0,
         "rise of a rotary actuator's moment arm over its range",
-        "change of a rotary actuator's moment arm from the middle of the joint's range to its upper end, as a "
-        "part of it: for stand-ins of unknown linkages",
+        "change of a rotary actuator's moment arm from the middle of the joint's range to its upper end, as "
+        "a part of it: for stand-ins of unknown linkages",
         limits=(Ge(-0.9), Le(0.9)),
         span=(-0.5, 0.5),
     ),
@@ -163,8 +163,8 @@ ROWS = (
         "",
         0.0,
         "bend of a rotary actuator's moment arm over its range",
-        "change of a rotary actuator's moment arm from the middle of the joint's range to both its ends, as a "
-        "part of it; below 0 for a cylinder",
+        "change of a rotary actuator's moment arm from the middle of the joint's range to both its ends, as "
+        "a part of it; below 0 for a cylinder",
         limits=(Ge(-0.9), Le(0.9)),
         span=(-0.5, 0.5),
     ),

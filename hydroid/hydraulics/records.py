@@ -40,9 +40,10 @@ JOINT = np.dtype([(name, np.float64) for name in QUANTITIES if name != "mass"])
 
 BARS = ("ground", "rocker", "coupler", "child", "phase", "branch")
 LINKAGE = np.dtype([("kind", np.int64), *_fields(" ".join(("middle half theta0 shortest stroke", *BARS)))])
-"""how a joint is moved: kind (NONE, LINEAR or ROTARY); middle of its range and half of it [rad]; the pivots' angle theta0 at joint angle 0 [rad], below
-0 if the rod runs out towards negative angles; cylinder length with the rod fully in [m], as at the end of the
-joint's range; stroke [m]; ground to branch are those of `linkage.four_bar`, and rocker is 0 without one"""
+"""how a joint is moved: kind (NONE, LINEAR or ROTARY); middle of its range and half of it [rad]; the pivots'
+angle theta0 at joint angle 0 [rad], below 0 if the rod runs out towards negative angles; cylinder length with
+the rod fully in [m], as at the end of the joint's range; stroke [m]; ground to branch are those of
+`linkage.four_bar`, and rocker is 0 without one"""
 
 _SIDED = [row.name for row in ROWS if row.sides]
 _PLAIN = [name for name in JOINT.names or () if name[:-2] not in _SIDED]

@@ -20,7 +20,8 @@ from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import QUANTITIES
 from hydroid.simulation.chain import Chain
-from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout
+from hydroid.simulation.quasi_static import roll_quasi_static
+from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import model_values
 
 Array = NDArray[np.float64]
@@ -236,7 +237,8 @@ class Plant:
         moving = np.arange(len(self._columns))
         pushed, substeps = moving[: 0 if settings.stage == "hyd" else None], settings.hydraulics.substeps
         self._chain = chain = Chain(settings.arm, locked, self._active, substeps, pushed)
-        self._arm = SteppedArm(model, chain.columns, pushed, self._steps)
+        rollout = roll_quasi_static if settings.quasi_static else roll
+        self._arm = SteppedArm(model, chain.columns, pushed, self._steps, rollout)
         self.model, self.data = self._arm.model, self._arm.data
         self._warnings, self._idle = self.data.warning.number, np.flatnonzero(~self._active)
         self._record = Record(np.empty((1, len(moving))), np.empty((0, len(chain.columns)), JOINT_STATE))

@@ -115,6 +115,11 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: {error}") from None
         return self
 
+    @property
+    def quasi_static(self) -> bool:
+        """Whether speeds follow valve and load at once, without oil stiffness and inertia."""
+        return self.stage == "hyd" and self.simulation.model == "quasi-static"
+
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
         found = [self._parameter(name, own) for name, own in self.parameters.items()]

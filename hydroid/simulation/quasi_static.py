@@ -1,13 +1,14 @@
-"""The quasi-static rollout: speed follows the valve and the load at once, without oil stiffness and inertia.
+"""The quasi-static rollout: speed follows valve and load at once, without oil stiffness and inertia.
 
-For a cylinder that moves at speed v towards the chamber it fills, with openings a_in and a_out, areas A_in and
-A_out, k = C_q √(2/ρ), and the load F (gravity, springs and dry friction against the motion) and damping d:
+For a cylinder that moves at speed v towards the chamber it fills, with openings a_in and a_out, areas A_in
+and A_out, k = C_q √(2/ρ), and the load F (gravity, springs and dry friction against the motion) and damping d:
 
     p_in = P − (v A_in/(k a_in))²,   p_out = p_T + (v A_out/(k a_out))²,   p_in A_in − p_out A_out = F + d v,
 
 which is a quadratic equation in v. Where the load overruns, p_in would fall below 0: the chamber then
 cavitates, and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
-share the pump's line, whose pressure P satisfies the one equation Σ Q_i(P) = Q_P(P) of `hydroid.hydraulics.pump`.
+share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(P) of
+`hydroid.hydraulics.pump`.
 
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
 integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
@@ -21,7 +22,7 @@ import llvmlite.binding
 import numpy as np
 from numba import njit, types
 
-from hydroid.hydraulics.cylinder import bent, four_bar, triangle
+from hydroid.hydraulics.cylinder import bent, four_bar, triangle, volume
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import command, move_spool, opened
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
@@ -116,6 +117,37 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) 
     return pressure
 
 
+@compilable
+def store_oil(c: Any, z: Any, w: Any, supply: float, speed: float, angle: float) -> None:
+    """Store the oil and flows of a joint's chambers as `actuator.observe` reads them.
+
+    A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N].
+    """
+    a, b, tank, edge = c.a.area, c.b.area, c.tank_pressure, c.conductance * abs(w.travel)
+    way, sign = bent(angle, c)[0], 1.0 if w.travel > 0.0 else -1.0
+    if speed == 0.0:
+        pressure_a, pressure_b = max(tank, (tank * b + w.push) / a), max(tank, (tank * a - w.push) / b)
+    elif w.travel > 0.0:
+        pressure_a, pressure_b = (
+            supply - (speed * a / edge) ** 2,
+            tank + (speed * b / (edge * c.b.return_)) ** 2,
+        )
+    else:
+        pressure_a, pressure_b = (
+            tank + (speed * a / (edge * c.a.return_)) ** 2,
+            supply - (speed * b / edge) ** 2,
+        )
+    fill_a, fill_b = way * a / c.dead_volume, -way * b / c.dead_volume
+    if c.kind == LINEAR:
+        psi = four_bar(angle, c)[0] if c.rocker > 0.0 else angle
+        out = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[0]
+        fill_a = np.log(volume(out, a, c.dead_volume) / c.dead_volume)
+        fill_b = np.log(volume(c.stroke - out, b, c.dead_volume) / c.dead_volume)
+    z.a.oil = max(pressure_a, 0.0) + c.bulk_modulus * fill_a
+    z.b.oil = max(pressure_b, 0.0) + c.bulk_modulus * fill_b
+    z.a.flow, z.b.flow = sign * a * speed, -sign * b * speed
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll_quasi_static(
     arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE
@@ -126,7 +158,6 @@ def roll_quasi_static(
     commands, followed, taken = course
     pad = make_pad(joints)
     work, line = pad.joints, pad.line[0]
-    start, rate = arm.angle.copy(), np.zeros(joints)
     past = commands.shape[0] - followed.shape[0]
     shared, step = False, period / substeps
     if idle < joints:
@@ -140,7 +171,7 @@ def roll_quasi_static(
             j = order[a]
             c, z, w = plugin.coefficients[j], state[j], work[j]
             z.angle = arm.angle[columns[j]]
-            arm.angle[columns[j]] = z.angle + 0.5 * period * rate[j]
+            arm.angle[columns[j]] = z.angle + 0.5 * period * z.velocity
             command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
             net = 0.0
             for i in range(substeps):
@@ -149,7 +180,7 @@ def roll_quasi_static(
             w.travel = net / substeps
         _kinematics(arm.model, arm.data)
         _com_pos(arm.model, arm.data)
-        _rne(arm.model, arm.data, 0, arm.balance.ctypes.data)
+        _rne(arm.model, arm.data, 0, arm.gravity.ctypes.data)
         for a in range(idle, joints):
             j = order[a]
             c, w = plugin.coefficients[j], work[j]
@@ -162,7 +193,7 @@ def roll_quasi_static(
             else:
                 w.arm = bent(middle, c)[1]
             lever = max(abs(w.arm), 1e-6)
-            held = arm.balance[columns[j]] + c.stiffness * (middle - start[columns[j]])
+            held = arm.gravity[columns[j]] + c.stiffness * (middle - arm.slack[columns[j]])
             w.push = held / w.arm
             w.thrust = c.dry_friction + c.friction / lever
             w.drag = c.damping / (lever * lever)
@@ -178,17 +209,18 @@ def roll_quasi_static(
         for a in range(idle, joints):
             j = order[a]
             c, z, w = plugin.coefficients[j], state[j], work[j]
-            speed, _, _ = directed_speed(c, w, min(pressure, c.supply_pressure))
+            supply = min(pressure, c.supply_pressure)
+            speed, _, _ = directed_speed(c, w, supply)
             sign = 1.0 if w.travel > 0.0 else -1.0
-            rate[j] = sign * speed / w.arm
-            after = z.angle + period * rate[j]
+            after = z.angle + period * sign * speed / w.arm
             lower, upper = arm.limits[columns[j], 0], arm.limits[columns[j], 1]
             after = min(max(after, min(lower, z.angle)), max(upper, z.angle))
-            rate[j] = (after - z.angle) / period
-            arm.angle[columns[j]] = after
-            z.velocity = rate[j]
+            arm.angle[columns[j]], z.velocity = after, (after - z.angle) / period
+            if record.states.size or k + 1 == followed.shape[0]:
+                store_oil(c, z, w, supply, speed, after)
             if shared:
                 z.line, z.share, z.demand = pressure, line.share, line.demand
-        record.angle[k] = arm.angle
-        if record.states.size:
-            record.states[k] = state
+        if (k + 1) % arm.steps == 0:
+            record.angle[k // arm.steps] = arm.angle
+            if record.states.size:
+                record.states[k // arm.steps] = state

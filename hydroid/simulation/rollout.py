@@ -56,8 +56,10 @@ class Handles(NamedTuple):
     """the other joints, (P,)"""
     steps: int
     """in one sample"""
-    balance: Array
-    """torques of gravity, where a rollout asks for them [N·m], (V,)"""
+    gravity: Array
+    """torques that hold the arm, where a rollout asks for them [N·m], (V,)"""
+    slack: Array
+    """angles at which springs are slack [rad], (V,)"""
     limits: Array
     """of the angles [rad], (V, 2)"""
 
@@ -111,7 +113,7 @@ class SteppedArm:
         limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
         self._handles = Handles(
-            m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, limits
+            m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, m.qpos_spring, limits
         )
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
@@ -195,7 +197,7 @@ def compile_rollout() -> None:
     one = np.ones(1)
     warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
     arm = Handles(
-        0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, np.empty((0, 2))
+        0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, one, np.empty((0, 2))
     )
     nothing = np.empty((0, 1))
     course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))

@@ -67,8 +67,6 @@ class Scenario:
     def __init__(
         self, spec: mujoco.MjSpec, arm: Arm, log: Log, outputs: list[int], settings: SimulationSettings
     ) -> None:
-        if settings.model == "quasi-static":
-            settings = settings.model_copy(update={"steps_per_sample": 1})
         self.settings = settings
         self.active = log.driven.copy()
         self.active[outputs] = True

@@ -33,7 +33,7 @@ outputs: {outputs}             # joints whose angles are compared
 
 {log}
 # quasi-static: speeds follow valve and load at once, which takes seconds to fit. Logs fast enough to show the
-# oil's stiffness and the arm's inertia may want `dynamic`: start it from the quasi-static fit with --start RUN.
+# oil's stiffness and the arm's inertia may want `dynamic`, started from the quasi-static fit: --start RUN.
 # Joints without a command are locked, passive or measured (they follow the log).
 simulation: {{model: quasi-static, other_joints: {other}}}
 
@@ -75,7 +75,7 @@ JOINT = """\
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3, bounds: [0.4, 5]}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3, bounds: [0.4, 5]}}
   lag_{own}: {{quantity: plunger_damping, joints: [{name}], within: 10}}    # N·s/m  2000 N·s/m are 1 s
-  friction_{own}: {{quantity: dry_friction, joints: [{name}], bounds: [0, {friction}], start: {little}}}    # {unit}"""
+  friction_{own}: {{quantity: dry_friction, joints: [{name}], bounds: [0, {friction}], start: {little}}}  # {unit}"""
 CYLINDER = """\
   area_A_{own}: {{quantity: area_a, joints: [{name}], within: 1.5}}    # mm²
   area_B_{own}: {{quantity: area_b, joints: [{name}], within: 1.5}}"""

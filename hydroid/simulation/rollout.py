@@ -113,7 +113,16 @@ class SteppedArm:
         limits = np.where(m.jnt_limited[:, None], m.jnt_range, [-np.inf, np.inf])
         live = (d.qpos, d.qvel, d.M, d.qfrc_applied, m.dof_armature, d.warning.number)
         self._handles = Handles(
-            m._address, d._address, *live, columns, own[columns], pushed, steps, d.qfrc_bias, m.qpos_spring, limits
+            m._address,
+            d._address,
+            *live,
+            columns,
+            own[columns],
+            pushed,
+            steps,
+            d.qfrc_bias,
+            m.qpos_spring,
+            limits,
         )
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:

@@ -1,7 +1,7 @@
 """The quasi-static rollout: speed follows valve and load at once, without oil stiffness and inertia.
 
 For a cylinder that moves at speed v towards the chamber it fills, with openings a_in and a_out, areas A_in
-and A_out, k = C_q √(2/ρ), and the load F (gravity, springs and dry friction against the motion) and damping d:
+and A_out, k = C_q √(2/ρ), the load F (gravity, springs, dry friction against the motion) and damping d:
 
     p_in = P − (v A_in/(k a_in))²,   p_out = p_T + (v A_out/(k a_out))²,   p_in A_in − p_out A_out = F + d v,
 

@@ -13,8 +13,6 @@ from hydroid.settings.linkage import LinearActuator
 
 COARSE = 0.05
 """sample period that a quasi-static model needs no finer [s]"""
-SHARE = 0.5
-"""of the flow of all joints at full speed that the pump gives"""
 LEVER = 0.1
 """moment arm of a cylinder with which its friction is bounded [m]"""
 DEAD = 0.8
@@ -84,8 +82,8 @@ STAND_IN = """\
   slope_{own}: {{quantity: lever_slope, joints: [{name}], nominal: 0, sd: 0.2}}    # its lever over the range
   bend_{own}: {{quantity: lever_bend, joints: [{name}], nominal: 0, sd: 0.2}}"""
 PUMP = """
-  P_flow: {{quantity: pump_flow, nominal: {flow}, within: 4}}    # L/min, of all joints together
-  P_droop: {{quantity: pump_droop, bounds: [0, 140], start: 15}}    # bar, at this flow"""
+  P_flow: {{quantity: pump_flow, fixed: {flow}}}    # L/min, of all joints at full speed; with P_droop it says how the
+  P_droop: {{quantity: pump_droop, bounds: [0, 140], start: 15}}    # bar    supply falls when joints move together"""
 NO_LOG = """\
 # Columns of your log. `hydroid init --log LOG` guesses them.
 # log:
@@ -132,7 +130,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         other="measured" if layout is not None and layout.followed else "locked",
         volume=short(min(volumes, default=50.0)),
         parameters="\n".join(lines),
-        pump=PUMP.format(flow=short(SHARE * 0.06 * full)) if len(lines) > 1 else "",
+        pump=PUMP.format(flow=short(0.06 * full)) if len(lines) > 1 else "",
     )
 
 

@@ -39,7 +39,7 @@ _rne: Any = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, 
 ITERATIONS = 30
 """for the line's pressure at most; three to five suffice"""
 SETTLED = 1e-9
-"""relative change of the pressure at which they end"""
+"""part of the pump's flow, or of its pressure, that may be left when they end"""
 
 
 @compilable
@@ -108,11 +108,11 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) 
             high = pressure
         else:
             low = pressure
+        if abs(excess) <= SETTLED * full or high - low <= SETTLED * some.relief:
+            break
         after = pressure - excess / slope if slope > 0.0 else (low if excess > 0.0 else high)
         if not low <= after <= high:
-            after = high if high == some.relief and excess < 0.0 else 0.5 * (low + high)
-        if abs(after - pressure) <= SETTLED * some.relief:
-            return after
+            after = high if after > high == some.relief else 0.5 * (low + high)
         pressure = after
     return pressure
 

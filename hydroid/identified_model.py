@@ -98,8 +98,8 @@ def load_identified(
     beside = None if file is None else file.parent / CONFIG
     chosen = config or (beside if beside is not None and is_file(beside) else default)
     settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
-    if config is None and summary is not None and summary.final == "joint":
-        settings = settings.freed()
+    if config is None and summary is not None:
+        settings = settings.of_estimate(summary.final)
     missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
     if nominal and missing:
         known = {n: p for n, p in settings.parameters.items() if n not in missing}

@@ -116,7 +116,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.parameters_report import parameter_table
 
     summary = summarise(problem, fit)
-    settings = problem.settings.freed() if fit.final == "joint" else problem.settings
+    settings = problem.settings.of_estimate(fit.final)
     model = IdentifiedModel(settings, fit.best.theta, str(folder or "the fit"), summary)
     report = [str(folder / "report.html")] if folder else []
     lines = [parameter_table(settings, summary), *fit_lines(summary), *report]
@@ -136,7 +136,7 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     result = _result(problem, fit, folder.path)
     folder.write_estimate(problem.logs[0], fit.best.theta, result.summary)
     began, advised = time.monotonic(), None
-    last = problem.varied(result.model.settings) if fit.final == "joint" else problem
+    last = problem.varied(result.model.settings)
     if fit.best.usable:
         run = str(folder.path)
         advised = advice(last, fit.uncertainty, fit.quantities, run=run, thorough=False)

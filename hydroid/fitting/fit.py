@@ -24,6 +24,8 @@ from hydroid.search.pareto import non_dominated
 
 _log = logging.getLogger(__name__)
 
+NEARER = 0.95
+"""part of the quasi-static model's rms error that the dynamic one must reach to be preferred"""
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it"""
 
@@ -126,18 +128,21 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     times.append(time.perf_counter())
     refinements = dict[str, Descent]()
     if settings.refinement is not None:
-        for final in ("refined", "joint") if settings.joint_refinement else ("refined",):
-            last = problem if final == "refined" else problem.varied(settings.freed())
-            result = refine(last, start.theta, settings.refinement, watch.refining, checkpoints, final)
+        ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"
+        for name in ("refined", *["dynamic"] * ladder, *["joint"] * settings.joint_refinement):
+            own = problem.varied(settings.of_estimate(name))
+            result = refine(own, start.theta, settings.refinement, watch.refining, checkpoints, name)
             if not result.converged:
                 _log.warning(
                     "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
                     "optimum.",
                     result.ending.value,
-                    final,
+                    name,
                 )
-            estimates |= _estimates(last, {final: last.parameters.from_unit(result.point)})
-            refinements[final], start = result, estimates[final]
+            estimates |= _estimates(own, {name: own.parameters.from_unit(result.point)})
+            refinements[name] = result
+            if name != "dynamic" or estimates[name].rms < NEARER * start.rms:
+                final, last, start = name, own, estimates[name]
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
     directions, determined = identifiability(last, about), quantities(last, about)

@@ -13,7 +13,7 @@ from hydroid.problem.problem import Problem
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
     """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
-    last = problem.varied(problem.settings.freed()) if fit.final == "joint" else problem
+    last = problem.varied(problem.settings.of_estimate(fit.final))
     objective = 1.0 if problem.settings.objective.relative else 180 / np.pi
     known = account(last, fit.uncertainty, fit.identifiability)
     estimates = {

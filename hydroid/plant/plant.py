@@ -67,7 +67,7 @@ class Plant:
             raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joints {self.joints}")
         moving = self._active | (settings.simulation.other_joints == "passive")
         self._moving = [name for name, moves in zip(arm.joint_names, moving, strict=True) if moves]
-        self.timestep = settings.log.period_s / settings.simulation.steps_per_sample
+        self.timestep = settings.log.period_s / settings.simulation.steps
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
         if self._steps < 1 or abs(self._steps * self.timestep - self.period) > 1e-9:

@@ -64,7 +64,7 @@ class Bench:
 
         Springs are slack where the first log starts.
         """
-        steps = samples * self.settings.simulation.steps_per_sample
+        steps = samples * self.settings.simulation.steps
         scenario = self.scenario.restarted(np.array([start]), np.full((steps, 1), command))
         simulation = Simulation(scenario, self.settings.arm, self.settings.hydraulics.substeps)
         return simulation.simulate(candidates).angle[:, :, 0]

@@ -11,79 +11,61 @@ from hydroid.project.sizes import JointSize
 from hydroid.settings.arm import Arm
 from hydroid.settings.linkage import LinearActuator
 
-COARSE = 0.05
-"""sample period that a quasi-static model needs no finer [s]"""
-LEVER = 0.1
-"""moment arm of a cylinder with which its friction is bounded [m]"""
+LONGEST_STEP = 0.025
+"""of MuJoCo [s], in a log of fewer samples"""
 DEAD = 0.8
 """part of the command below which a joint seems to stand that its dead band is"""
-RESPONSE = 0.1
+RESPONSE = 0.05
 """of a valve and its oil without any delay [s]"""
 
 FIT = """\
 # hydroid fit-hyd LOG --config {file}
 #
-# The whole chain: command, valve, cylinder, arm. Every setting: docs/settings.md. More terms that a machine
-# may need: configs/fit-hyd-machine.yaml of hydroid.
+# The whole chain: command, valve, oil, cylinder, arm. Every setting: docs/settings.md. More terms that a
+# machine may need: configs/fit-hyd-machine.yaml of hydroid.
 stage: hyd
 arm: {arm}
 outputs: {outputs}             # joints whose angles are compared
 
 {log}
-# quasi-static: speeds follow valve and load at once, which takes seconds to fit. Logs fast enough to show the
-# oil's stiffness and the arm's inertia may want `dynamic`, started from the quasi-static fit: --start RUN.
-# Joints without a command are locked, passive or measured (they follow the log).
-simulation: {{model: quasi-static, other_joints: {other}}}
-
+{others}
 # What is taken to be known of all joints; these are also nominal values of parameters below.
 hydraulics:
   supply_pressure: 150             # bar    read it off the gauge
   onset_a: 0                       # V      no jump behind the dead band
   onset_b: 0
-  opening_exponent: 1.4            #        above 1: a valve opens slowly at first
-  plunger_damping: 200             # N·s/m  a spool that lags by 0.1 s
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
-  substeps: 4                      # of valves and oil in one step
+  substeps: 5                      # of valves and oil in one MuJoCo step
 
 # Starts and priors follow from the arm's weight and the speeds in the log. They are wide guesses: write what
 # you know. `within: 4`: with 95 % probability between a quarter and four times the nominal value, which is
 # the arm file's where none stands here. `fixed: VALUE` holds a parameter. Of a valve, A is the direction of
-# positive angles. A pilot stage lags before the dead band, the spool behind it.
+# positive angles.
 parameters:
-{parameters}{pump}
-  M: {{quantity: mass, each: true, within: 1.5}}    # kg, M_LINK of every link
+{parameters}
+  M: {{quantity: mass, each: true, within: 2}}    # kg, M_LINK of every link
 
 # Each joint alone, then all together, from the nominal values.
 objective: {{norm: 2, segments: {{equal: 4}}}}
-search:
-  algorithm: multistart
-  seed: 1
-  multistart: {{starts: 1, horizons: [], iterations: 40, gain_tolerance: 0.001}}
-refinement: {{iterations: 100, gain_tolerance: 1.0e-5}}
+search: {{algorithm: multistart, seed: 1, multistart: {{starts: 1, iterations: 30, gain_tolerance: 0.001}}}}
+refinement: {{iterations: 60, gain_tolerance: 1.0e-6}}
 """
 JOINT = """\
 {actuator}
+  D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 10}}    # N·m·s/rad
   delay_{own}: {{quantity: delay, joints: [{name}], bounds: [0, 1], start: {delay:.2f}}}    # s
-  pilot_A_{own}: {{quantity: pilot_lag_a, joints: [{name}], bounds: [0, 0.6], start: 0.03}}
-  pilot_B_{own}: {{quantity: pilot_lag_b, joints: [{name}], bounds: [0, 0.6], start: 0.03}}
-  dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 80]}}    # %
-  dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 80]}}
-  open_A_{own}: {{quantity: opening_a, joints: [{name}], within: 10}}    # mm², at full command
-  open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 10}}
-  exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3, bounds: [0.4, 5]}}
-  exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3, bounds: [0.4, 5]}}
+  dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 75]}}    # %
+  dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 75]}}
+  open_A_{own}: {{quantity: opening_a, joints: [{name}], within: 4}}    # mm², at full command
+  open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
   lag_{own}: {{quantity: plunger_damping, joints: [{name}], within: 10}}    # N·s/m  2000 N·s/m are 1 s
-  friction_{own}: {{quantity: dry_friction, joints: [{name}], bounds: [0, {friction}], start: {little}}}  # {unit}"""
+  # friction_{own}: {{quantity: dry_friction, joints: [{name}], bounds: [0, 5000], start: 100}}  # {friction}
+  # exponent_{own}: {{quantity: opening_exponent, joints: [{name}], within: 2}}"""
 CYLINDER = """\
   area_A_{own}: {{quantity: area_a, joints: [{name}], within: 1.5}}    # mm²
   area_B_{own}: {{quantity: area_b, joints: [{name}], within: 1.5}}"""
 STAND_IN = """\
-  size_{own}: {{quantity: area, joints: [{name}], within: 6}}    # cm³/rad, of the stand-in
-  slope_{own}: {{quantity: lever_slope, joints: [{name}], nominal: 0, sd: 0.2}}    # its lever over the range
-  bend_{own}: {{quantity: lever_bend, joints: [{name}], nominal: 0, sd: 0.2}}"""
-PUMP = """
-  P_flow: {{quantity: pump_flow, fixed: {flow}}}    # L/min, of all joints at full speed; with P_droop it says how the
-  P_droop: {{quantity: pump_droop, bounds: [0, 140], start: 15}}    # bar    supply falls when joints move together"""
+  size_{own}: {{quantity: area, joints: [{name}], within: 3}}    # cm³/rad, of the stand-in"""
 NO_LOG = """\
 # Columns of your log. `hydroid init --log LOG` guesses them.
 # log:
@@ -102,23 +84,20 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
     """
     lines, volumes = list[str](), list[float]()
     outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
-    full = 0.0
     for joint in outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
         motion = layout.motions.get(joint) if layout else None
         linear = isinstance(own.actuator, LinearActuator)
-        full += size.displacement * size.speed
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
         words = {"own": name.removesuffix("_joint"), "name": name}
         lines.append(
             JOINT.format(
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
+                damping=short(0.1 * size.damping),
                 delay=min(max(motion.follows(joint)[1] - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 dead=short(DEAD * min(max(motion.dead_band, 5.0), 70.0) if motion else 5.0),
-                friction=short(size.torque / (1.0 if not linear else LEVER)),
-                little=short(1e-3 * size.torque),
-                unit="N" if linear else "N·m",
+                friction="N" if linear else "N·m",
                 **words,
             )
         )
@@ -127,10 +106,9 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         arm=flow(arm_file),
         outputs=flow([arm.joint_names[joint - 1] for joint in outputs]),
         log=_log(arm, layout),
-        other="measured" if layout is not None and layout.followed else "locked",
+        others=_others(layout),
         volume=short(min(volumes, default=50.0)),
         parameters="\n".join(lines),
-        pump=PUMP.format(flow=short(0.06 * full)) if len(lines) > 1 else "",
     )
 
 
@@ -142,7 +120,7 @@ def short(value: float) -> str:
 def _log(arm: Arm, layout: Layout | None) -> str:
     if layout is None:
         return NO_LOG
-    section = layout.section | {"period_s": max(COARSE, float(layout.section["period_s"]))}
+    section = layout.section
     lines = [
         "# GUESSED from the log: check every line.",
         *(f"# - {reason}" for reason in layout.reasons),
@@ -153,6 +131,15 @@ def _log(arm: Arm, layout: Layout | None) -> str:
         *(f"    {arm.joint_names[joint - 1]}: {flow(entry)}" for joint, entry in section["joints"].items()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _others(layout: Layout | None) -> str:
+    """Settings of the simulation."""
+    period = 0.01 if layout is None else float(layout.section["period_s"])
+    steps = max(math.ceil(period / LONGEST_STEP - 1e-9), 1)
+    other = "measured" if layout is not None and layout.followed else "locked"
+    text = f"simulation: {{steps_per_sample: {steps}, other_joints: {other}}}"
+    return f"{text}    # joints without a command: locked, passive or measured (they follow the log)\n"
 
 
 def flow(value: Any) -> str:

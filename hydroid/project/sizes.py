@@ -20,19 +20,18 @@ LIFT = 2.5
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil per angle [cm³/rad], valve opening [mm²], torque [N·m]; its speed [rad/s]."""
+    """What a joint needs: oil per angle [cm³/rad], valve opening [mm²], and damping [N·m·s/rad]."""
 
     displacement: float
     opening: float
-    torque: float
-    speed: float
+    damping: float
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     """Return the size of every joint, (J,).
 
     The displacement gives the torque at the pump's pressure; the opening gives the speed while the arm is
-    lifted, and both edges lose the same.
+    lifted, and both edges lose the same; the damping holds the speed at full command.
 
     Args:
         arm: with its model in place.
@@ -57,5 +56,5 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     for joint, most in enumerate(torque.tolist(), 1):
         speed = max(speeds.get(joint, 0.5), 0.01)
         volume = most / pressure
-        sizes.append(JointSize(1e6 * volume, 1e6 * volume * speed / through, most, speed))
+        sizes.append(JointSize(1e6 * volume, 1e6 * volume * speed / through, most / speed))
     return tuple(sizes)

@@ -192,9 +192,8 @@ def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:
     """
     path = Path(folder)
     identity = RunFolder(path).identity()
-    settings, summary = RunFolder(path).settings(), load(path / NAME, FitSummary)
-    if summary.final == "joint":
-        settings = settings.freed()
+    summary = load(path / NAME, FitSummary)
+    settings = RunFolder(path).settings().of_estimate(summary.final)
     files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
     names = [file.parent.name for file in files]
     if missing := [name for name in without if name not in names]:

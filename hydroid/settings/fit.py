@@ -103,6 +103,8 @@ class FitSettings(Settings):
     def _of_the_stage(self) -> "FitSettings":
         if len(set(self.outputs)) < len(self.outputs):
             raise ValueError("outputs: a joint is listed twice")
+        if self.joint_refinement and self.simulation.model == "ladder":
+            raise ValueError("joint_refinement: refines one model; set simulation.model to it")
         for name, own in self.parameters.items():
             hydraulic = own.quantity not in MECHANICAL
             if self.stage == "mech" and hydraulic:
@@ -118,7 +120,15 @@ class FitSettings(Settings):
     @property
     def quasi_static(self) -> bool:
         """Whether speeds follow valve and load at once, without oil stiffness and inertia."""
-        return self.stage == "hyd" and self.simulation.model == "quasi-static"
+        return self.stage == "hyd" and self.simulation.model != "dynamic"
+
+    def of_estimate(self, name: str) -> "FitSettings":
+        """Return the settings that an estimate of a fit was refined with, and predicts with."""
+        settings = self.freed() if name == "joint" else self
+        if name != "dynamic":
+            return settings
+        simulation = self.simulation.model_copy(update={"model": "dynamic"})
+        return settings.model_copy(update={"simulation": simulation})
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""

@@ -68,7 +68,7 @@ class ParameterSettings(Settings):
         if lowest < (least := CHOICES[self.quantity].lowest):
             what = f"be below {least:g}" if least else "be negative"
             raise ValueError(f"a {self.quantity} cannot {what}")
-        low, high = self.bounds or (0.0, math.inf)
+        low, high = self.bounds or (CHOICES[self.quantity].lowest, math.inf)
         for name in ("nominal", "start"):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:

@@ -54,9 +54,9 @@ class Prescribed:
         model.jnt_limited[columns] = False  # the machine's own stops are in the log
         self.columns = columns
         self.damping, self.stiffness = 2 * SERVO * armature, SERVO**2 * armature
-        step = log.period / settings.steps_per_sample
+        step = log.period / settings.steps
         motion = smooth(log.angle[:, joints], settings.measured_cutoff_hz * log.period)
-        samples = np.arange((len(motion) - 1) * settings.steps_per_sample + 1) * step
+        samples = np.arange((len(motion) - 1) * settings.steps + 1) * step
         fine = np.empty((len(samples), len(joints)))
         for k, angle in enumerate(motion.T):
             fine[:, k] = np.interp(samples, log.time, angle)

@@ -72,10 +72,10 @@ class Scenario:
         self.active[outputs] = True
         moving = self.active | (settings.other_joints != "locked")
         self.arm: LockedArm = lock(spec, arm, np.array(arm.joint_names)[moving].tolist(), log.start)
-        self.arm.model.opt.timestep = log.period / settings.steps_per_sample
+        self.arm.model.opt.timestep = log.period / settings.steps
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
-        self.command = np.repeat(log.command[:-1, moving], settings.steps_per_sample, axis=0)
+        self.command = np.repeat(log.command[:-1, moving], settings.steps, axis=0)
         start = log.start_pressure
         self.pressure = np.full((len(self.arm.columns), 2), np.nan) if start is None else start[moving]
         self.period = log.period

@@ -47,7 +47,7 @@ class Simulation:
     ) -> None:
         compile_rollout()
         self.scenario = scenario
-        self._quasi_static = bool(substeps) and scenario.settings.model == "quasi-static"
+        self._quasi_static = bool(substeps) and scenario.settings.model != "dynamic"
         pushed = scenario.prescribed.columns if substeps else np.arange(len(scenario.arm.columns))
         self._chain = Chain(arm, scenario.arm, scenario.active, substeps or 1, pushed)
         self.joints = self._chain.joints
@@ -61,7 +61,7 @@ class Simulation:
             the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
         """
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
-        samples = 1 + len(scenario.command) // scenario.settings.steps_per_sample
+        samples = 1 + len(scenario.command) // scenario.settings.steps
         angle = np.full((n, samples, len(scenario.outputs)), np.nan)
         pressure = np.full((n, samples, len(wanted), 2), np.nan) if wanted.size else None
         exists = has_force_curve(candidates.joints[:, self.joints])
@@ -98,7 +98,7 @@ class Simulation:
 
     def _stepped(self) -> SteppedArm:
         scenario, chain = self.scenario, self._chain
-        steps = scenario.settings.steps_per_sample
+        steps = scenario.settings.steps
         rollout = roll_quasi_static if self._quasi_static else roll
         return SteppedArm(scenario.arm.model, chain.columns, chain.pushed, steps, rollout)
 
@@ -109,7 +109,7 @@ class Simulation:
         """
         scenario, chain, n = self.scenario, self._chain, len(candidates)
         values, pose, servo = scenario.values(candidates), scenario.arm.pose, scenario.prescribed
-        samples = len(scenario.command) // scenario.settings.steps_per_sample
+        samples = len(scenario.command) // scenario.settings.steps
         balance = np.array([arm.start(values, row, pose) for row in range(n)])
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         taken = chain.taken(candidates, servo.angle, servo.velocity)

@@ -71,4 +71,4 @@ def assert_recovered(found: Uncertainty, settings: FitSettings, truth: Mapping[s
         if settings.parameters[name].fixed is None:
             what = f"{name}: {estimate:.5g} ± {deviation:.2g}, truth {truth[name]:.5g}"
             assert abs(estimate - truth[name]) < 3 * deviation, what
-            assert deviation < truth[name] / 3, what
+            assert deviation < abs(truth[name]) / 3, what

@@ -31,6 +31,13 @@ class Case(NamedTuple):
 # The flow limit starts where it is felt: above the largest flow of the log it has no effect. The
 # effect of the start pressure fades with the first movement, and a log of several has a second optimum.
 CASES = {
+    "lag of a pilot stage": Case(
+        {"pilot_lag": (0.005, 1, 0.15, 0.05), "delay": (0, 0.5, 0.05, 0.1)}, {"dead_band": 20.0}
+    ),
+    "lever of a rotary actuator": Case(
+        {"lever_slope": (-0.8, 0.8, 0.2, 0.0), "lever_bend": (-0.8, 0.8, -0.3, 0.0)},
+        NOTHING, ({ROTARY: [90, 90, -90, -90, -90, 60, -80, 90]},),
+    ),
     "droop": Case({"pump_droop": (1, 150, 60, 20)}, {"pump_flow": 3.0}),
     "width of the slots": Case({"slot_width_a": (0.5, 5, 2.4, 1.5), "slot_width_b": (0.5, 5, 1.6, 2.2)}),
     "volume of the line": Case(

@@ -1,0 +1,93 @@
+"""The quasi-static rollout: closed forms, its limit of the dynamic one, the pump's balance, static loads."""
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import candidates
+
+from hydroid.hydraulics.valve import DENSITY
+from hydroid.log import Log
+from hydroid.settings.simulation import SimulationSettings
+from hydroid.simulation import Simulation
+from hydroid.simulation.scenario import Scenario
+
+SHOULDER, ROLL = 1, 3
+"""a cylinder that lifts the arm, and a rotary actuator, 0-based"""
+
+
+@pytest.fixture
+def simulated(spec, arm, study_log):
+    """Simulate constant commands [%] of some joints, 0-based; angles [rad] and what the actuators did."""
+
+    def run(commands, seconds=2.0, model="quasi-static", period=0.01, **values):
+        log_time = np.arange(0.0, seconds + 0.5 * period, period)
+        command = np.zeros((len(log_time), len(arm.joints)))
+        for joint, value in commands.items():
+            command[:, joint] = value
+        angle = np.tile(study_log.angle[0], (len(log_time), 1))
+        log = Log("constant", log_time, command, angle, period)
+        one = candidates(arm, 1)
+        one.mass[:], one.joints.stiffness[:] = arm.masses, 0.0
+        for name, value in values.items():
+            one.joints[name] = value
+        settings = SimulationSettings(model=model)
+        simulation = Simulation(Scenario(spec, arm, log, sorted(commands), settings), arm, 10)
+        return simulation.simulate(one).angle[0], simulation.trace(one), one.joints[0]
+
+    return run
+
+
+def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated):
+    angle, trace, joints = simulated({ROLL: 40}, 1.0, damping=0.0)
+    roll = joints[ROLL]
+    share = trace.spool[-1, 0] / roll.slot_width_a
+    half = (roll.supply_pressure - roll.tank_pressure) / 2  # both edges lose the same
+    flow = roll.flow_coefficient * roll.opening_a * share * np.sqrt(2 * half / DENSITY)
+    assert 0.1 < share < 0.9
+    np.testing.assert_allclose(np.diff(angle[-20:, 0]) / 0.01, flow / roll.area_a, rtol=0.01)
+
+
+@pytest.mark.parametrize("commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}])
+@pytest.mark.parametrize("pump", [{}, {"pump_flow": 6e-5, "pump_droop": 60e5}])
+def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simulated, commands, pump):
+    def apart(slower, stiffer):
+        each = {"opening_a": 3e-7 / slower, "opening_b": 3e-7 / slower, "leakage": 1e-14, "damping": 0.0}
+        each |= pump | {"pump_flow": pump["pump_flow"] / slower} if pump else {}
+        each |= {"bulk_modulus": 8e8 * stiffer, "line_volume": 1e-6}
+        quasi, full = (
+            simulated(commands, 1.0 * slower, model, **each)[0] for model in ("quasi-static", "dynamic")
+        )
+        return np.abs(quasi - full).max() / np.ptp(full, axis=0).max()
+
+    near, far = apart(4.0, 20.0), apart(1.0, 1.0)
+    assert near < 0.01
+    assert near < 0.5 * far
+
+
+def test_what_the_actuators_take_is_what_the_pump_gives(simulated):
+    flow, droop = 6e-5, 60e5
+    _, trace, joints = simulated({SHOULDER: 70, 2: -60}, pump_flow=flow, pump_droop=droop)
+    taken = np.where(trace.flow[..., 0] > 0, trace.flow[..., 0], -trace.flow[..., 1]).sum(axis=1)
+    given = flow * np.minimum((joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / droop, 1.0)
+    moving = trace.line[:, 0] < joints.supply_pressure[SHOULDER]
+    assert moving.sum() > 100
+    np.testing.assert_allclose(taken[moving], given[moving], rtol=1e-6)
+
+
+def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, spec):
+    angle, trace, _ = simulated({SHOULDER: 0})
+    np.testing.assert_array_equal(angle, np.broadcast_to(angle[0], angle.shape))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for name, q in zip(arm.joint_names, arm.pose("study"), strict=True):
+        data.joint(name).qpos[0] = q
+    mujoco.mj_forward(model, data)
+    held = data.joint(arm.joint_names[SHOULDER]).qfrc_bias[0]
+    length, q = arm.joints[SHOULDER].actuator.length, arm.pose("study")[SHOULDER]
+    lever = (length(q + 1e-4) - length(q - 1e-4)) / 2e-4
+    assert trace.force[-1, 0] * lever == pytest.approx(held, rel=1e-3)
+
+
+def test_a_load_beyond_the_supply_is_held_and_never_sinks(simulated):
+    angle, _, _ = simulated({SHOULDER: 80}, supply_pressure=6e5)
+    assert np.ptp(angle) == 0.0

@@ -141,8 +141,7 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
 
 @pytest.mark.parametrize("kind", [".gif", ".mp4", ".png"])
 def test_every_kind_of_file_is_written(nominal: IdentifiedModel, study_log: Log, kind, monkeypatch):
-    if kind == ".mp4":
-        av = pytest.importorskip("av")
+    av: Any = pytest.importorskip("av") if kind == ".mp4" else None
     motion = simulated_motion(nominal, {"alone": study_log})
     renderable(motion).__exit__()
     rate = film.KINDS[kind][1]

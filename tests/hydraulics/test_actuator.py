@@ -136,13 +136,6 @@ def test_a_load_sinks_on_the_oil_that_leaves():
     assert starved[1] == 0.0
 
 
-def test_rest_after_motion_is_rest():
-    """No chatter: once the valve is shut and the arm has rung out, nothing moves but by leakage."""
-    command = np.r_[np.full(100, 80.0), np.full(50, -60.0), np.zeros(850)]
-    speed = np.diff(simulate(parameters(TIGHT), command, TIGHT)[0, -100:]) / 0.01
-    assert abs(speed).max() < 1e-6
-
-
 COIL, GAP = force_curve(8.0, 0.7, 0.8, 12.0, 0.9)
 SCALE = np.array([1.0, 1.3])
 NULL = {

@@ -32,9 +32,8 @@ def options(text: str | None, **defaults: Any) -> Any:
         how: dict[str, Any] = {"type": type(first), "default": default, "nargs": nargs}
         if nargs and isinstance(first, str):
             how["choices"] = default
-        parser.add_argument(
-            f"--{name.replace('_', '-')}", **{"action": "store_true"} if default is False else how
-        )
+        how = {"action": "store_true"} if default is False else how
+        parser.add_argument(f"--{name.replace('_', '-')}", **how)
     return parser.parse_args()
 
 

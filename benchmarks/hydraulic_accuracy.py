@@ -28,9 +28,8 @@ def accuracy(sets: int) -> None:
     rng, clock = np.random.default_rng(1), Clock()
     command = pulses(rng, 3000)
     candidates = parameters(HydraulicSettings(), **draw(rng, sets))
-    exact, pressure = zip(
-        *(reference(candidates[i : i + 1], command, 1e-8) for i in range(sets)), strict=True
-    )  # pyright: ignore[reportArgumentType]
+    pairs = [reference(candidates[i : i + 1], command, 1e-8) for i in range(sets)]  # pyright: ignore[reportArgumentType]
+    exact, pressure = zip(*pairs, strict=True)
     angle, bar, errors = np.degrees(exact), 1e-5 * np.array(pressure), []
     low, high = angle.min(), angle.max()
     print(f"{sets} sets, 30 s, joint from {low:.0f} to {high:.0f} deg; Radau took {clock}")

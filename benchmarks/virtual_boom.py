@@ -151,7 +151,7 @@ ROWS = {
     "pump_delay": (0.0, 3.0, 1.0), "pump_rise": (0.01, 2.0, 0.3),
 }  # fmt: skip
 """lowest, highest and start value of the quantities that are fitted; those of the pump have no joints"""
-PARAMETERS: dict[str, object] = {
+PARAMETERS = {
     "S": {"quantity": "stiffness", "fixed": 0.0},
     "D": {"quantity": "damping", "bounds": [20.0, 2000.0], "start": 230.0},
     "M3": {"quantity": "mass", "link": "link3", "bounds": [15.0, 35.0], "start": 22.5},

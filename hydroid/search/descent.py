@@ -81,7 +81,7 @@ class Descent:
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         values["ending"] = self.ending.name
         if self.ended:
-            values |= {"residual": [], "jacobian": []}
+            values["residual"] = []  # the Jacobian is where the uncertainty begins
         return {name: np.asarray(value) for name, value in values.items()}
 
     @staticmethod

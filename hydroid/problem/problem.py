@@ -106,7 +106,9 @@ class Problem:
         return tuple(sorted({*(np.flatnonzero(driven) + 1).tolist(), *self.settings.outputs}))
 
     def varied(self, settings: FitSettings, logs: Sequence[Log] | None = None) -> "Problem":
-        """Return the problem with other settings, and other logs or the same, simulated in the same place."""
+        """Return the problem with other settings, or other logs too, simulated in the same place."""
+        if settings is self.settings and logs is None:
+            return self
         return Problem(settings, self.logs if logs is None else logs, self._spread)
 
     @property

@@ -119,7 +119,7 @@ def random_machine(rng: Generator, number: int) -> Machine:
 
 
 @njit(cache=True)
-def gravity_torque(angle: Array, vertical: Array, length: Array, mass: Array, torque: Array) -> None:
+def gravity_torque(angle: Array, vertical: Any, length: Array, mass: Array, torque: Array) -> None:
     """Write the torque that holds each joint [N·m], (J,): a planar chain, each link's mass in its middle."""
     pitch, carried, moment = 0.0, 0.0, 0.0
     along = np.zeros(len(angle))
@@ -148,9 +148,7 @@ def speeds(supply: float, part: Array, lift: Array, friction: Array, turn: Array
 
 
 @njit(cache=True)
-def integrate(
-    command: Array, start: Array, late: Array, vertical: Array, numbers: Array, droop: float
-) -> Array:
+def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: Array, droop: float) -> Array:
     """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as `Machine.numbers`."""
     steps, joints = command.shape
     length, mass, lower, upper, lag, early, load, friction, lever, stiff, ratio = numbers[:11]
@@ -207,8 +205,8 @@ def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array, Arr
     """Commands as a person gives them, kept off the stops, with the angles that follow and the start."""
     steps, joints = round(seconds / STEP), len(m.names)
     start = m.lower + (m.upper - m.lower) * rng.uniform(0.35, 0.65, joints)
-    command = np.zeros((steps, joints))
-    angle = np.tile(start, (steps, 1))
+    command = trial = np.zeros((steps, joints))
+    angle = moved = np.tile(start, (steps, 1))
     block = round(10.0 / STEP)
     for first in range(0, steps, block):
         last = min(first + block, steps)
@@ -311,6 +309,8 @@ def richer(config: Path) -> None:
                     parameters[f"{change}_{own}"] = lever | here
             case "M":
                 one |= {"within": 1.5}
+            case _:
+                pass
         parameters[name] = one
     for actuator in yaml.safe_load((config.parent / "arm.yaml").read_text())["actuators"].values():
         flow += 0.06 * float(actuator["displacement"]) * 0.5  # at half a radian a second
@@ -331,7 +331,7 @@ def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[fl
         numbered from 1, and the seconds to the end of the fit.
     """
     mine, began = folder / "mine", time.perf_counter()
-    hydroid.init(mine, arm=folder / "robot.urdf", log=logs)
+    hydroid.init(mine, arm=folder / "robot.urdf", log=[*logs])
     if rich:
         richer(mine / "fit.yaml")
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")

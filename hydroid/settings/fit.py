@@ -122,7 +122,7 @@ class FitSettings(Settings):
         """Whether speeds follow valve and load at once, without oil stiffness and inertia."""
         return self.stage == "hyd" and self.simulation.model != "dynamic"
 
-    def of_estimate(self, name: str) -> "FitSettings":
+    def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts with."""
         settings = self.freed() if name == "joint" else self
         if name != "dynamic":

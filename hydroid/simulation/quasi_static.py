@@ -38,21 +38,24 @@ _rne: Any = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, 
 
 ITERATIONS = 30
 """for the line's pressure at most; three to five suffice"""
+LEAST_LEVER = 1e-6
+"""moment arm below which a cylinder stands at its dead centre [m]"""
 SETTLED = 1e-9
 """part of the pump's flow, or of its pressure, that may be left when they end"""
 
 
 @compilable
-def rod_speed(c: Any, side: Any, other: Any, area: float, supply: float, load: float, drag: float) -> Any:
+def rod_speed(c: Any, side: Any, other: Any, w: Any, supply: float, sign: float) -> Any:
     """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P.
 
     Args:
         c: the joint's COEFFICIENTS, `side` and `other` its sides that fill and empty.
-        area: opening of the pump's edge [m²], above 0.
+        w: its scratch space: net opening `travel` [m²], load `push` of gravity and springs, dry friction
+            `thrust` [N], damping `drag` [N·s/m]; of a rotary actuator torques and angles.
         supply: P [Pa].
-        load: against the motion [N]; of a rotary actuator a torque [N·m], as all forces.
-        drag: d [N·s/m].
+        sign: of the motion, 1 towards A.
     """
+    area, load, drag = abs(w.travel), sign * w.push + w.thrust, w.drag
     pump_edge, tank_edge = c.conductance * area, c.conductance * area * other.return_
     back = (other.area / tank_edge) ** 2 * other.area
     free = supply * side.area - c.tank_pressure * other.area - load
@@ -75,11 +78,11 @@ def rod_speed(c: Any, side: Any, other: Any, area: float, supply: float, load: f
 
 @compilable
 def directed_speed(c: Any, w: Any, supply: float) -> Any:
-    """`rod_speed` of a joint in its direction: w.travel is its net opening [m²], w.push its load [N]."""
+    """`rod_speed` of a joint in the direction of its valve."""
     if w.travel > 0.0:
-        return rod_speed(c, c.a, c.b, w.travel, supply, w.push + w.thrust, w.drag)
+        return rod_speed(c, c.a, c.b, w, supply, 1.0)
     if w.travel < 0.0:
-        return rod_speed(c, c.b, c.a, -w.travel, supply, -w.push + w.thrust, w.drag)
+        return rod_speed(c, c.b, c.a, w, supply, -1.0)
     return 0.0, 0.0, 0.0
 
 
@@ -148,78 +151,88 @@ def store_oil(c: Any, z: Any, w: Any, supply: float, speed: float, angle: float)
     z.a.flow, z.b.flow = sign * a * speed, -sign * b * speed
 
 
+@compilable
+def meter(c: Any, z: Any, w: Any, substeps: int, step: float) -> None:
+    """Advance the plungers over a step; w.travel becomes the mean opening [m²], below 0 towards B."""
+    net = 0.0
+    for i in range(substeps):
+        displacement = move_spool(c, z, w, i, step)
+        net += opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+    w.travel = net / substeps
+
+
+@compilable
+def weigh(c: Any, w: Any, angle: float, torque: float) -> None:
+    """Lever and load of a joint that a torque [N·m] must hold at an angle [rad]."""
+    if c.kind == LINEAR:
+        psi, first = angle, 1.0
+        if c.rocker > 0.0:
+            psi, first, _ = four_bar(angle, c)
+        w.arm = first * triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[1]
+    else:
+        w.arm = bent(angle, c)[1]
+    lever = max(abs(w.arm), LEAST_LEVER)
+    w.push, w.thrust, w.drag = (
+        torque / w.arm,
+        c.dry_friction + c.friction / lever,
+        c.damping / (lever * lever),
+    )
+
+
+@compilable
+def share_pump(plugin: Plugin, state: Any, pad: Any, demanded: bool) -> float:
+    """Advance the pump over a step; the pressure of its line [Pa], inf where its flow has no limit."""
+    last = plugin.order[plugin.order.size - 1]
+    c, line = plugin.coefficients[last], pad.line[0]
+    if c.pump_flow == np.inf:
+        return np.inf
+    begin_line(line, c, state[last], demanded, plugin.period)
+    full = come_up(line, c, plugin.period) * c.pump_flow
+    pressure = line_pressure(plugin, pad.joints, line, full, c)
+    for j in range(state.size):
+        state[j].line, state[j].share, state[j].demand = pressure, line.share, line.demand
+    return pressure
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll_quasi_static(
     arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE
 ) -> None:
     """Roll one candidate out, as `rollout.roll` does; joints that follow a log take its angle."""
-    columns, order, idle = arm.columns, plugin.order, plugin.idle
-    joints, substeps, period = order.size, plugin.substeps, plugin.period
+    order, idle, period, substeps = plugin.order, plugin.idle, plugin.period, plugin.substeps
     commands, followed, taken = course
-    pad = make_pad(joints)
-    work, line = pad.joints, pad.line[0]
-    past = commands.shape[0] - followed.shape[0]
-    shared, step = False, period / substeps
-    if idle < joints:
-        some = plugin.coefficients[order[joints - 1]]
-        shared = some.pump_flow < np.inf
+    pad, past = make_pad(order.size), commands.shape[0] - followed.shape[0]
     for k in range(followed.shape[0]):
-        now = past + k
+        now, observed, demanded = past + k, record.states.size > 0 or k + 1 == followed.shape[0], False
         for i in range(arm.pushed.size):
             arm.angle[arm.pushed[i]] = followed[k, i]
-        for a in range(idle, joints):
+        for a in range(idle, order.size):
             j = order[a]
-            c, z, w = plugin.coefficients[j], state[j], work[j]
-            z.angle = arm.angle[columns[j]]
-            arm.angle[columns[j]] = z.angle + 0.5 * period * z.velocity
-            command(c, z, w, commands[now - c.a.late, j], commands[now - c.b.late, j])
-            net = 0.0
-            for i in range(substeps):
-                displacement = move_spool(c, z, w, i, step)
-                net += opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
-            w.travel = net / substeps
+            c, z, place = plugin.coefficients[j], state[j], arm.columns[j]
+            z.angle = arm.angle[place]
+            arm.angle[place] = z.angle + 0.5 * period * z.velocity
+            command(c, z, pad.joints[j], commands[now - c.a.late, j], commands[now - c.b.late, j])
+            meter(c, z, pad.joints[j], substeps, period / substeps)
+            demanded |= commands[now, j] != 0.0
         _kinematics(arm.model, arm.data)
         _com_pos(arm.model, arm.data)
         _rne(arm.model, arm.data, 0, arm.gravity.ctypes.data)
-        for a in range(idle, joints):
-            j = order[a]
-            c, w = plugin.coefficients[j], work[j]
-            middle = arm.angle[columns[j]]
-            if c.kind == LINEAR:
-                psi, first = middle, 1.0
-                if c.rocker > 0.0:
-                    psi, first, _ = four_bar(middle, c)
-                w.arm = first * triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[1]
-            else:
-                w.arm = bent(middle, c)[1]
-            lever = max(abs(w.arm), 1e-6)
-            held = arm.gravity[columns[j]] + c.stiffness * (middle - arm.slack[columns[j]])
-            w.push = held / w.arm
-            w.thrust = c.dry_friction + c.friction / lever
-            w.drag = c.damping / (lever * lever)
-        pressure = np.inf
-        if shared:
-            line.taken = taken[k] if taken.size else 0.0
-            demanded = False
-            for a in range(idle, joints):
-                demanded |= commands[now, order[a]] != 0.0
-            begin_line(line, some, state[order[joints - 1]], demanded, period)
-            full = come_up(line, some, period) * some.pump_flow
-            pressure = line_pressure(plugin, work, line, full, some)
-        for a in range(idle, joints):
-            j = order[a]
-            c, z, w = plugin.coefficients[j], state[j], work[j]
+        for a in range(idle, order.size):
+            j, place = order[a], arm.columns[order[a]]
+            spring = plugin.coefficients[j].stiffness * (arm.angle[place] - arm.slack[place])
+            weigh(plugin.coefficients[j], pad.joints[j], arm.angle[place], arm.gravity[place] + spring)
+        pad.line[0].taken = taken[k] if taken.size else 0.0
+        pressure = share_pump(plugin, state, pad, demanded) if idle < order.size else np.inf
+        for a in range(idle, order.size):
+            j, place = order[a], arm.columns[order[a]]
+            c, z, w = plugin.coefficients[j], state[j], pad.joints[j]
             supply = min(pressure, c.supply_pressure)
-            speed, _, _ = directed_speed(c, w, supply)
-            sign = 1.0 if w.travel > 0.0 else -1.0
-            after = z.angle + period * sign * speed / w.arm
-            lower, upper = arm.limits[columns[j], 0], arm.limits[columns[j], 1]
-            after = min(max(after, min(lower, z.angle)), max(upper, z.angle))
-            arm.angle[columns[j]], z.velocity = after, (after - z.angle) / period
-            if record.states.size or k + 1 == followed.shape[0]:
+            speed = directed_speed(c, w, supply)[0]
+            after = z.angle + period * (speed if w.travel > 0.0 else -speed) / w.arm
+            after = min(max(after, min(arm.limits[place, 0], z.angle)), max(arm.limits[place, 1], z.angle))
+            arm.angle[place], z.velocity = after, (after - z.angle) / period
+            if observed:
                 store_oil(c, z, w, supply, speed, after)
-            if shared:
-                z.line, z.share, z.demand = pressure, line.share, line.demand
         if (k + 1) % arm.steps == 0:
             record.angle[k // arm.steps] = arm.angle
             if record.states.size:

@@ -112,10 +112,7 @@ def design(
     directions = _improved(fitted, np.mean([t.gained.T @ t.gained for t in random], axis=0))
 
     def score(trial: Trial) -> float:
-        after = known.add(trial.gained)
-        if settings.design.criterion == "D":
-            return float(np.sum(np.log(np.diag(after.root))))  # half the log determinant
-        return -weakest(after, directions)[0]
+        return -weakest(known.add(trial.gained), directions)[0]
 
     elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:4]
     for tried in range(first + 1, effort + 1):

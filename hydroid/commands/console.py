@@ -24,7 +24,6 @@ OPTIONS = {
     "joint_refinement": "--both-stages",
     "design.duration_s": "--duration",
     "design.joints": "--joints",
-    "design.criterion": "--criterion",
 }
 """settings that have an option of their own"""
 

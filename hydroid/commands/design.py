@@ -30,14 +30,6 @@ def design(
         typer.Option(metavar="2,3", help="Joints to drive [default: the compared joints]."),
         str | None,
     ] = None,
-    criterion: Annotated[
-        str | None,
-        typer.Option(
-            metavar="E|D",
-            help="What the experiment minimises. E: the uncertainty of the worst-known combination of "
-            "parameters. D: the volume of the uncertainty of all of them together.",
-        ),
-    ] = None,
     seed: Seed = 1,
     config: OwnConfig = None,
     set: Set = None,
@@ -62,7 +54,7 @@ def design(
         RunError: the folder cannot be written.
     """
     driven = [int(name) if name.isdigit() else name for name in names(joints)] or None
-    options = {"design.duration_s": duration, "design.criterion": criterion, "design.joints": driven}
+    options = {"design.duration_s": duration, "design.joints": driven}
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log

@@ -32,8 +32,6 @@ class DesignSettings(Settings):
     clearance_m: Positive | None = 0.05
     """smallest distance of the simulated arm from itself and from the floor; where the arm's file has a pair,
     also from the carrier and the other arm, at rest in start_pose [m]; null: collisions are not checked"""
-    criterion: Literal["D", "E"] = "E"
-    """E: make the least precise combination of parameters as precise as possible; D: all together"""
     noise_deg: Positive = 0.1
     """standard deviation of the angles' noise [deg]"""
     noise_correlation_s: NotNegative = 0.0

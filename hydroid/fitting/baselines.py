@@ -1,0 +1,170 @@
+"""What anybody would try before a model: each joint's speed follows its command, and nothing else.
+
+Three models of one joint, fitted to logs in about a second: it does not move; a table of mean speeds with a
+delay; nine numbers: dead band, exponent, speed and lag of each direction, and one delay. A model of the arm
+must predict better than they do, and can start its own fit from them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from hydroid.log import Log
+from hydroid.log.log import Floats
+
+NAMES = ("does not move", "table of speeds", "nine numbers")
+"""of the baselines, the simplest first"""
+LONGEST_DELAY = 1.0
+"""between a command and its motion [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A joint whose speed follows its command; it stands still on zero command.
+
+    Attributes:
+        joint: number, from 1.
+        limits: its range [rad], where it stops, shape (2,).
+        delay: [s].
+        lag: time constant of the speed towards positive and negative commands [s].
+        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: the opening below.
+        dead_band: of positive and negative commands [%].
+        exponent: of the command beyond the dead band.
+        speed: at full command of each direction [rad/s], of either sign.
+    """
+
+    joint: int
+    limits: Floats
+    delay: float = 0.0
+    lag: tuple[float, float] = (0.0, 0.0)
+    table: Floats | None = None
+    dead_band: tuple[float, float] = (0.0, 0.0)
+    exponent: tuple[float, float] = (1.0, 1.0)
+    speed: tuple[float, float] = (0.0, 0.0)
+
+    def predict(self, log: Log) -> Floats:
+        """Return the angle from the log's start pose under its commands alone [rad], shape (T,)."""
+        command, side = log.command[:, self.joint - 1], (log.command[:, self.joint - 1] < 0).astype(int)
+        if self.table is not None:
+            target = np.interp(command, *self.table.T)
+        else:
+            dead, exponent, speed = np.array([self.dead_band, self.exponent, self.speed])[:, side]
+            beyond = (np.abs(command) - dead) / (100.0 - dead)
+            target = speed * np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
+        return _follow(target, side, self.delay, self.lag, log.period, log.start[self.joint - 1], self.limits)
+
+    def rms(self, logs: Sequence[Log]) -> float:
+        """Return the rms error over the samples of all logs [rad]."""
+        return float(np.sqrt(np.mean(self.errors(logs) ** 2)))
+
+    def errors(self, logs: Sequence[Log]) -> Floats:
+        """Return measured minus predicted angles of all logs [rad]."""
+        return np.concatenate([log.angle[:, self.joint - 1] - self.predict(log) for log in logs])
+
+
+@njit(cache=True)
+def _follow(
+    target: Floats,
+    side: NDArray[np.int64],
+    delay: float,
+    lag: tuple[float, float],
+    period: float,
+    start: float,
+    limits: Floats,
+) -> Floats:
+    """Angles of a joint whose speed follows `target` after a delay, of parts of a sample too, and a lag."""
+    whole = int(delay / period)
+    part = delay / period - whole
+    left = [np.exp(-period / time) if time > 1e-6 else 0.0 for time in lag]
+    angle, speed, angles = start, 0.0, np.empty(len(target))
+    for k in range(len(target)):
+        angles[k] = angle
+        late, later = k - whole, k - whole - 1
+        wanted = ((1 - part) * target[late] if late >= 0 else 0.0) + (
+            part * target[later] if later >= 0 else 0.0
+        )
+        way = side[max(late, 0)]
+        angle += wanted * period + (speed - wanted) * lag[way] * (1 - left[way])
+        speed = wanted + (speed - wanted) * left[way]
+        if angle < limits[0] or angle > limits[1]:
+            angle, speed = min(max(angle, limits[0]), limits[1]), 0.0
+    return angles
+
+
+def fit_baselines(logs: Sequence[Log], joint: int, limits: Floats) -> dict[str, Baseline]:
+    """Fit the baselines of a joint (number, from 1) to the logs that measure it; `limits` is its range [rad].
+
+    Returns:
+        By name, the simplest first. A joint that is never driven has only the first.
+    """
+    limits = np.asarray(limits, float)
+    measured = [log for log in logs if log.measured[joint - 1]]
+    still = Baseline(joint, limits)
+    if not any(log.driven[joint - 1] for log in measured):
+        return {NAMES[0]: still}
+    delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
+    table = min((_mean_speeds(measured, still, d) for d in delays), key=lambda model: model.rms(measured))
+    return dict(zip(NAMES, (still, table, _nine_numbers(measured, table)), strict=True))
+
+
+def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
+    """Return the mean speed in each of 24 bins of a command that acts after a delay, but for zero command."""
+    commands, speeds = list[Floats](), list[Floats]()
+    for log in logs:
+        command, angle = log.command[:, still.joint - 1], log.angle[:, still.joint - 1]
+        late = round(delay / log.period)
+        step = np.diff(angle[late:]) / log.period
+        margin = 0.01 * np.ptp(still.limits)  # at an end of its range no command moves it
+        free = (angle[late:-1] > still.limits[0] + margin) & (angle[late:-1] < still.limits[1] - margin)
+        used = free & (command[: len(step)] != 0)
+        commands.append(command[: len(step)][used])
+        speeds.append(step[used])
+    command, speed = np.concatenate(commands), np.concatenate(speeds)
+    bins = np.floor(command / (200 / 24)).astype(int)
+    filled = [bins == number for number in np.unique(bins)]
+    rows = sorted([(0.0, 0.0), *((command[one].mean(), speed[one].mean()) for one in filled)])
+    return replace(still, delay=delay, table=np.array(rows))
+
+
+def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
+    """Return the best of the fits that start at the table of speeds with different exponents."""
+    lower = np.array([0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0])
+    upper = np.array([90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY])
+    scale = np.array([10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1])
+
+    def made(numbers: Floats) -> Baseline:
+        dead, exponent, speed, lag = ((a, b) for a, b in numbers[:8].reshape(4, 2).tolist())
+        return Baseline(table.joint, table.limits, float(numbers[8]), lag, None, dead, exponent, speed)
+
+    def fit(numbers: Floats, evaluations: int) -> tuple[float, Floats]:
+        best = least_squares(
+            lambda x: made(x).errors(logs),
+            numbers,
+            bounds=(lower, upper),
+            x_scale=scale,
+            max_nfev=evaluations,
+        )
+        return float(best.cost), best.x
+
+    starts = list(_starts(table))
+    _, best = min((fit(start, 15) for start in starts), key=lambda result: result[0])
+    return made(fit(best, 60)[1])
+
+
+def _starts(table: Baseline) -> Iterator[Floats]:
+    """Dead bands that end where the table begins to move, its last speeds, and three exponents."""
+    assert table.table is not None
+    commands, speeds = table.table.T
+    dead, last, largest = np.zeros(2), np.zeros(2), np.full(2, 100.0)
+    for side, sign in enumerate((1, -1)):
+        if np.any(here := commands * sign > 0):
+            size, speed = np.abs(commands[here]), speeds[here]
+            dead[side] = 0.9 * size[np.abs(speed) > 0.05 * np.abs(speed).max()].min(initial=90.0)
+            largest[side], last[side] = size.max(), speed[size.argmax()]
+    for exponent in (1.0, 1.6, 2.5):
+        full = last * ((100 - dead) / (largest - dead)) ** exponent
+        yield np.array([*dead, exponent, exponent, *full, 0.1, 0.1, max(table.delay - 0.1, 0.01)])

@@ -15,10 +15,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hydroid.quantity_table import Quantity
+from hydroid.quantity_table import HYDRAULIC, Quantity
 from hydroid.settings.arm import Arm, ArmFile
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.hydraulics import ROWS, HydraulicSettings
+from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.log import JointColumns
 from hydroid.settings.study import StudySettings
 
@@ -61,15 +61,15 @@ def _table(kind: type[BaseModel]) -> str:
         cells = f"`{key}`", _type(field.annotation), default, unit, text.replace("|", "\\|")
         lines.append(f"| {' | '.join(cells)} |")
         if field.annotation is HydraulicSettings:
-            lines += map(_row, ROWS.values())
+            lines += map(_row, HYDRAULIC.values())
     return "\n".join(lines) + "\n"
 
 
 def _row(quantity: Quantity) -> str:
     """A quantity of the hydraulics as a row of the table of settings."""
-    kind = "number or null" if quantity.optional else "number"
-    meaning = quantity.meaning + (" (the article's value)" if quantity.source == "article" else "")
-    cells = f"`hydraulics.{quantity.name}`", kind, f"`{_yaml(quantity.default)}`", quantity.unit, meaning
+    kind = "number or null" if quantity.optional or quantity.default is None else "number"
+    default = f"`{_yaml(quantity.default)}`"
+    cells = f"`hydraulics.{quantity.name}`", kind, default, quantity.unit, quantity.meaning
     return f"| {' | '.join(cells)} |"
 
 

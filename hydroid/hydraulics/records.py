@@ -45,7 +45,7 @@ angle theta0 at joint angle 0 [rad], below 0 if the rod runs out towards negativ
 the rod fully in [m], as at the end of the joint's range; stroke [m]; ground to branch are those of
 `linkage.four_bar`, and rocker is 0 without one"""
 
-_SIDED = [row.name for row in ROWS if row.sides]
+_SIDED = [row.name for row in ROWS if isinstance(row.default, tuple)]
 _PLAIN = [name for name in JOINT.names or () if name[:-2] not in _SIDED]
 _SIDE_FIELDS = {name: f"{name}_" if keyword.iskeyword(name) else name for name in _SIDED}
 

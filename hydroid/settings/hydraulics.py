@@ -9,26 +9,27 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field, create_model, model_validator
 
-from hydroid.quantity_table import QUANTITIES, TARGETS, Quantity
+from hydroid.quantity_table import HYDRAULIC, QUANTITIES, TARGETS, Quantity
 from hydroid.settings.linkage import LinearActuator, RotaryActuator
 from hydroid.settings.load import Positive, Settings
 
 
 def _field(quantity: Quantity) -> Any:
-    number: Any = Annotated[float, *quantity.limits] if quantity.limits else float
-    return number | None if quantity.optional else number, quantity.default
+    number: Any = Annotated[float, *quantity.allowed] if quantity.allowed else float
+    optional = quantity.optional or quantity.default is None
+    return number | None if optional else number, quantity.default
 
 
-ROWS = {q.name: q for q in QUANTITIES.values() if q.source in ("ours", "article")}
-"""the quantities of the table that hold for all joints"""
-_Rows: type[Settings] = create_model("_Rows", __base__=Settings, **{n: _field(q) for n, q in ROWS.items()})
+_Rows: type[Settings] = create_model(
+    "_Rows", __base__=Settings, **{n: _field(q) for n, q in HYDRAULIC.items()}
+)
 
 
 class HydraulicSettings(Settings):
     """Values of quantities by name, for all joints; a name without _a or _b sets both sides."""
 
     model_config = ConfigDict(extra="allow")
-    more: ClassVar[Iterable[str]] = ROWS
+    more: ClassVar[Iterable[str]] = HYDRAULIC
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
@@ -38,7 +39,7 @@ class HydraulicSettings(Settings):
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """A quantity, by its name in `ROWS`."""
+            """A quantity, by its name in `HYDRAULIC`."""
 
     @model_validator(mode="before")
     @classmethod

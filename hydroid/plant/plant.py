@@ -18,7 +18,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.problem.bindings import Bindings
-from hydroid.quantity_table import QUANTITIES
+from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.chain import Chain
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
@@ -207,7 +207,7 @@ class Plant:
         motors: Array | None = np.array([self._gain, self._balance])
         actuators: dict[str, dict[str, Any]] | None = None
         if self._chain.joints.size:
-            hydraulic = {name: q for name, q in QUANTITIES.items() if q.source != "fit"}
+            hydraulic = {name: q for name, q in QUANTITIES.items() if name not in MECHANICAL}
             motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
             for joint, values in zip(names, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}

@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import load_settings, open_model
 from hydroid.commands.logs import problem_of
-from hydroid.commands.options import FIT_HELP, Folder, MoreLogs, OwnConfig, Repair, Set, command, names
+from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, rows, written
 from hydroid.errors import SettingsError
@@ -18,7 +15,8 @@ from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ModelSource
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
+    from hydroid.commands.logs import LogSources
     from hydroid.parameters import Array
     from hydroid.problem.problem import Problem
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
@@ -26,50 +24,18 @@ if TYPE_CHECKING:
 
 @command
 def analyse(
-    logs: MoreLogs = (),
+    logs: "LogSources" = (),
     *,
-    fit: Annotated[
-        "ModelSource | None",
-        typer.Option(metavar="RUN|YAML", help=f"{FIT_HELP} [default: the start values of the parameters]."),
-        Path | None,
-    ] = None,
-    profile: Annotated[
-        "str | list[str]",
-        typer.Option(
-            metavar="K,D", help="Parameters to profile. Each point of a profile takes a refinement."
-        ),
-        str,
-    ] = "",
-    sensitivity: Annotated[
-        bool,
-        typer.Option(
-            help="Add the effect of each free parameter on each output over time (article, figure 10): for "
-            "1 % of the parameter, and for 20 values within its bounds. Both are also written as CSV."
-        ),
-    ] = False,
-    over: Annotated[
-        "Sequence[str | Sequence[str]]",
-        typer.Option(
-            metavar="K,D",
-            help="Add the error over two parameters, the others at the estimate (article, figure 11). Repeat "
-            "it for several pairs. The setting objective.norm says which error: inf, 2 (rms) or 1.",
-        ),
-        list[str] | None,
-    ] = (),
-    points: Annotated[int, typer.Option(min=3, max=301, help="Grid points along each axis of --over.")] = 31,
-    around: Annotated[
-        float | None,
-        typer.Option(
-            min=0.001,
-            max=1000,
-            metavar="PCT",
-            help="With --over: ±PCT % around the estimate [default: from bound to bound].",
-        ),
-    ] = None,
-    out: Folder = "runs/analysis",
-    config: OwnConfig = None,
-    set: Set = None,
-    repair: Repair = False,
+    fit: "ModelSource | None" = None,
+    profile: str | list[str] = "",
+    sensitivity: bool = False,
+    over: Sequence[str | Sequence[str]] = (),
+    points: int = 31,
+    around: float | None = None,
+    out: "Source | None" = "runs/analysis",
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> "Result[UncertaintyStudy]":
     """Find which parameters, and which combinations of parameters, the logs determine.
 
@@ -80,6 +46,18 @@ def analyse(
 
         study = hydroid.analyse("a.csv", fit="runs/a", over=["K,D"])
         print(study.result.uncertainty.interval)
+
+    Args:
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of the
+            parameters].
+        profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
+        sensitivity: Add the effect of each free parameter on each output over time (article, figure 10): for
+            1 % of the parameter, and for 20 values within its bounds. Both are also written as CSV.
+        over (K,D): Add the error over two parameters, the others at the estimate (article, figure 11). Repeat
+            it for several pairs. The setting objective.norm says which error: inf, 2 (rms) or 1.
+        points (3 to 301): Grid points along each axis of --over.
+        around (0.001 to 1000): With --over: plus and minus so many % around the estimate [default: from bound
+            to bound].
 
     Raises:
         SettingsError: a name that is no free parameter.

@@ -8,10 +8,12 @@ import numpy as np
 
 from hydroid.commands.inputs import as_list, load_settings
 from hydroid.commands.logs import joint_ranges
-from hydroid.commands.options import Config, Logs, Repair, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.result import Result
 
 if TYPE_CHECKING:
+    from hydroid.commands.inputs import ConfigSource, SettingChanges
+    from hydroid.commands.logs import LogSources
     from hydroid.log import Log, LogFinding
 
 
@@ -53,7 +55,11 @@ class Checked(NamedTuple):
 
 @command
 def check(
-    logs: Logs, *, config: Config = "fit-mech", set: Set = None, repair: Repair = False
+    logs: "LogSources",
+    *,
+    config: "ConfigSource" = "fit-mech",
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> Result[Checked]:
     """List the faults of logs, anything unusual in them, and the commands that none of them has.
 

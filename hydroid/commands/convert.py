@@ -3,22 +3,21 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import typer
 
 from hydroid.commands.check import plain_findings
 from hydroid.commands.inputs import load_settings, refuse_overwriting, setting_changes
 from hydroid.commands.logs import joint_ranges
-from hydroid.commands.options import Repair, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.settings.load import replace_setting, validate
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, Source
+    from hydroid.commands.inputs import ConfigSource, SettingChanges, Source
     from hydroid.log import ColumnGuess, Log, Table
 
 MOST_JOINTS = 12
@@ -34,21 +33,12 @@ class Converted(NamedTuple):
 
 @command
 def convert(
-    log: Annotated[
-        "Source", typer.Argument(metavar="LOG", help="CSV, .mat, Parquet, ROS bag or MCAP."), Path
-    ],
+    log: "Source",
     *,
-    out: Annotated["Source", typer.Option("--out", "-o", metavar="OUT.csv", help="The CSV to write."), Path],
-    config: Annotated[
-        "ConfigSource | None",
-        typer.Option(
-            help="Settings that map the columns (`log`): a YAML file, or the name of a shipped config "
-            "[default: the columns are guessed, and each guess is printed; --set corrects them]."
-        ),
-        str | None,
-    ] = None,
-    set: Set = None,
-    repair: Repair = False,
+    out: "Source",
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> Result[Converted]:
     """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
 
@@ -58,6 +48,12 @@ def convert(
     Example: hydroid convert LOG.mat --out LOG.csv
 
         hydroid.convert("a.mat", out="a.csv", config="my-fit.yaml")
+
+    Args:
+        log (LOG): CSV, .mat, Parquet, ROS bag or MCAP.
+        out (OUT.csv): The CSV to write.
+        config (YAML): Settings that map the columns (`log`): a file, or the name of a shipped config
+            [default: the columns are guessed, and each guess is printed; --set corrects them].
 
     Raises:
         LogError: the log cannot be used.

@@ -1,18 +1,18 @@
 """`hydroid design`: the next experiment."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import open_model, setting_changes
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import Fit, Folder, MoreLogs, OwnConfig, Repair, Seed, Set, command, names
+from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
+    from hydroid.commands.logs import LogSources
 
 PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
 """keys of the table of predicted relative standard deviations"""
@@ -20,20 +20,16 @@ PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "desig
 
 @command
 def design(
-    logs: MoreLogs = (),
+    logs: "LogSources" = (),
     *,
-    fit: Fit,
-    out: Folder = "runs/design",
-    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the experiment [s].")] = None,
-    joints: Annotated[
-        "str | list[str] | None",
-        typer.Option(metavar="2,3", help="Joints to drive [default: the compared joints]."),
-        str | None,
-    ] = None,
-    seed: Seed = 1,
-    config: OwnConfig = None,
-    set: Set = None,
-    repair: Repair = False,
+    fit: "ModelSource",
+    out: "Source | None" = "runs/design",
+    duration: float | None = None,
+    joints: str | list[str] | None = None,
+    seed: int = 1,
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> "Result[Design]":
     """Design the next experiment: start pose and commands that best reduce the uncertainty of the estimate.
 
@@ -48,6 +44,10 @@ def design(
     Example: hydroid design LOG.csv --fit runs/mech --duration 30
 
         commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
+
+    Args:
+        duration (S): Length of the experiment [s].
+        joints (2,3): Joints to drive [default: the compared joints].
 
     Raises:
         SettingsError: limits that no experiment keeps.

@@ -1,9 +1,8 @@
 """`hydroid init`: a project for your own arm and log."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import as_list
 from hydroid.commands.options import command, names
@@ -18,44 +17,12 @@ if TYPE_CHECKING:
 
 @command
 def init(
-    folder: Annotated[
-        "Source", typer.Argument(metavar="DIR", help="Folder of the project, new or not."), Path
-    ],
+    folder: "Source",
     *,
-    arm: Annotated[
-        "Source | None",
-        typer.Option(
-            metavar="robot.urdf",
-            help="URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].",
-        ),
-        Path | None,
-    ] = None,
-    log: Annotated[
-        "Source | list[Source] | None",
-        typer.Option(
-            metavar="LOG",
-            help="A log; its columns are guessed. Repeat it for several logs: the next steps keep the last "
-            "to validate on.",
-        ),
-        list[Path] | None,
-    ] = None,
-    joints: Annotated[
-        "str | list[str] | None",
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Names of the arm's joints in the order of the log's numbers (u1, u2, ...) [default: the "
-            "order in the arm's file].",
-        ),
-        str | None,
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LINK",
-            help="Last link of the arm, if the robot has several branches [default: the end of the "
-            "branch whose joints the log names, or else of the longest branch].",
-        ),
-    ] = None,
+    arm: "Source | None" = None,
+    log: "Source | Sequence[Source] | None" = None,
+    joints: str | list[str] | None = None,
+    tip: str | None = None,
 ) -> "Result[Project]":
     """Write a project that runs, from your arm's CAD and your log.
 
@@ -66,6 +33,16 @@ def init(
 
         project = hydroid.init("mine", arm="robot.urdf", log=["a.csv", "b.csv"]).result
         print(*project.notes, *project.columns, *project.commands, sep="\\n")
+
+    Args:
+        folder (DIR): Folder of the project, new or not.
+        arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a template of boxes].
+        log (LOG): A log; its columns are guessed. Repeat it for several logs: the next steps keep the last to
+            validate on.
+        joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2, ...)
+            [default: the order in the arm's file].
+        tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the branch
+            whose joints the log names, or else of the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the names.

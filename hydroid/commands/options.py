@@ -1,134 +1,125 @@
-"""Options that several commands share, and what makes a command of a function.
+"""What makes a command of a function: its parameters are the options, its docstring says what each is.
 
-An option is `Annotated[type in Python, typer.Option(...)]`, followed by the type on the command line where
-Python accepts more, a `Log` as well as a file's name, and by the default where the option stands in a
-`TypedDict` of several commands.
+A line of `Args:` is `name (VALUE): text`; VALUE is what `--help` calls it, or the range of a number. What
+parameters of several commands are stands in `SHARED`. Those before `*` need no name on the command line.
 """
 
 import inspect
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 import typer
 
-if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
-    from hydroid.commands.logs import LogSources
-
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
 
-LOGS_HELP = "Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP."
-Logs = Annotated["LogSources", typer.Argument(metavar="LOG", help=LOGS_HELP), list[Path]]
-MoreLogs = Annotated[
-    "LogSources",
-    typer.Argument(metavar="LOG", help=f"{LOGS_HELP} [default: those of the run]"),
-    list[Path] | None,
-]
-Config = Annotated[
-    "ConfigSource", typer.Option(help="Settings: a YAML file, or the name of a shipped config."), str
-]
-OwnConfig = Annotated[
-    "ConfigSource | None",
-    typer.Option(
-        help="Settings: a YAML file, or the name of a shipped config [default: config.yaml in the folder of "
-        "the estimate, or else fit-mech]."
-    ),
-    str | None,
-]
-Set = Annotated[
-    "SettingChanges",
-    typer.Option(metavar="KEY=VALUE", help="Replace a setting, such as search.ga.generations=80."),
-    list[str] | None,
-]
-Folder = Annotated[
-    "Source | None",
-    typer.Option(metavar="DIR", help="Folder for the report, tables and figures."),
-    Path | None,
-]
-FIT_HELP = (
-    "An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a YAML file of "
-    "values by name"
-)
-Fit = Annotated["ModelSource", typer.Option(metavar="RUN|YAML", help=f"{FIT_HELP}."), Path]
-Repair = Annotated[
-    bool,
-    typer.Option(
-        help="Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files "
-        "themselves stay as they are."
-    ),
-]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
-Processes = Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0 means one per core.")]
-Dask = Annotated[
-    str | None,
-    typer.Option(
-        metavar="local[:N]|slurm[:N]|ADDRESS",
-        help="Simulate in N processes of this machine, in N Slurm jobs, or on the "
-        "workers of the Dask scheduler at ADDRESS. The result is the same.",
-    ),
-]
-DaskInsecure = Annotated[
-    bool,
-    typer.Option(
-        help="Accept a scheduler without TLS. Anyone who can reach its port can then run code as you."
-    ),
-]
-Arm = Annotated[
-    str | None,
-    typer.Option(
-        metavar="right|left|both",
-        help="Simulate the two-arm machine of the arm's file; the value names the arms that move. Columns "
-        "such as right_u2_pct and left_q2_deg belong to one arm. All others apply to every arm that moves.",
-    ),
-]
-Pose = Annotated[
-    str | None,
-    typer.Option(help="Name of the start pose in the arm's file [default: the first angles of the log]."),
-]
+SHARED = """
+    logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP [default: those of the
+        run that is judged or resumed].
+    fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a
+        YAML file of values by name.
+    out (DIR): Folder for the report, tables and figures.
+    config (YAML): Settings: a file, or the name of a shipped config [default: config.yaml in the folder of
+        the estimate, or else fit-mech; fit-hyd for stage 2].
+    set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
+    repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves
+        stay as they are.
+    seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
+    dask (local[:N]|slurm[:N]|ADDRESS): Simulate in N processes of this machine, in N Slurm jobs, or on the
+        workers of the Dask scheduler at ADDRESS. The result is the same.
+    dask_insecure: Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.
+    arm (right|left|both): Simulate the two-arm machine of the arm's file; the value names the arms that move.
+        Columns such as right_u2_pct and left_q2_deg belong to one arm. All others apply to every arm that
+        moves.
+    pose (NAME): The start pose, one of the arm's file [default: the first angles of the log].
+
+    algorithm (NAME): Search: ga, nsga2, cmaes, multistart, or one of the library pymoo, such as pymoo:NSGA3.
+    runs (1 to 10000): Number of runs, with the seeds SEED, SEED + 1, ...
+    start (RUN|YAML): Start the search from the values of an estimate.
+    resume: Continue the stopped run in --out; start it if there is none.
+    refinement: After the search, refine its estimate by least squares.
+    threads (N): Number of threads (0: one per core, or with --dask one per worker).
+"""
+
+TERMINAL: dict[str, Any] = {
+    "bool": bool,
+    "int": int,
+    "float": float,
+    "str": str,
+    "Source": Path,
+    "LogSources": Path,
+    "ModelSource": Path,
+    "ConfigSource": str,
+    "SettingChanges": str,
+}
+"""what a value of a Python type is on the command line"""
 
 COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]] = {}
 """text, example and parameters on the command line of every command that is imported"""
 
 
 def command(function: F) -> F:
-    """Make a command of a function: its signature has plain types, and its docstring the options' texts.
-
-    `command_line` keeps how a terminal calls it: text, example, and parameters for typer.
-    """
+    """Make a command of a function: describe all its parameters in its docstring, and keep them for typer."""
     text, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
-    plain, typed, arguments = list[inspect.Parameter](), list[inspect.Parameter](), list[str]()
-    for parameter in _parameters(function):
-        kind, option, *more = get_args(parameter.annotation)
-        if kind is bool and parameter.default is False:  # no --no-... beside it
-            option.param_decls = (f"--{parameter.name.replace('_', '-')}",)
-        arguments.append(f"    {parameter.name}: {option.help}")
-        plain.append(parameter.replace(annotation=getattr(kind, "__forward_arg__", kind)))
-        default = None if parameter.default == () else parameter.default
-        annotation = Annotated[more[0] if more else kind, option]
-        typed.append(parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=annotation))
+    text, _, arguments = text.partition("\n\nArgs:")
     summary, _, example = text.partition("\n\nExample:")
+    entries = _entries(SHARED) | _entries(arguments)
+    parameters = inspect.signature(function).parameters.values()
+    lines = [f"    {p.name}: {entries[p.name][1]}" for p in parameters]
     more = ["", f"Raises:{raises}"] if raises else []
-    function.__doc__ = "\n".join((text, "", "Args:", *arguments, *more))
-    function.__signature__ = inspect.Signature(plain)  # pyright: ignore[reportFunctionMemberAccess]
+    function.__doc__ = "\n".join((text, "", "Args:", *lines, *more))
+    typed = [_typed(p, *entries[p.name]) for p in parameters]
     COMMAND_LINES[function] = summary, f"Example:{example.partition(chr(10))[0]}", typed
     return function
 
 
-def _parameters(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
-    """Yield the parameters of a function, with those of the `TypedDict` of its further ones."""
-    for parameter in inspect.signature(function).parameters.values():
-        if parameter.kind is not parameter.VAR_KEYWORD:
-            yield parameter
-            continue
-        (several,) = get_args(parameter.annotation)
-        for name, option in several.__annotations__.items():
-            kind, _, *more = get_args(option)
-            default = more[1] if len(more) > 1 else False if kind is bool else None
-            yield inspect.Parameter(name, parameter.KEYWORD_ONLY, default=default, annotation=option)
+def taking(options: Callable[P, T]) -> Callable[[Callable[[T], R]], Callable[P, R]]:
+    """Let the fields of a dataclass be the parameters of a function that takes it."""
+
+    def with_fields(function: Callable[[T], R]) -> Callable[P, R]:
+        @wraps(function)
+        def called(*arguments: P.args, **named: P.kwargs) -> R:
+            return function(options(*arguments, **named))
+
+        called.__signature__ = inspect.signature(options)  # pyright: ignore[reportAttributeAccessIssue]
+        return called
+
+    return with_fields
 
 
-def names(given: "str | list[str] | tuple[str, ...] | None") -> list[str]:
+def _entries(text: str) -> dict[str, tuple[str, str]]:
+    """Return VALUE and text of the parameters that a docstring describes."""
+    found = re.findall(r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)", text, re.MULTILINE)
+    return {name: (value, " ".join(words.split())) for name, value, words in found}
+
+
+def _typed(parameter: inspect.Parameter, value: str, text: str) -> inspect.Parameter:
+    """Return a parameter as typer takes it."""
+    given = parameter.annotation
+    names = re.findall(r"\w+", given.__name__ if isinstance(given, type) else str(given))
+    one = next(TERMINAL[name] for name in names if name in TERMINAL)
+    kind = list[one] if {"Sequence", "LogSources", "SettingChanges"} & {*names} else one
+    default = None if parameter.default == () else parameter.default
+    spelt = [f"--{parameter.name.replace('_', '-')}"]
+    if parameter.name == "out":
+        spelt.append("-o")
+    how: dict[str, Any] = {"metavar": value or None, "help": text}
+    if limits := re.fullmatch(r"(\S+) (?:or more|to (\S+))", value):
+        how |= {"metavar": None, "min": one(limits[1]), "max": limits[2] and one(limits[2])}
+    if parameter.kind is parameter.POSITIONAL_OR_KEYWORD:
+        option = typer.Argument(**how)
+    else:  # of one that is on or left to the settings there is also --no-...
+        option = typer.Option(*([] if one is bool and default is not False else spelt), **how)
+    annotation = Annotated[kind | None if default is None else kind, option]
+    return parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def names(given: str | list[str] | tuple[str, ...] | None) -> list[str]:
     """Return names that stand in a list, or in a text such as `K,D`."""
     parts = given.split(",") if isinstance(given, str) else given or ()
     return [name.strip() for name in parts if name.strip()]

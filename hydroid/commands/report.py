@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import as_list
 from hydroid.commands.options import command
@@ -20,30 +18,12 @@ SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile"
 
 @command
 def report(
-    runs: Annotated[
-        "Source | Sequence[Source]",
-        typer.Argument(metavar="RUN", help="Folders of finished runs; with --merge also a quoted pattern."),
-        list[str],
-    ],
+    runs: "Source | Sequence[Source]",
     *,
-    merge: Annotated[
-        bool,
-        typer.Option(
-            help="The folders are runs of one fit with different seeds: show median and spread of their "
-            "estimates. Runs that are not finished or damaged are left out, with a warning."
-        ),
-    ] = False,
-    without: Annotated[
-        "Sequence[str]",
-        typer.Option(metavar="NAME", help="Leave out a validation of the run; repeat for several."),
-        list[str] | None,
-    ] = (),
-    figures: Annotated[
-        bool, typer.Option(help="Also write every chart as PNG and SVG, to figures/.")
-    ] = False,
-    out: Annotated[
-        "Source", typer.Option(metavar="DIR", help="Folder for the page of several."), Path
-    ] = "runs/report",
+    merge: bool = False,
+    without: Sequence[str] = (),
+    figures: bool = False,
+    out: "Source" = "runs/report",
 ) -> "Result[Runs | None]":
     """Draw the report of a finished run anew, or several side by side on one page.
 
@@ -55,6 +35,14 @@ def report(
 
         hydroid.report(["runs/mech", "runs/hyd"], out="runs/report")
         print(hydroid.report("runs/array/seed-*", merge=True).result.best.path)
+
+    Args:
+        runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
+        merge: The folders are runs of one fit with different seeds: show median and spread of their
+            estimates. Runs that are not finished or damaged are left out, with a warning.
+        without (NAME): Leave out a validation of the run; repeat for several.
+        figures: Also write every chart as PNG and SVG, to figures/.
+        out (DIR): Folder for the page of several.
 
     Raises:
         RunError: a folder holds no finished run of this version, runs to be merged differ in more than their

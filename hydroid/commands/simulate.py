@@ -2,20 +2,19 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
 from hydroid.commands.inputs import open_model, refuse_overwriting
 from hydroid.commands.logs import read_arms
-from hydroid.commands.options import Arm, Fit, OwnConfig, Pose, Repair, Seed, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import Source
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.log import Log
 
 
@@ -31,33 +30,18 @@ class Simulated(Result["dict[str, Log]"]):
 
 @command
 def simulate(
-    commands: Annotated[
-        "Source | Log",
-        typer.Argument(
-            metavar="COMMANDS.csv",
-            help="A log of commands. Its angles before the first command give the start pose.",
-        ),
-        Path,
-    ],
+    commands: "Source | Log",
     *,
-    fit: Fit,
-    out: Annotated[
-        "Source | None", typer.Option(metavar="LOG.csv", help="The log to write."), Path | None
-    ] = Path("runs/simulated.csv"),
-    pose: Pose = None,
-    noise_deg: Annotated[
-        float, typer.Option(min=0, max=90, help="Standard deviation of Gaussian noise on the angles [deg].")
-    ] = 0.0,
-    seed: Seed = 0,
-    trace: Annotated[
-        "Source | None",
-        typer.Option(metavar="CSV", help="Also write pressures, flows, spool position and force (stage 2)."),
-        Path | None,
-    ] = None,
-    arm: Arm = None,
-    config: OwnConfig = None,
-    set: Set = None,
-    repair: Repair = False,
+    fit: "ModelSource",
+    out: "Source | None" = Path("runs/simulated.csv"),
+    pose: str | None = None,
+    noise_deg: float = 0.0,
+    seed: int = 0,
+    trace: "Source | None" = None,
+    arm: str | None = None,
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> Simulated:
     """Simulate commands with an estimate and write the log: a prediction, or synthetic data to test a fit.
 
@@ -66,6 +50,12 @@ def simulate(
     Example: hydroid simulate COMMANDS.csv --fit runs/hyd --out sim.csv
 
         log = hydroid.simulate("commands.csv", fit="runs/a", out="predicted.csv").log
+
+    Args:
+        commands (COMMANDS.csv): A log of commands. Its angles before the first command give the start pose.
+        out (LOG.csv): The log to write.
+        noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
+        trace (CSV): Also write pressures, flows, spool position and force (stage 2).
 
     Raises:
         SettingsError: a trace of stage 1 or of two arms, or `out` would overwrite the commands.

@@ -2,12 +2,10 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import Dask, DaskInsecure, Folder, Processes, command
+from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, written
 from hydroid.errors import Stopped
@@ -20,14 +18,12 @@ if TYPE_CHECKING:
 
 @command
 def study(
-    file: Annotated[
-        "Source", typer.Argument(metavar="STUDY.yaml", help="The study's file (docs/studies.md)."), Path
-    ],
+    file: "Source",
     *,
-    out: Folder = "runs/study",
-    processes: Processes = 0,
-    dask: Dask = None,
-    dask_insecure: DaskInsecure = False,
+    out: "Source | None" = "runs/study",
+    processes: int = 0,
+    dask: str | None = None,
+    dask_insecure: bool = False,
 ) -> "Result[StudyRuns]":
     """Compare settings over many seeds.
 
@@ -39,6 +35,10 @@ def study(
 
         runs = hydroid.study("my-study.yaml", out="runs/my-study").result
         print([(row.cell, row.seed, row.values["rms error"]) for row in runs.rows])
+
+    Args:
+        file (STUDY.yaml): The study's file (docs/studies.md).
+        processes (0 to 1024): Number of processes. 0 means one per core.
 
     Raises:
         SettingsError: a key or value of the file that is not allowed.

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import open_model
 from hydroid.commands.logs import problem_of
-from hydroid.commands.options import Fit, Folder, MoreLogs, OwnConfig, Repair, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, written
 from hydroid.files import is_file
@@ -13,18 +13,20 @@ from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
     from hydroid.advice.proposals import Advice
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
+    from hydroid.commands.logs import LogSources
     from hydroid.reporting.table import Table
 
 
 @command
 def suggest(
-    logs: MoreLogs = (),
+    logs: "LogSources" = (),
     *,
-    fit: Fit,
-    out: Folder = "runs/suggestions",
-    config: OwnConfig = None,
-    set: Set = None,
-    repair: Repair = False,
+    fit: "ModelSource",
+    out: "Source | None" = "runs/suggestions",
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> "Result[Advice]":
     """Find what the model lacks, and what to do next.
 

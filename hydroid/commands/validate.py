@@ -2,39 +2,29 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import as_list, open_model
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import FIT_HELP, Folder, Logs, Repair, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ModelSource
+    from hydroid.commands.inputs import ModelSource, SettingChanges, Source
+    from hydroid.commands.logs import LogSources
     from hydroid.fitting.validation import Prediction
 
 
 @command
 def validate(
-    logs: Logs,
+    logs: "LogSources",
     *,
-    fit: Annotated[
-        "ModelSource | Sequence[ModelSource]",
-        typer.Option(metavar="RUN|YAML", help=f"{FIT_HELP}. Repeat the option for several estimates."),
-        list[Path],
-    ],
-    leave_one_out: Annotated[
-        bool,
-        typer.Option(
-            help="Give the fit's own logs. For each of them: refit without it, and predict it. Takes one fit."
-        ),
-    ] = False,
-    out: Folder = "runs/validation",
-    set: Set = None,
-    repair: Repair = False,
+    fit: "ModelSource | Sequence[ModelSource]",
+    leave_one_out: bool = False,
+    out: "Source | None" = "runs/validation",
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> "Result[list[Prediction]]":
     """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots.
 
@@ -44,6 +34,12 @@ def validate(
 
         validated = hydroid.validate("b.csv", fit="runs/a")
         print(validated.result[0].indices[2].rms)  # of joint 2 [rad]
+
+    Args:
+        fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
+            Repeat the option for several estimates.
+        leave_one_out: Give the fit's own logs. For each of them: refit without it, and predict it. Takes one
+            fit.
 
     Raises:
         LogError: a log cannot be used.

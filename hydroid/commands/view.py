@@ -2,13 +2,11 @@
 
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import load_settings, open_model, require_hydraulics
 from hydroid.commands.logs import read_arms, run_logs
-from hydroid.commands.options import FIT_HELP, Arm, Pose, Repair, Set, command
+from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
@@ -18,68 +16,25 @@ from hydroid.viewer.opengl import choose_platform
 
 if TYPE_CHECKING:
     from hydroid.arm.collision import Clearance
-    from hydroid.commands.inputs import ConfigSource, ModelSource, Source
+    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.log import Log
     from hydroid.settings.fit import FitSettings
 
 
 @command
 def view(
-    source: Annotated[
-        "Source | Log | None",
-        typer.Argument(
-            metavar="RUN|LOG", help="A run folder, whose first log drives the arm; or a log, with --fit."
-        ),
-        Path | None,
-    ] = None,
+    source: "Source | Log | None" = None,
     *,
-    out: Annotated[
-        "Source | None",
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE|DIR",
-            help="Write a film (.mp4, .gif) or several moments (.png) instead of opening a window; with "
-            "--collisions or --actuator, folder for their pages.",
-        ),
-        Path | None,
-    ] = None,
-    fit: Annotated[
-        "ModelSource | None",
-        typer.Option(
-            metavar="RUN|YAML",
-            help=f"{FIT_HELP} [default: the arm's file and `hydraulics` in the settings].",
-        ),
-        Path | None,
-    ] = None,
-    span: Annotated[
-        str,
-        typer.Option(metavar="FROM:TO", help="Part of the log to film [s], such as 10:20 [default: all]."),
-    ] = "",
-    pose: Pose = None,
-    arm: Arm = None,
-    collisions: Annotated[
-        bool,
-        typer.Option(
-            help="Instead, find which bodies meet along the log's joint angles: of the arm, its base and the "
-            "floor; with --arm also of the carrier and the other arm. The exit status is 1 if bodies meet."
-        ),
-    ] = False,
-    actuator: Annotated[
-        int | None,
-        typer.Option(
-            metavar="JOINT",
-            help="Instead, draw the curves of this joint's actuator (1 azimuth, 2 shoulder, ...): "
-            "calibration, current, force, spool, opening, flow and torque, with the 95 % bands of a fit.",
-        ),
-    ] = None,
-    config: Annotated[
-        "ConfigSource | None",
-        typer.Option(help="Settings [default: config.yaml in the folder of the estimate, or else fit-hyd]."),
-        str | None,
-    ] = None,
-    set: Set = None,
-    repair: Repair = False,
+    out: "Source | None" = None,
+    fit: "ModelSource | None" = None,
+    span: str = "",
+    pose: str | None = None,
+    arm: str | None = None,
+    collisions: bool = False,
+    actuator: int | None = None,
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
 ) -> "Result[Clearance | None]":
     """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the measured one.
 
@@ -91,6 +46,19 @@ def view(
     Example: hydroid view runs/hyd -o arm.mp4
 
         hydroid.view("a.csv", out="a.png", fit="runs/a", span="0:2")
+
+    Args:
+        source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with --fit.
+        out (FILE|DIR): Write a film (.mp4, .gif) or several moments (.png) instead of opening a window; with
+            --collisions or --actuator, folder for their pages.
+        fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and `hydraulics`
+            in the settings].
+        span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
+        collisions: Instead, find which bodies meet along the log's joint angles: of the arm, its base and the
+            floor; with --arm also of the carrier and the other arm. The exit status is 1 if bodies meet.
+        actuator (JOINT): Instead, draw the curves of this joint's actuator (1 azimuth, 2 shoulder, ...):
+            calibration, current, force, spool, opening, flow and torque, with the 95 % bands of a fit.
+        config (YAML): Settings [default: config.yaml in the folder of the estimate, or else fit-hyd].
 
     Raises:
         RunError: no window, no OpenGL, no package that writes films, or the simulation diverged.

@@ -4,10 +4,10 @@ The MJCF has links, joints, ranges, masses and meshes; its keyframes are the nam
 actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
 from hydroid.assets import find_config
 from hydroid.errors import ModelError, SettingsError
-from hydroid.settings.linkage import DIGITS, Cylinder, LinearActuator, RotaryActuator, make_cylinder, sides_of
+from hydroid.settings.linkage import DIGITS, Cylinder, LinearActuator, RotaryActuator, make_cylinder
 from hydroid.settings.load import Settings, load
 
 if TYPE_CHECKING:
@@ -69,22 +69,72 @@ class Joint:
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm as its MJCF and its YAML file describe it.
+    """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is asked for.
 
     Attributes:
         file: the YAML's settings.
-        name: of the model.
-        joints: in the order of the model, J of them.
-        mass_of: nominal masses of its links, the bodies that move [kg], by name: those of the joints in
-            their order, then parts that are fixed to them, L of them.
-        poses: angle of each joint by the pose's name [rad].
+        where: begins messages about them.
+
+    Raises:
+        SettingsError: where the MJCF is read, a setting that does not fit it.
+        ModelError: then, no MJCF, or one that hydroid cannot simulate.
     """
 
     file: ArmFile
-    name: str
-    joints: tuple[Joint, ...]
-    mass_of: dict[str, float]
-    poses: dict[str, tuple[float, ...]]
+    where: str = field(compare=False)
+
+    @cached_property
+    def joints(self) -> tuple["Joint", ...]:
+        """In the order of the model, (J,)."""
+        model = self._model
+        names = [model.joint(j).name for j in range(model.njnt)]
+        for name in self.file.actuators:
+            if name not in names:
+                hint = f"the model's joints: {', '.join(names)}"
+                raise SettingsError(f"actuators.{name}: no such joint", where=self.where, hint=hint)
+        if self.payload is not None and self.payload not in [model.site(s).name for s in range(model.nsite)]:
+            raise SettingsError(f"payload: the model has no site {self.payload!r}", where=self.where)
+        return tuple(self._joint(name) for name in names)
+
+    @cached_property
+    def mass_of(self) -> dict[str, float]:
+        """Nominal masses of the links, the bodies that move [kg], by name.
+
+        Those of the joints come in their order, then parts that are fixed to them, L in all.
+        """
+        model = self._model
+        moving = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b] and model.body_mass[b]]
+        links = sorted((body for body in moving if body.name), key=lambda body: not body.jntnum[0])
+        return {body.name: float(body.mass[0]) for body in links}
+
+    @cached_property
+    def poses(self) -> dict[str, tuple[float, ...]]:
+        """Angle of each joint by the pose's name [rad]: the model's keyframes, and `home`."""
+        model = self._model
+        keys = {model.key(k).name: tuple(model.key_qpos[k].tolist()) for k in range(model.nkey)}
+        return {"home": tuple(model.qpos0.tolist())} | keys
+
+    @cached_property
+    def name(self) -> str:
+        """Of the model."""
+        return self._model.names.split(b"\0")[0].decode()
+
+    @property
+    def _model(self) -> Any:
+        return _at_zero(self.file.model).model
+
+    def _joint(self, name: str) -> "Joint":
+        joint, actuator = self._model.joint(name), self.file.actuators.get(name)
+        limited = bool(joint.limited[0])
+        low, high = np.degrees(joint.range).round(DIGITS).tolist() if limited else TURN
+        if isinstance(actuator, Cylinder):
+            try:
+                if not limited:
+                    raise ValueError("a joint without limits needs a rotary actuator")
+                actuator = make_cylinder(actuator, (low, high), _at_zero(self.file.model), name)
+            except ValueError as error:
+                raise SettingsError(f"actuators.{name}: {error}", where=self.where) from None
+        return Joint(name, (low, high), not limited, actuator)
 
     @property
     def model(self) -> Path:
@@ -138,55 +188,27 @@ class Arm:
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
-    """Read an arm's YAML, found as `find_config` does, and its MJCF.
+    """Read an arm's YAML, found as `find_config` does.
 
     Raises:
-        SettingsError: no such file, a setting that is not allowed or does not fit the model.
-        ModelError: no MJCF, or one that hydroid cannot simulate.
+        SettingsError: no such file, or a setting that is not allowed.
     """
     path = find_config(name, beside, kind="arm")
-    return make_arm(load(path, ArmFile), str(path))
+    return Arm(load(path, ArmFile), str(path))
 
 
-def make_arm(file: ArmFile, where: str) -> Arm:
-    """Return the arm of an arm file's settings; `where` begins messages about them."""
-    if not file.model.is_file():
+def _at_zero(path: Path) -> "mujoco.MjData":
+    """The compiled MJCF with all joints at 0."""
+    if not path.is_file():
         hint = "give the arm's MJCF; `hydroid init` writes one"
-        raise ModelError("no such model", where=str(file.model), hint=hint)
-    state = file.model.stat()
-    data = _at_zero(file.model, state.st_mtime_ns, state.st_size)
-    model = data.model
-    joints = [model.joint(j) for j in range(model.njnt)]
-    for name in file.actuators:
-        if name not in [joint.name for joint in joints]:
-            hint = f"the model's joints: {', '.join(joint.name for joint in joints)}"
-            raise SettingsError(f"actuators.{name}: no such joint", where=where, hint=hint)
-    if file.payload is not None and file.payload not in [model.site(s).name for s in range(model.nsite)]:
-        raise SettingsError(f"payload: the model has no site {file.payload!r}", where=where)
-    made: list[Joint] = []
-    for joint in joints:
-        actuator = file.actuators.get(joint.name)
-        low, high = np.degrees(joint.range).round(DIGITS).tolist() if joint.limited[0] else TURN
-        if isinstance(actuator, Cylinder):
-            try:
-                if not joint.limited[0]:
-                    raise ValueError("a joint without limits needs a rotary actuator")
-                sides, pivots = sides_of(actuator, data, joint.name)
-                actuator = make_cylinder(actuator, sides, (low, high), pivots)
-            except ValueError as error:
-                raise SettingsError(f"actuators.{joint.name}: {error}", where=where) from None
-        made.append(Joint(joint.name, (low, high), not joint.limited[0], actuator))
-    moving = [model.body(b) for b in range(1, model.nbody) if model.body_weldid[b] and model.body_mass[b]]
-    links = sorted((body for body in moving if body.name), key=lambda body: not body.jntnum[0])
-    poses = {"home": tuple(model.qpos0.tolist())}
-    poses |= {model.key(k).name: tuple(model.key_qpos[k].tolist()) for k in range(model.nkey)}
-    name = model.names.split(b"\0")[0].decode()
-    return Arm(file, name, tuple(made), {body.name: float(body.mass[0]) for body in links}, poses)
+        raise ModelError("no such model", where=str(path), hint=hint)
+    state = path.stat()
+    return _compiled(path, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=8)
-def _at_zero(path: Path, _changed: int, _size: int) -> "mujoco.MjData":
-    """The compiled MJCF with all joints at 0, without meshes that decide no inertia: these take long."""
+def _compiled(path: Path, _changed: int, _size: int) -> "mujoco.MjData":
+    """The same of a file that did not change, without meshes that decide no inertia: these take long."""
     import mujoco
 
     from hydroid.mjcf import mujoco_errors, read_mjcf

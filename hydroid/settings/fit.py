@@ -16,7 +16,7 @@ from pydantic import (
 
 from hydroid.parameters import Parameter, ParameterSet
 from hydroid.quantity_table import MECHANICAL
-from hydroid.settings.arm import Arm, ArmFile, load_arm, make_arm
+from hydroid.settings.arm import Arm, ArmFile, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings, validate
@@ -32,9 +32,7 @@ def _read_arm(value: Any, info: ValidationInfo) -> Any:
     folder = (info.context or {}).get("folder")
     if isinstance(value, str):
         return load_arm(value, folder)
-    if not isinstance(value, dict):
-        return value
-    return make_arm(validate(value, ArmFile, "arm", folder=folder), "arm")
+    return Arm(validate(value, ArmFile, "arm", folder=folder), "arm") if isinstance(value, dict) else value
 
 
 ArmSetting = Annotated[
@@ -83,20 +81,19 @@ class FitSettings(Settings):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, values: Any, info: ValidationInfo) -> Any:
-        """Read the arm first: joints and links may be given by its names."""
+        """Find the arm first: joints and links may be given by its names."""
         if not isinstance(values, dict):
             return values
         names = values.get("parameters")
         if isinstance(names, dict) and not all(isinstance(n, str) and n.isidentifier() for n in names):
             raise ValueError("parameter names must be plain words such as K or M1")
         arm = _read_arm(values.get("arm", cls.model_fields["arm"].default), info)
-        known = isinstance(arm, Arm)
-        if known and info.context is not None:
-            info.context["joints"] = arm.joint_names
-        compared = values.get("outputs", cls.model_fields["outputs"].default)
+        known = arm if isinstance(arm, Arm) else None
+        if info.context is not None:
+            info.context["arm"] = known
         if isinstance(names, dict):
-            among = (arm.joint_names, arm.link_names) if known else ((), ())
-            values = {**values, "parameters": expanded(names, compared, *among)}
+            compared = values.get("outputs", cls.model_fields["outputs"].default)
+            values = {**values, "parameters": expanded(names, compared, known)}
         return {**values, "arm": arm}
 
     @model_validator(mode="after")

@@ -192,44 +192,20 @@ class LinearActuator:
         return length, arm * first
 
 
-def sides_of(
-    settings: Cylinder, data: "mujoco.MjData", joint: str
-) -> tuple[Triangle, tuple[Vector, Vector] | None]:
-    """Return a cylinder's triangle, and its pivots in the frames of the parent and of the moved body [m].
-
-    `data` has all joints of the arm at 0. A cylinder whose triangle is given has no pivots.
-
-    Raises:
-        ValueError: pivots that are not stated, or that make no triangle.
-    """
-    if settings.triangle is not None:
-        return settings.triangle, None
-    if settings.pivots is not None:
-        ends = np.array([settings.pivots.parent, settings.pivots.child])
-    else:
-        try:
-            ends = np.array([data.site(f"{joint}_pivot_{end}").xpos for end in ("parent", "child")])
-        except KeyError as error:
-            name = str(error).split("'")[1]
-            raise ValueError(f"the model has no site {name}; add it, or give pivots") from None
-    axis, child = data.joint(joint), int(data.model.joint(joint).bodyid[0])
-    bodies = int(data.model.body_parentid[child]), child
-    local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
-    parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    return _triangle(ends - axis.xanchor, axis.xaxis), (parent, moved)
-
-
 def make_cylinder(
-    settings: Cylinder,
-    sides: Triangle,
-    limits: tuple[float, float],
-    pivots: tuple[Vector, Vector] | None = None,
+    settings: Cylinder, limits: tuple[float, float], data: "mujoco.MjData | None" = None, joint: str = ""
 ) -> LinearActuator:
     """Return a cylinder that moves its joint through a range [deg].
 
+    `data` has all joints of the arm at 0; a cylinder whose triangle is given needs none.
+
     Raises:
-        ValueError: a dead centre in the range, a linkage that does not reach, or a stroke that is too short.
+        ValueError: pivots that are not stated or make no triangle, a dead centre in the range, a linkage that
+            does not reach, or a stroke that is too short.
     """
+    sides, pivots = settings.triangle, None
+    if sides is None:
+        sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.model_copy(update={"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
     angles = np.radians(np.linspace(*limits, 181))
@@ -245,6 +221,23 @@ def make_cylinder(
     if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
         raise ValueError(f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm")
     return replace(cylinder, stroke=stroke)
+
+
+def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:
+    """The triangle of a cylinder's pivots, and these in the frames of parent and moved body [m]."""
+    if given is not None:
+        ends = np.array([given.parent, given.child])
+    else:
+        try:
+            ends = np.array([data.site(f"{joint}_pivot_{end}").xpos for end in ("parent", "child")])
+        except KeyError as error:
+            name = str(error).split("'")[1]
+            raise ValueError(f"the model has no site {name}; add it, or give pivots") from None
+    at, child = data.joint(joint), int(data.model.joint(joint).bodyid[0])
+    bodies = int(data.model.body_parentid[child]), child
+    local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
+    parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
+    return _triangle(ends - at.xanchor, at.xaxis), (parent, moved)
 
 
 def _triangle(ends: Array, axis: Array) -> Triangle:

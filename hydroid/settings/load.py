@@ -61,9 +61,12 @@ def _with_tuples(values: Any) -> Any:
 
 def _number_of(key: Any, info: ValidationInfo) -> Any:
     """Take a joint's name, or its number as text, as JSON and `--set` spell it, for its number from 1."""
-    names = (info.context or {}).get("joints", ())
-    if not isinstance(key, str) or (key.isascii() and key.isdecimal()):
-        return int(key) if isinstance(key, str) else key
+    if not isinstance(key, str):
+        return key
+    if key.isascii() and key.isdecimal():
+        return int(key)
+    arm = (info.context or {}).get("arm")
+    names = arm.joint_names if arm else ()
     if key in names:
         return names.index(key) + 1
     raise ValueError(f"no joint {key!r}" + (f"; the arm's joints: {', '.join(names)}" if names else ""))

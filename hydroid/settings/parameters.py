@@ -19,9 +19,7 @@ SMALLEST = 0.01
 """part of the nominal value below which a quantity that must be above 0 is not searched by default"""
 
 
-def expanded(
-    parameters: Mapping[str, Any], compared: Any, joints: tuple[str, ...] = (), links: tuple[str, ...] = ()
-) -> dict[str, Any]:
+def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> dict[str, Any]:
     """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
 
     `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
@@ -40,20 +38,23 @@ def expanded(
             what = "link or each: links" if mass else "joints that share it or each: joints"
             raise ValueError(f"{name}: give {what} that have their own, not both")
         shared = {key: value for key, value in entry.items() if key != "each"}
-        chosen = (links if mass else compared) if each is True else each
-        allowed = str if mass else int | str
-        if not isinstance(chosen, list | tuple) or not all(isinstance(c, allowed) for c in chosen):
+        every = [*arm.link_names] if mass and arm else compared
+        chosen = every if each is True else each
+        if not isinstance(chosen, list | tuple) or not all(
+            isinstance(c, str if mass else int | str) for c in chosen
+        ):
             result[name] = entry  # refused as any other wrong value
             continue
-        numbers = [joints.index(c) + 1 if not mass and c in joints else c for c in chosen]
-        if len(numbers) == 1 and not mass:
+        joints = arm.joint_names if arm and not mass and not all(isinstance(c, int) for c in chosen) else ()
+        places = [joints.index(c) + 1 if c in joints else c for c in chosen]
+        if len(places) == 1 and not mass:
             everywhere = each is True and entry.get("quantity") in MECHANICAL
-            result[name] = shared | ({} if everywhere else {"joints": tuple(numbers)})
+            result[name] = shared | ({} if everywhere else {"joints": tuple(places)})
             continue
-        for number in numbers:
-            own = f"{name}_{number}"
+        for place in places:
+            own = f"{name}_{place}"
             changes = result.get(own, parameters.get(own, {}))
-            result[own] = {**shared, **({"link": number} if mass else {"joints": (number,)}), **changes}
+            result[own] = {**shared, **({"link": place} if mass else {"joints": (place,)}), **changes}
     return result
 
 

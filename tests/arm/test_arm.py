@@ -180,7 +180,7 @@ WRONG = [
 def test_an_arm_that_hydroid_cannot_simulate_is_refused_in_one_line(tmp_path, change, settings, message):
     assert change[0] in BOOM
     with pytest.raises(HydroidError, match=message) as caught:
-        write_arm(tmp_path, BOOM.replace(*change), **settings)
+        assert write_arm(tmp_path, BOOM.replace(*change), **settings).joints
     assert str(caught.value).startswith(str(tmp_path))
     assert "\n" not in str(caught.value)
 
@@ -188,4 +188,4 @@ def test_an_arm_that_hydroid_cannot_simulate_is_refused_in_one_line(tmp_path, ch
 def test_a_model_that_is_not_there_is_answered_with_the_way_to_one(tmp_path):
     (tmp_path / "arm.yaml").write_text("model: none.xml")
     with pytest.raises(HydroidError, match=r"none\.xml: no such model; .*hydroid init"):
-        load_arm(tmp_path / "arm.yaml")
+        assert load_arm(tmp_path / "arm.yaml").joints

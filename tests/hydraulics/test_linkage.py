@@ -21,8 +21,10 @@ def with_cylinder(arm: Arm, **changes) -> Arm:
     cylinder, limits = joint.actuator, changes.pop("range", joint.range)
     changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
     settings = cylinder.settings.model_copy(update=changes)
-    moved = replace(joint, range=limits, actuator=make_cylinder(settings, settings.triangle, limits))
-    return replace(arm, joints=(*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :]))
+    moved = replace(joint, range=limits, actuator=make_cylinder(settings, limits))
+    other = replace(arm)
+    vars(other)["joints"] = (*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :])
+    return other
 
 
 def mirrored(arm: Arm) -> Arm:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hydroid.commands.inputs import as_list, load_settings
-from hydroid.commands.logs import joint_ranges
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
 
@@ -32,15 +31,19 @@ class LogCheck(NamedTuple):
     findings: "Sequence[LogFinding]"
     moved_deg: Mapping[int, float]
 
+    @property
+    def driven(self) -> list[int]:
+        """Joints with a command, numbered from 1."""
+        return [] if self.log is None else (np.flatnonzero(self.log.driven) + 1).tolist()
+
     def plain(self) -> dict[str, Any]:
         """Return what JSON holds."""
-        log = self.log
         return {
             "log": str(self.path),
-            "usable": log is not None,
-            "samples": log and len(log.time),
-            "duration_s": log and float(log.duration),
-            "driven_joints": [] if log is None else (np.flatnonzero(log.driven) + 1).tolist(),
+            "usable": self.log is not None,
+            "samples": self.log and len(self.log.time),
+            "duration_s": self.log and float(self.log.duration),
+            "driven_joints": self.driven,
             "moved_deg": {str(joint): deg for joint, deg in self.moved_deg.items()},
             "findings": plain_findings(self.findings),
         }
@@ -73,29 +76,25 @@ def check(
     settings = load_settings(config, set)
     from hydroid.log import check_log, driven_joints, grouped, motion_findings, survey
 
-    found: list[LogCheck] = []
+    outputs, checks = settings.outputs, list[LogCheck]()
     for path in map(Path, as_list(logs)):
-        log, findings = check_log(
-            path, settings.log, joint_ranges(settings), outputs=settings.outputs, repair=repair
-        )
-        joints = driven_joints(log) if log else {}
-        more = motion_findings(log) if log else []
-        moved = {joint: motion.travel for joint, motion in joints.items()}
-        found.append(LogCheck(path, log, [*findings, *more], moved))
-    together = survey([one.log for one in found if one.log])
-    every = [*(finding for one in found for finding in one.findings), *together]
-    every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
-    lines = [f"{level}: {line}" for level, line in grouped(every)]
-    contents = [one.plain() for one in found]
-    for one in contents:
-        if one["usable"]:
-            driven = ", ".join(map(str, one["driven_joints"])) or "none"
-            moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in one["moved_deg"].items())
-            size = f"{one['samples']} samples, {one['duration_s']:.2f} s"
-            lines.append(f"{one['log']}: {size}, driven joints: {driven}" + (moved and f"; moved: {moved}"))
-    content = {"logs": contents, "findings": plain_findings(together)}
-    status = 0 if all(one.log for one in found) else 2
-    return Result(lines, content, Checked(found, together), exit_status=status)
+        log, faults = check_log(path, settings.log, settings.arm.ranges, outputs=outputs, repair=repair)
+        moved = {joint: motion.travel for joint, motion in (driven_joints(log) if log else {}).items()}
+        checks.append(LogCheck(path, log, [*faults, *(motion_findings(log) if log else ())], moved))
+    usable = [(one, one.log) for one in checks if one.log]
+    together = survey([log for _, log in usable])
+    findings = [*(finding for one in checks for finding in one.findings), *together]
+    findings.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
+    lines = [f"{level}: {line}" for level, line in grouped(findings)]
+    for one, log in usable:
+        driven = ", ".join(map(str, one.driven)) or "none"
+        moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in one.moved_deg.items())
+        size = f"{len(log.time)} samples, {log.duration:.2f} s"
+        lines.append(f"{one.path}: {size}, driven joints: {driven}" + (moved and f"; moved: {moved}"))
+    content = {"logs": [one.plain() for one in checks], "findings": plain_findings(together)}
+    return Result(
+        lines, content, Checked(checks, together), exit_status=0 if len(usable) == len(checks) else 2
+    )
 
 
 def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:

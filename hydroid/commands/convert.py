@@ -9,7 +9,6 @@ import numpy as np
 
 from hydroid.commands.check import plain_findings
 from hydroid.commands.inputs import load_settings, refuse_overwriting, setting_changes
-from hydroid.commands.logs import joint_ranges
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
@@ -18,10 +17,7 @@ from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ConfigSource, SettingChanges, Source
-    from hydroid.log import ColumnGuess, Log, Table
-
-MOST_JOINTS = 12
-"""of a log whose columns are guessed"""
+    from hydroid.log import ColumnGuess, Log
 
 
 class Converted(NamedTuple):
@@ -60,36 +56,42 @@ def convert(
         SettingsError: `out` would overwrite the log, or a change that is not allowed.
         RunError: `out` cannot be written.
     """
-    from hydroid.log import open_table, read_log, write_log
+    from hydroid.log import read_log, write_log
 
     path, target, changes = Path(log), Path(out), setting_changes(set)
     refuse_overwriting(path, target)
-    settings = None if config is None else load_settings(config, changes)
-    layout, guess, lines = settings.log if settings else LogSettings(), None, list[str]()
-    table = open_table(path, layout)
-    usual = all(layout.columns(kind, 1) == LogSettings().columns(kind, 1) for kind in ("command", "angle"))
-    if settings is None or (usual and not layout.joints and layout.time.column not in table.names):
-        joints = settings.arm.joint_names if settings else None
-        guess, layout = _guessed(table, joints, {} if settings else changes)
-        lines = _guess_lines(guess)
-    unlimited = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
-    read, findings = read_log(path, layout, joint_ranges(settings) if settings else unlimited, repair=repair)
+    guess = None
+    if config is not None:
+        settings = load_settings(config, changes)
+        layout, ranges = settings.log, settings.arm.ranges
+    else:
+        guess, layout = _guessed(path, changes)
+        ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
+    read, findings = read_log(path, layout, ranges, repair=repair)
     write_log(target, read, _plain_layout(read), exact=True)
-    lines += [f"{finding.level}: {finding}" for finding in findings]
+    lines = [
+        *(_guess_lines(guess) if guess else ()),
+        *(f"{finding.level}: {finding}" for finding in findings),
+    ]
     size = f"{len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
-    content = {"out": str(out), "samples": len(read.time)}
-    content |= {"duration_s": read.duration, "period_s": read.period, "findings": plain_findings(findings)}
-    content |= {"log": guess and guess.log, "reasons": [*guess.reasons] if guess else []}
+    content = {
+        "out": str(out),
+        "samples": len(read.time),
+        "duration_s": read.duration,
+        "period_s": read.period,
+        "findings": plain_findings(findings),
+        "log": guess and guess.log,
+        "reasons": [*guess.reasons] if guess else [],
+    }
     return Result([*lines, f"{out}: {size}"], content, Converted(replace(read, source=str(out)), guess))
 
 
-def _guessed(
-    table: "Table", joints: "tuple[str, ...] | None", changes: Mapping[str, Any]
-) -> "tuple[ColumnGuess, LogSettings]":
-    """Guess the columns of a table by the names of the joints, and correct the guess by `changes`."""
-    from hydroid.log import guess_columns
+def _guessed(path: Path, changes: Mapping[str, Any]) -> "tuple[ColumnGuess, LogSettings]":
+    """Guess the columns of a log, and correct the guess by `changes`."""
+    from hydroid.log import guess_columns, open_table
 
-    guess = guess_columns(table, joints or [f"joint{number}" for number in range(1, MOST_JOINTS + 1)])
+    # more joints than an arm has
+    guess = guess_columns(open_table(path, LogSettings()), [f"joint{number}" for number in range(1, 13)])
     section = {"log": guess.log | {"joints": {str(n): {**own} for n, own in guess.log["joints"].items()}}}
     for key, value in changes.items():
         if not key.startswith("log."):

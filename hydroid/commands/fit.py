@@ -1,9 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import logging
-import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +16,6 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
     from hydroid.fitting.fit import Fit, Watcher
-    from hydroid.log import LogFinding
     from hydroid.problem.problem import Problem, Spread
     from hydroid.run.folder import RunFolder
 
@@ -52,7 +49,6 @@ def fit(
     resume: bool = False,
     progress: "Watcher | None" = None,
     workers: "Spread | None" = None,
-    findings: "Sequence[LogFinding]" = (),
 ) -> FitResult:
     """Fit parameters to logs.
 
@@ -67,7 +63,6 @@ def fit(
         resume: continue the run in `out`, or begin it.
         progress: is called after every generation and during the refinement.
         workers: where candidates are simulated (`open_workers`); None: in this process.
-        findings: what reading the logs found, for `run.log`.
 
     Raises:
         SettingsError: settings that do not fit the logs or the arm.
@@ -82,7 +77,6 @@ def fit(
     from hydroid.fitting.search import check_search
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
-    from hydroid.run.run_log import log_start
 
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
@@ -92,7 +86,6 @@ def fit(
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)
     with folder.owned():
-        log_start(settings, read, findings)
         began = time.monotonic()
         try:
             result = _fit_in(folder, problem, progress)
@@ -103,10 +96,7 @@ def fit(
         except Exception as error:
             _log.error("ended by %s: %s", type(error).__name__, error)
             raise
-        simulated, diverged = map(int, result.fit.history[-1, 2:4])
-        rms = math.degrees(result.fit.best.rms)
-        _log.info("search: %d parameter sets simulated, %d of them diverged", simulated, diverged)
-        _log.info("done in %.0f s: %s, rms error %.6g deg", time.monotonic() - began, result.fit.final, rms)
+        _log.info("done in %.0f s", time.monotonic() - began)
     return result
 
 
@@ -115,8 +105,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.fit_report import fit_lines
     from hydroid.reporting.parameters_report import parameter_table
 
-    summary = summarise(problem, fit)
-    settings = problem.settings.of_estimate(fit.final)
+    summary, settings = summarise(problem, fit), problem.settings.of_estimate(fit.final)
     model = IdentifiedModel(settings, fit.best.theta, str(folder or "the fit"), summary)
     report = [str(folder / "report.html")] if folder else []
     lines = [parameter_table(settings, summary), *fit_lines(summary), *report]
@@ -130,7 +119,9 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.reporting.drawing import draw
     from hydroid.run.record import fit_result, save_result
+    from hydroid.run.run_log import log_start
 
+    log_start(problem.settings, problem.logs)
     checkpoints = folder.begin_or_continue(problem.settings, problem.logs)
     fit = run_fit(problem, progress, checkpoints)
     result = _result(problem, fit, folder.path)

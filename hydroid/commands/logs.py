@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 
-def read_logs(logs: "LogSources", settings: FitSettings, *, repair: bool = False) -> "list[Log]":
+def read_logs(
+    logs: "LogSources", settings: FitSettings, *, repair: bool = False, angles: bool = True
+) -> "list[Log]":
     """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
 
         logs = hydroid.read_logs(["a.csv", "b.csv"], hydroid.load_settings("fit-mech"))
@@ -34,36 +36,27 @@ def read_logs(logs: "LogSources", settings: FitSettings, *, repair: bool = False
         logs: files, or logs that were read before; one or several.
         settings: of the fit; joints that a log does not measure stand in its `start_pose`.
         repair: fill holes up to `log.repair_s`.
+        angles: whether the compared joints must be measured.
 
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
-    return read_with_findings(logs, settings, repair=repair)[0]
-
-
-def read_with_findings(
-    logs: "LogSources", settings: FitSettings, *, repair: bool = False, commands: bool = False
-) -> "tuple[list[Log], list[LogFinding]]":
-    """Do as `read_logs`, and return the warnings and notes too; logs of `commands` need no angles."""
     from hydroid.log import Log, grouped, read_log
 
     read: list[Log] = []
     findings: list[LogFinding] = []
-    outputs = () if commands else settings.outputs
+    needed = {"outputs": settings.outputs if angles else (), "angles_required": angles}
     for source in as_list(logs):
         if isinstance(source, Log):
             read.append(source)
             continue
-        ranges = joint_ranges(settings)
-        log, more = read_log(
-            Path(source), settings.log, ranges, outputs=outputs, angles_required=not commands, repair=repair
-        )
+        log, more = read_log(Path(source), settings.log, settings.arm.ranges, **needed, repair=repair)
         findings += more
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
     for level, line in grouped(findings):
         _log.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
-    return read, findings
+    return read
 
 
 def read_arms(
@@ -75,7 +68,7 @@ def read_arms(
     angles: bool = False,
     repair: bool = False,
 ) -> "dict[str, Log]":
-    """Read commands of an arm, or of the arms of a pair that move.
+    """Read commands of an arm, or of the arms of a pair that move; return logs by the arm's name.
 
     Args:
         log: a file or a log. Columns that begin with `right_` and `left_` are those of the two arms. Without
@@ -85,9 +78,6 @@ def read_arms(
         pose: pose of the arm's file in which the arms stand; None: as logged.
         angles: read joint angles over time instead.
         repair: fill holes up to `log.repair_s`.
-
-    Returns:
-        Logs by the arm's name: right, left, or alone.
 
     Raises:
         LogError: a fault that keeps the log from being used.
@@ -101,16 +91,14 @@ def read_arms(
         raise SettingsError(f"{arm!r} is no arm of a pair", where="--arm", hint=hint)
     moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
     columns = settings.log.angles_only() if angles else settings.log
-    layouts, prefixes = {moving[0]: columns}, tuple(f"{side}_" for side in SIDES)
     names = open_table(Path(log), settings.log).names if isinstance(log, str | Path) and arm else ()
-    if any(name.startswith(prefixes) for name in names):
-        layouts = {side: columns.of_arm(side) for side in moving}
-    stand = None if pose is None else settings.arm.pose(pose)
+    apart = any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names)
     logs: dict[str, Log] = {}
-    for side, layout in layouts.items():
-        own = settings.model_copy(update={"log": layout} | ({"outputs": ()} if angles else {}))
-        ((one,), _) = read_with_findings(log, own, repair=repair, commands=not angles)
-        logs[side] = one if stand is None else replace(one, angle=np.zeros_like(one.angle) + stand)
+    for side in moving if apart else moving[:1]:
+        layout = {"log": columns.of_arm(side) if apart else columns} | ({"outputs": ()} if angles else {})
+        (one,) = read_logs(log, settings.model_copy(update=layout), repair=repair, angles=angles)
+        stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)
+        logs[side] = replace(one, angle=stand)
     return {side: logs.get(side, logs[moving[0]]) for side in moving}
 
 
@@ -146,8 +134,3 @@ def problem_of(model: IdentifiedModel, logs: "LogSources", *, repair: bool = Fal
     if not np.isfinite(problem.residuals(model.theta[None])).all():
         raise RunError("the simulation diverged with these parameters", where=model.source)
     return problem
-
-
-def joint_ranges(settings: FitSettings) -> np.ndarray:
-    """Return the ranges of the arm's joints [rad], shape (J, 2)."""
-    return np.stack([settings.arm.lower, settings.arm.upper], axis=1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from hydroid.commands.fit import FitResult, fit
 from hydroid.commands.inputs import as_list, setting_changes
-from hydroid.commands.logs import read_with_findings, run_logs
+from hydroid.commands.logs import read_logs, run_logs
 from hydroid.commands.options import command, taking
 from hydroid.commands.progress import FitProgress
 from hydroid.commands.result import Printed, written
@@ -182,18 +182,18 @@ def _fit(options: FitOptions) -> FitRuns:
     """Fit over one seed or several."""
     settings = options.settings() if options.logs else options.stored()
     logs, out, runs = options.logs or run_logs(options.out or ""), options.out, options.runs
-    read, findings = read_with_findings(logs, settings, repair=options.repair)
+    read = read_logs(logs, settings, repair=options.repair)
     if str(out) == NAMED:
         out = f"runs/{Path(read[0].source).stem}-{settings.stage}-{settings.search.name}"
     results: list[FitResult] = []
     with options.workers() as workers:
-        how: Any = {"resume": options.resume, "workers": workers, "findings": findings}
         for seed in range(settings.search.seed, settings.search.seed + runs):
             search = settings.search.model_copy(update={"seed": seed})
             seeded = settings.model_copy(update={"search": search})
             name, folder = ("", out) if runs == 1 else (f"seed {seed}", out and Path(out) / f"seed-{seed}")
             with FitProgress(seeded, name) as watcher:
-                results.append(fit(seeded, read, folder, progress=watcher, **how))
+                done = fit(seeded, read, folder, resume=options.resume, progress=watcher, workers=workers)
+                results.append(done)
     first, several = results[0], tuple(results)
     if runs == 1:
         return FitRuns(first.lines, first.content, several)

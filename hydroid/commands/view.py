@@ -70,20 +70,18 @@ def view(
             hint = f"name a log, or leave out --fit {fit}"
             raise SettingsError("is a run itself", where=str(source), hint=hint)
         fit, log = source, None if actuator else run_logs(source)[0]
+    wanting = {"--collisions": collisions, "--arm": arm, "--out": out and not actuator}
+    if log is None and (where := next((name for name, given in wanting.items() if given), None)):
+        raise SettingsError("needs a log or a run", where=where, hint="name the log")
     if collisions:
-        if log is None:
-            raise SettingsError("needs a log or a run", where="--collisions", hint="name the log")
         known = open_model(fit, config, set, nominal=True).settings if fit else None
         settings = known or load_settings(config or "fit-hyd", set)
-        return _collisions(read_arms(log, settings, arm, angles=True, repair=repair), settings, out)
+        return _collisions(read_arms(log or "", settings, arm, angles=True, repair=repair), settings, out)
     if out is not None:
         choose_platform()
     model = open_model(fit, config, set, nominal=True)
     if actuator is not None:
         return _actuator(model, actuator, Path(out or "runs/actuator"))
-    if log is None and (arm is not None or out is not None):
-        where = "--arm" if arm is not None else "--out"
-        raise SettingsError("needs a log or a run: sliders are those of one arm", where=where)
     logs = None if log is None else read_arms(log, model.settings, arm, pose=pose, repair=repair)
     from hydroid.viewer.motion import simulated_motion
 
@@ -113,15 +111,10 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | 
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
     page, nearest = collision_page(result, machine.arm.name), result.smallest
+    keys = ("from_s", "to_s", "depth_m", "deepest_at_s")
     meetings = [
-        {
-            "bodies": [meeting.first, meeting.second],
-            "from_s": meeting.begins,
-            "to_s": meeting.ends,
-            "depth_m": meeting.depth,
-            "deepest_at_s": meeting.deepest,
-        }
-        for meeting in result.meetings
+        {"bodies": [m.first, m.second]} | dict(zip(keys, (m.begins, m.ends, m.depth, m.deepest), strict=True))
+        for m in result.meetings
     ]
     content = {
         "free": not meetings,

@@ -12,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from hydroid.errors import RunError
-from hydroid.log import Log, LogFinding
+from hydroid.log import Log
 from hydroid.progress import logging_to
 from hydroid.settings.fit import FitSettings
 
@@ -36,7 +36,7 @@ def run_log(file: Path) -> Generator[None]:
         yield
 
 
-def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[LogFinding]) -> None:
+def log_start(settings: FitSettings, logs: Sequence[Log]) -> None:
     """Log what runs, where, with what."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("hydroid", "mujoco", "numpy", "numba"))
     _log.info("%s, Python %s", versions, platform.python_version())
@@ -44,8 +44,6 @@ def log_start(settings: FitSettings, logs: Sequence[Log], findings: Sequence[Log
     search = f"search {settings.search.name}, seed {settings.search.seed}"
     _log.info("stage %s, %s; settings in config.yaml", settings.stage, search)
     _log.info("logs: %s", ", ".join(log.source for log in logs))
-    for finding in findings:
-        _log.info("%s: %s", finding.level, finding)
 
 
 class _File(logging.FileHandler):

@@ -167,14 +167,20 @@ class Arm:
         return np.array([*self.mass_of.values()])
 
     @property
+    def ranges(self) -> NDArray[np.float64]:
+        """Lower and upper joint stops [rad], shape (J, 2); infinite where there is none."""
+        free = (-np.inf, np.inf)
+        return np.radians([free if joint.continuous else joint.range for joint in self.joints])
+
+    @property
     def lower(self) -> NDArray[np.float64]:
-        """Lower joint stops [rad], shape (J,); -inf where there is none."""
-        return np.radians([-np.inf if joint.continuous else joint.range[0] for joint in self.joints])
+        """Lower joint stops [rad], shape (J,)."""
+        return self.ranges[:, 0]
 
     @property
     def upper(self) -> NDArray[np.float64]:
-        """Upper joint stops [rad], shape (J,); inf where there is none."""
-        return np.radians([np.inf if joint.continuous else joint.range[1] for joint in self.joints])
+        """Upper joint stops [rad], shape (J,)."""
+        return self.ranges[:, 1]
 
     def pose(self, name: str) -> NDArray[np.float64]:
         """Return a named pose [rad], shape (J,).

@@ -34,7 +34,7 @@ def report(
     Example: hydroid report runs/mech runs/hyd
 
         hydroid.report(["runs/mech", "runs/hyd"], out="runs/report")
-        print(hydroid.report("runs/array/seed-*", merge=True).result.best.path)
+        print(hydroid.report("runs/array/seed-*", merge=True).result.best.folder)
 
     Args:
         runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
@@ -59,11 +59,11 @@ def report(
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
     page, best = spread_page(collected), collected.best
     table = page.tables["spread"]
-    line = f"smallest error: {best.path} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
+    line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
     content = {
         "out": str(out),
-        "best": str(best.path),
-        "runs": {str(run.path): {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected.runs},
+        "best": best.folder,
+        "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected.runs},
         "parameters": rows(table, *SPREAD),
     }
     return Result([table, line, *written(page, out)], content, collected, page)

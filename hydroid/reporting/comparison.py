@@ -119,7 +119,7 @@ def runs_table(runs: Runs) -> Table:
     """Return one row per run, the smallest output error first."""
     values = tuple(f"{p.name} [{p.unit}]" for p in runs.parameters.parameters)
     rows = [
-        (str(run.path), run.seed, run.rms_deg, *theta.tolist())
+        (run.folder, run.seed, run.rms_deg, *theta.tolist())
         for run, theta in zip(runs.runs, runs.theta, strict=True)
     ]
     header = ("run", "seed", "rms output error [deg]", *values)

@@ -48,13 +48,13 @@ class CheckpointFile(UserDict[str, Arrays]):
         """Read a file; where it is damaged, the one before it."""
         try:
             content = unpack(file)
-        except Exception as error:  # a damaged zip fails in many ways; all mean the same to the user
-            damage = f"is damaged ({type(error).__name__})"
+        except (ValueError, OSError) as error:
             if not before:
                 hint = "remove the run's checkpoints to begin again from the seed"
-                raise RunError(damage, where=str(file), hint=hint) from None
+                what = f"is damaged ({type(error).__name__})"
+                raise RunError(what, where=str(file), hint=hint) from None
             earlier = self._read(*before)
-            _log.warning("%s: %s; going on from the checkpoint before it", file, damage)
+            _log.warning("%s: is damaged; going on from the checkpoint before it", file)
             file.replace(file.with_suffix(f".damaged{file.suffix}"))
             return earlier
         if content["run"] != self._run:

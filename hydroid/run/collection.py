@@ -3,46 +3,27 @@
 import glob
 import logging
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hydroid.errors import HydroidError, RunError
-from hydroid.estimate import NAME, FitSummary
 from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import difference
+from hydroid.run.record import Record, load_record
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.load import load
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A finished run: its folder, what it was made of, its summary, and the final estimate, shape (P,)."""
-
-    path: Path
-    identity: Mapping[str, Any]
-    settings: FitSettings
-    summary: FitSummary
-    theta: Array
-    rms_deg: float
-
-    @property
-    def seed(self) -> int:
-        """Of the search."""
-        return self.settings.search.seed
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
     """Runs that differ in their seeds only, in the order of these."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[Record, ...]
 
     @property
     def settings(self) -> FitSettings:
@@ -57,10 +38,10 @@ class Runs:
     @property
     def theta(self) -> Array:
         """The final estimates, shape (N, P)."""
-        return np.array([run.theta for run in self.runs])
+        return np.array([self.parameters.vector(run.summary.values, run.folder) for run in self.runs])
 
     @property
-    def best(self) -> Run:
+    def best(self) -> Record:
         """The run with the smallest rms output error."""
         return min(self.runs, key=lambda run: run.rms_deg)
 
@@ -77,8 +58,10 @@ def read_runs(names: Sequence[str], out: Path) -> Runs:
     """
     if RunFolder(out).exists:
         raise RunError("is a run itself", where=str(out), hint="name another folder")
-    runs: list[Run] = []
-    for path in _folders(names):
+    runs: list[Record] = []
+    groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
+    paths = {Path(path).resolve(): path for group in groups for path in group}
+    for _, path in sorted(paths.items()):
         try:
             runs.append(_read(path))
         except HydroidError as error:
@@ -86,42 +69,31 @@ def read_runs(names: Sequence[str], out: Path) -> Runs:
     if not runs:
         hint = "resume those that were stopped"
         raise RunError("no finished run is there", where=" ".join(names), hint=hint)
-    first, *others = sorted(runs, key=lambda run: (run.seed, run.path))
+    first, *others = sorted(runs, key=lambda run: (run.seed, run.folder))
     once, differing = {first.seed: first}, 0
     for run in others:
-        other = (run.identity, run.settings), (first.identity, first.settings)
-        if text := difference(*other, but="search.seed"):
-            _log.warning("%s: %s", run.path, text)
+        if text := difference(run.identity, first.identity, but="search.seed"):
+            _log.warning("%s: %s", run.folder, text)
             differing += 1
         elif (kept := once.setdefault(run.seed, run)) is not run:
-            _log.warning("left out: %s: has seed %d, as %s has", run.path, run.seed, kept.path)
+            _log.warning("left out: %s: has seed %d, as %s has", run.folder, run.seed, kept.folder)
     if differing:
-        what = f"{differing} of {len(runs)} runs differ from {first.path} in more than the seed"
+        what = f"{differing} of {len(runs)} runs differ from {first.folder} in more than the seed"
         raise RunError(what, hint="collect them apart")
     return Runs(tuple(once.values()))
 
 
-def _folders(names: Sequence[str]) -> list[Path]:
-    """The folders that names and patterns stand for, each once; a name that stands for nothing stays."""
-    groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
-    paths = [Path(path) for group in groups for path in group]
-    return sorted({path.resolve(): path for path in reversed(paths)}.values())
-
-
-def _read(path: Path) -> Run:
+def _read(path: str) -> Record:
     """Read a finished run.
 
     Raises:
         HydroidError: it is not finished or is damaged.
     """
-    folder, file = RunFolder(path), path / NAME
-    identity = folder.identity()
-    if identity.get("status") != "done":
-        raise RunError(f"is not finished ({identity.get('status')})", where=str(path), hint="resume it")
+    folder = RunFolder(Path(path))
+    if (status := folder.identity().get("status")) != "done":
+        raise RunError(f"is not finished ({status})", where=path, hint="resume it")
     folder.refuse_changes()
-    settings, summary = folder.settings(), load(file, FitSummary)
-    final = summary.estimates.get(summary.final or "")
-    if final is None or final.rms_deg is None:
-        raise RunError("has no final estimate that could be simulated", where=str(file))
-    theta = settings.parameter_set().vector(final.values, str(file))
-    return Run(path, identity, settings, summary, theta, final.rms_deg)
+    record = load_record(path)
+    if record.summary.rms_deg is None:
+        raise RunError("has no final estimate that could be simulated", where=path)
+    return record

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hydroid.errors import RunError
-from hydroid.estimate import FitSummary, write_estimate
+from hydroid.estimate import NAME, FitSummary, write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.identified_model import CONFIG, MODEL, IdentifiedModel, write_settings
 from hydroid.log import Log
@@ -89,7 +87,7 @@ class RunFolder:
         then, now = self.identity(), identity(settings, logs)
         if settings.arm.model.resolve() == (self.path / MODEL).resolve():  # the run's own copy
             now["origin"] = then.get("origin")
-        if other := difference((then, self.settings()), (now, settings)):
+        if other := difference(then, now):
             hint = "continue it as it is with only --resume and --out, or choose another folder"
             raise RunError(f"the run here {other}", where=str(self.path), hint=hint)
 
@@ -134,10 +132,8 @@ class RunFolder:
     def write_estimate(self, log: Log, theta: Array, summary: FitSummary) -> None:
         """Write `estimate.yaml`, and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, summary)
-        settings = self.settings()
-        model = IdentifiedModel(settings, theta, str(self.path / "estimate.yaml"))
-        driven = {int(j) + 1 for j in np.flatnonzero(log.driven)} | set(settings.outputs)
-        plant = Plant(model, joints=sorted(driven), payload=settings.payloads.get(Path(log.source).name, 0.0))
+        model = IdentifiedModel(self.settings(), theta, str(self.path / NAME), summary)
+        plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")
 

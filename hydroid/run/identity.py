@@ -19,17 +19,17 @@ from hydroid.settings.fit import FitSettings
 
 DESCRIPTION = "run.json"
 """name of the file that describes the run: versions, seed, hashes of its logs and files, status, seconds"""
-ALGORITHMS = ("ga", "nsga2", "cmaes", "pymoo", "multistart")
 
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> dict[str, Any]:
-    """Return versions, seed, and hashes of the logs and of the arm's model."""
+    """Return versions, the settings that decide, and hashes of the logs and of the arm's model."""
     versions = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
     return versions | {
         "python": platform.python_version(),
         "seed": settings.search.seed,
         "logs": {log.source: log_hash(log) for log in logs},
         "origin": model_hash(settings.arm),
+        "settings": deciding(settings),
     }
 
 
@@ -38,44 +38,38 @@ def deciding(settings: FitSettings) -> dict[str, Any]:
 
     Without threads and unused searches, and without where the arm's files are.
     """
-    values = portable(settings)
+    values, search = portable(settings), settings.search.algorithm
     del values["simulation"]["threads"]
-    for name in ALGORITHMS:
-        if name != settings.search.algorithm:
-            del values["search"][name]
+    values["search"] = {n: v for n, v in values["search"].items() if n == search or not isinstance(v, dict)}
     return values | {"arm": settings.arm.file.model_dump(mode="json", exclude={"model", "pair"})}
 
 
-def difference(
-    run: tuple[Mapping[str, Any], FitSettings], other: tuple[Mapping[str, Any], FitSettings], but: str = ""
-) -> str:
+def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> str:
     """Say what makes a run another one, as "has search.seed = 1, not 2"; empty where nothing does.
 
-    Both are an identity with its settings. The setting `but` may differ.
+    Both are identities. The setting `but` may differ.
     """
-    (own, settings), (others, other_settings) = run, other
     for key in ("hydroid", "mujoco"):
-        if own.get(key) != others.get(key):
-            return f"was made by {key} {own.get(key)}, not {others.get(key)}"
-    if text := _other_logs(own.get("logs", {}), others.get("logs", {})):
+        if run.get(key) != other.get(key):
+            return f"was made by {key} {run.get(key)}, not {other.get(key)}"
+    if text := _other_logs(run.get("logs", {}), other.get("logs", {})):
         return f"has other logs: {text}"
-    values, other_values = _flat(deciding(settings)), _flat(deciding(other_settings))
-    for key in sorted(values.keys() | other_values.keys()):
-        if values.get(key) != other_values.get(key) and key != but:
-            return f"has {key} = {values.get(key)}, not {other_values.get(key)}"
-    return "" if own.get("origin") == others.get("origin") else "has another model of the arm"
+    values, others = _flat(run.get("settings")), _flat(other.get("settings"))
+    for key in sorted(values.keys() | others.keys()):
+        if values.get(key) != others.get(key) and key != but:
+            return f"has {key} = {values.get(key)}, not {others.get(key)}"
+    return "" if run.get("origin") == other.get("origin") else "has another model of the arm"
 
 
 def _other_logs(own: dict[str, str], others: dict[str, str]) -> str:
     """Say how the logs' contents differ, empty if they do not; the files may have moved."""
-    if list(own.values()) == list(others.values()):
-        return ""
     if len(own) != len(others):
         return f"{len(own)} of them, not {len(others)}"
-    if sorted(own.values()) == sorted(others.values()):
-        return f"their order is {', '.join(own)}"
-    a, b = next((a, b) for a, b in zip(own, others, strict=True) if own[a] != others[b])
-    return f"{b} is not its {a}, or the content has changed"
+    if differing := next(
+        (pair for pair in zip(own, others, strict=True) if own[pair[0]] != others[pair[1]]), None
+    ):
+        return f"{differing[1]} is not its {differing[0]}, or the content has changed"
+    return ""
 
 
 def was_fitted(run: Path, log: Log) -> bool | None:

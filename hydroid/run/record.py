@@ -6,6 +6,7 @@
 A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
 """
 
+import math
 import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.parameters import Array
 from hydroid.posterior.covariance import Uncertainty
+from hydroid.posterior.noise import Noise
+from hydroid.problem.channels import Channel
 from hydroid.problem.problem import Problem
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder
@@ -106,6 +109,16 @@ class Record:
     validations: Mapping[str, Prediction]
 
     @property
+    def seed(self) -> int:
+        """Of the search."""
+        return self.settings.search.seed
+
+    @property
+    def rms_deg(self) -> float:
+        """Error of the final estimate on its logs; infinite where it diverged."""
+        return math.inf if self.summary.rms_deg is None else self.summary.rms_deg
+
+    @property
     def given(self) -> str:
         """Its logs as a command takes them."""
         return " ".join(shlex.quote(p.log.source) for p in self.result.fitted)
@@ -132,25 +145,23 @@ def fit_result(problem: Problem, fit: Fit, advice: Advice | None) -> FitResult:
 
 def channel_noise(problem: Problem, known: Uncertainty) -> tuple[ChannelNoise, ...]:
     """Return the noise of every compared signal."""
-    rows: list[ChannelNoise] = []
-    for channel, noise in zip(problem.channels, known.noise, strict=True):
+
+    def row(channel: Channel, noise: Noise) -> ChannelNoise:
         angle = channel.quantity == "angle"
         factor = (np.degrees(1) if angle else 1e-5) / channel.weight
-        residual = factor * float(np.sqrt(np.mean(known.jacobian.residual[channel.rows] ** 2)))
-        rows.append(
-            ChannelNoise(
-                channel.log,
-                channel.joint,
-                channel.quantity.replace("_", " "),
-                "deg" if angle else "bar",
-                residual,
-                factor * noise.level,
-                noise.correlation_time * problem.logs[channel.log].period,
-                noise.effective_sample_size,
-                noise.source,
-            )
+        return ChannelNoise(
+            channel.log,
+            channel.joint,
+            channel.quantity.replace("_", " "),
+            "deg" if angle else "bar",
+            factor * float(np.sqrt(np.mean(known.jacobian.residual[channel.rows] ** 2))),
+            factor * noise.level,
+            noise.correlation_time * problem.logs[channel.log].period,
+            noise.effective_sample_size,
+            noise.source,
         )
-    return tuple(rows)
+
+    return tuple(map(row, problem.channels, known.noise))
 
 
 def save_result(folder: Path, result: FitResult) -> None:

@@ -92,7 +92,8 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
         settings = plain.model_copy(update=changes)
         shutil.rmtree("seed-3")
         RunFolder(tmp_path / "seed-3").begin(settings, read_logs([array[0] / name], settings))
-        shutil.copy(array[0] / "seed-3" / "estimate.yaml", "seed-3/estimate.yaml")
+        for file in ("estimate.yaml", "result.npz"):
+            shutil.copy(array[0] / "seed-3" / file, Path("seed-3") / file)
         RunFolder(tmp_path / "seed-3").status("done")
 
     def refused() -> str:

@@ -104,6 +104,29 @@ class CurveEstimate(Settings):
     """95 % interval at each point by itself"""
 
 
+class JointVerdict(Settings):
+    """What a fit is worth for one joint; rms errors over the logs that drive it [deg], null if diverged."""
+
+    joint: int
+    """numbered from 1"""
+    name: str
+    verdict: str
+    """predicts, predicts roughly, predicts no better than BASELINE, fits but does not predict, does not fit,
+    or not tested (`fitting.verdict` has the rules)"""
+    fitted_deg: float | None = None
+    """on the logs that it was fitted to"""
+    unseen_deg: float | None = None
+    """on logs that it was not fitted to; null: there are none"""
+    tolerance_deg: float
+    """error up to which it predicts"""
+    baselines_deg: dict[str, float] = Field(default_factory=dict[str, float])
+    """of the baselines on the unseen logs, or on the fitted logs where there are no others"""
+    horizons_deg: dict[str, tuple[float | None, ...]] = Field(
+        default_factory=dict[str, tuple[float | None, ...]]
+    )
+    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s there, of the fit and of the baselines"""
+
+
 def _finding(value: Any) -> Any:
     """Return a finding from a mapping: files have no dataclasses."""
     try:
@@ -137,6 +160,8 @@ class FitSummary(Settings):
     """simulations of the search that diverged"""
     findings: tuple[Annotated[Finding, BeforeValidator(_finding)], ...] = ()
     """what to know before using the estimate, the most important first; `hydroid.words` has the sentences"""
+    verdict: tuple[JointVerdict, ...] = ()
+    """of each compared joint on the fitted logs; the page of a run adds the unseen logs"""
     strained_priors: dict[str, float] = Field(default_factory=dict[str, float])
     """priors that the final estimate is far from: the distance in standard deviations, by name"""
     estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
@@ -224,6 +249,6 @@ def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:
     return values, None
 
 
-def finite(value: float) -> float | None:
+def finite(value: float | None) -> float | None:
     """Return a number, or None where it is infinite or NaN, which JSON has no word for."""
-    return float(value) if math.isfinite(value) else None
+    return None if value is None or not math.isfinite(value) else float(value)

@@ -86,10 +86,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
         "The limits were checked only in simulation, at the present estimate; the machine moves differently "
         "as far as it differs from the model. Watch the first run with a hand on the emergency stop.",
     ),
-    "fit it too": (
-        "Fit again with the new log beside the old ones.",
-        "The table predicts how precise it will be.",
-    ),
     # a profile
     "better optimum": (
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
@@ -114,16 +110,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
         "{0}: the joint is at its stop for {seconds:.2g} s, with an error of {rms:.2g}°.",
         "",
     ),
-    # a prediction
-    "error as expected": (
-        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°.",
-        "",
-    ),
-    "error not expected": (
-        "{0} on {1}: the error is {rms:.2g}°. The fit leads to expect {expected:.2g}°.",
-        "The model, not the noise, limits the prediction.",
-    ),
-    "error without band": ("{0} on {1}: the error is {rms:.2g}°. The fit has no band for it.", ""),
     "few logs disagree": (
         "The logs disagree about {few} by more than the noise explains.",
         "Add logs before you use these values: so few cannot tell why.",

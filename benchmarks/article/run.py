@@ -26,7 +26,7 @@ from statements import statements
 from studies import DETERMINED_AT_DEG, Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.reporting.study_report import runs_csv
+from hydroid.reporting.study_report import runs_table
 from hydroid.studies.execution import processes
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +42,7 @@ def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
         made = [plan.run(folder, executor) for plan in plans]
     for runs in made:
         if runs.rows:
-            (results / f"{runs.plan.name}_runs.csv").write_text(runs_csv(runs.rows), encoding="utf-8")
+            (results / f"{runs.plan.name}_runs.csv").write_text(runs_table(runs.rows).csv(), encoding="utf-8")
         for figure in runs.plan.study.figures:
             file = results / f"{figure.item.replace(' ', '_')}.svg"
             draw(runs, figure).savefig(file, metadata={"Date": None})

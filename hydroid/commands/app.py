@@ -34,7 +34,7 @@ GROUPS = {
     "Judge a fit": {
         "validate": "test fits on other logs",
         "analyse": "find what the logs determine, and what each parameter does",
-        "report": "draw reports anew, several side by side, or runs with different seeds as one",
+        "report": "draw reports anew, or merge runs with different seeds",
     },
     "Plan what to do next": {
         "suggest": "find what the model lacks, and what to do next",
@@ -50,7 +50,9 @@ PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_excepti
 PRINTING = {
     "json": typer.Option("--json", help="Print the result as JSON (docs/json.md)."),
     "quiet": typer.Option("-q", "--quiet", help="Print errors only."),
-    "verbose": typer.Option("-v", "--verbose", help="Also print the lines that go to run.log."),
+    "verbose": typer.Option(
+        "-v", "--verbose", help="Also print all tables, findings, and the lines that go to run.log."
+    ),
 }
 """options of every command on the command line"""
 
@@ -83,7 +85,7 @@ def click_command(command: str) -> "TyperCommand":
         with log_lines(verbose=verbose, quiet=quiet), shown(not (quiet or json)):
             result = function(**given)
         if json or not quiet:
-            show(result, as_json=json)
+            show(result, as_json=json, verbose=verbose)
         raise typer.Exit(result.exit_status)
 
     printing = [

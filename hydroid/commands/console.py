@@ -28,12 +28,12 @@ OPTIONS = {
 """settings that have an option of their own"""
 
 
-def show(result: "Printed", *, as_json: bool) -> None:
-    """Print a result: as JSON, or as tables and lines."""
+def show(result: "Printed", *, as_json: bool, verbose: bool = False) -> None:
+    """Print a result: as JSON, or as tables and lines, with its details if `verbose`."""
     if as_json:
         _print_json(result.plain())
         return
-    for line in result.lines:
+    for line in [*(result.details if verbose else ()), *result.lines]:
         if isinstance(line, str):
             typer.echo(line)
         else:

@@ -58,18 +58,17 @@ def design(
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
-    from hydroid.reporting.design_report import design_page
+    from hydroid.reporting.design_report import design_table
 
     settings, commands = model.settings, None if out is None else str(Path(out) / "commands.csv")
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    page = design_page(settings.arm, settings.design, result, model.values)
-    files = written(page, out)
+    precision = design_table(settings.design, result, model.values)
+    files = written({"design": precision}, out)
     if out is not None:
         write_log(Path(out) / "commands.csv", result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, str(commands))
-    precision = page.tables["design"]
     content = {"commands": commands, "precision": rows(precision, *PRECISION)}
-    return Result([precision, *files], content, result, page)
+    return Result([precision, *files], content, result)

@@ -1,6 +1,7 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
 import logging
+import shlex
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,10 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
     from hydroid.fitting.fit import Fit, Watcher
+    from hydroid.fitting.validation import Prediction
+    from hydroid.fitting.verdict import Baselines
     from hydroid.problem.problem import Problem, Spread
+    from hydroid.reporting.table import Table
     from hydroid.run.folder import RunFolder
 
 _log = logging.getLogger(__name__)
@@ -32,6 +36,8 @@ class FitResult(Printed):
         folder: the run folder; None where nothing was written.
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
         model: at the final estimate; every command takes it as `fit`.
+        predictions: what its estimates make of its logs.
+        baselines: fitted to the same logs, by joint and name.
     """
 
     problem: "Problem"
@@ -39,6 +45,8 @@ class FitResult(Printed):
     folder: Path | None
     summary: FitSummary
     model: IdentifiedModel
+    predictions: "tuple[Prediction, ...]"
+    baselines: "Baselines"
 
 
 def fit(
@@ -102,22 +110,37 @@ def fit(
 
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
-    from hydroid.reporting.fit_report import fit_lines
+    from hydroid.fitting.validation import fitted
+    from hydroid.fitting.verdict import baselines_of, judge
+    from hydroid.reporting.fit_report import next_step
     from hydroid.reporting.parameters_report import parameter_table
+    from hydroid.reporting.uncertainty_report import warnings
+    from hydroid.reporting.verdict_table import verdict_table
 
-    summary, settings = summarise(problem, fit), problem.settings.of_estimate(fit.final)
+    settings = problem.settings.of_estimate(fit.final)
+    predictions, baselines = fitted(problem.varied(settings), fit), baselines_of(settings, problem.logs)
+    verdict = judge(settings, predictions, baselines)
+    summary = summarise(problem, fit).model_copy(update={"verdict": verdict})
     model = IdentifiedModel(settings, fit.best.theta, str(folder or "the fit"), summary)
-    report = [str(folder / "report.html")] if folder else []
-    lines = [parameter_table(settings, summary), *fit_lines(summary), *report]
+    lines: list[Table | str] = [verdict_table({fit.final: verdict}), *warnings(summary)]
+    if folder is not None:
+        logs = " ".join(shlex.quote(log.source) for log in problem.logs)
+        lines += [
+            f"Next: {next_step(settings, logs, str(folder)).numbers['command']}",
+            str(folder / "report.html"),
+        ]
+    details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
-    return FitResult(lines, content, problem, fit, folder, summary, model)
+    return FitResult(
+        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
+    )
 
 
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.advice.proposals import advice
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.reporting.drawing import draw
+    from hydroid.reporting.fit_report import draw
     from hydroid.run.record import fit_result, save_result
     from hydroid.run.run_log import log_start
 
@@ -131,7 +154,7 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     if fit.best.usable:
         run = str(folder.path)
         advised = advice(last, fit.uncertainty, fit.quantities, run=run, thorough=False)
-    save_result(folder.path, fit_result(last, fit, advised))
-    draw([folder.path], folder.path)
+    save_result(folder.path, fit_result(fit, result.predictions, result.baselines, advised))
+    draw(folder.path)
     folder.status("done", seconds=dict(fit.seconds) | {"report": time.monotonic() - began})
     return result

@@ -25,15 +25,14 @@ def report(
     figures: bool = False,
     out: "Source" = "runs/report",
 ) -> "Result[Runs | None]":
-    """Draw the report of a finished run anew, or several side by side on one page.
+    """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
 
-    Nothing is simulated, and no log is needed: a run stores all that its report shows. With one folder, its
-    report is written again in place. With several, --out gets one page that compares errors, parameters, and
-    responses to the same logs.
+    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is written again
+    in its folder. `hydroid validate` compares several fits.
 
     Example: hydroid report runs/mech runs/hyd
 
-        hydroid.report(["runs/mech", "runs/hyd"], out="runs/report")
+        hydroid.report(["runs/mech", "runs/hyd"])
         print(hydroid.report("runs/array/seed-*", merge=True).result.best.folder)
 
     Args:
@@ -42,28 +41,27 @@ def report(
             estimates. Runs that are not finished or damaged are left out, with a warning.
         without (NAME): Leave out a validation of the run; repeat for several.
         figures: Also write every chart as PNG and SVG, to figures/.
-        out (DIR): Folder for the page of several.
+        out (DIR): Folder for the tables of --merge.
 
     Raises:
         RunError: a folder holds no finished run of this version, runs to be merged differ in more than their
             seeds, or the page cannot be written.
     """
     if not merge:
-        from hydroid.reporting.drawing import draw
+        from hydroid.reporting.fit_report import draw
 
-        file = str(draw(as_list(runs), out, without or (), figures=figures))
-        return Result([file], {"out": file}, None)
-    from hydroid.reporting.comparison import spread_page
+        files = [str(draw(run, without or (), figures=figures)) for run in as_list(runs)]
+        return Result(files, {"files": files}, None)
+    from hydroid.reporting.validation_report import merged_tables
     from hydroid.run.collection import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
-    page, best = spread_page(collected), collected.best
-    table = page.tables["spread"]
+    tables, best = merged_tables(collected), collected.best
     line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
     content = {
         "out": str(out),
         "best": best.folder,
         "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected.runs},
-        "parameters": rows(table, *SPREAD),
+        "parameters": rows(tables["spread"], *SPREAD),
     }
-    return Result([table, line, *written(page, out)], content, collected, page)
+    return Result([tables["spread"], line, *written(tables, out)], content, collected)

@@ -1,7 +1,7 @@
 """What a command returns: numbers that print themselves in a terminal, as JSON and in a notebook."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -20,10 +20,12 @@ class Printed:
     Attributes:
         lines: what a terminal and a notebook show: tables and sentences.
         content: what JSON holds (docs/json.md): mappings, lists, text and finite numbers.
+        details: further lines that -v adds.
     """
 
     lines: "Sequence[Table | str]"
     content: Mapping[str, Any]
+    details: "Sequence[Table | str]" = field(default=(), kw_only=True)
     exit_status = 0
 
     def plain(self) -> dict[str, Any]:
@@ -35,7 +37,7 @@ class Printed:
         return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
-        return "".join(_html(line) for line in self.lines)
+        return "".join(_html(line) for line in (*self.lines, *self.details))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,18 +55,18 @@ class Result(Printed, Generic[T_co]):
     exit_status: int = 0
 
 
-def written(page: "Page", out: str | Path | None) -> list[str]:
-    """Write a report to a folder, if there is one; return its file.
+def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> list[str]:
+    """Write a report, or tables by name, to a folder, if there is one; return the file that is written last.
 
     Raises:
         RunError: the folder cannot be written.
     """
     if out is None:
         return []
-    from hydroid.reporting.page_file import write_page
+    from hydroid.reporting.page_file import write_page, write_tables
 
-    write_page(page, Path(out))
-    return [str(Path(out) / f"{page.name}.html")]
+    write = write_tables if isinstance(report, Mapping) else write_page
+    return [str(write(report, Path(out))[-1])]  # pyright: ignore[reportArgumentType]
 
 
 def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:

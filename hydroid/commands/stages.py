@@ -196,12 +196,12 @@ def _fit(options: FitOptions) -> FitRuns:
                 results.append(done)
     first, several = results[0], tuple(results)
     if runs == 1:
-        return FitRuns(first.lines, first.content, several)
+        return FitRuns(first.lines, first.content, several, details=first.details)
     content = {"out": out and str(out), "runs": [result.plain() for result in results]}
     if out is None:
         return FitRuns(first.lines, content, several)
-    from hydroid.reporting.comparison import spread_page
+    from hydroid.reporting.validation_report import merged_tables
     from hydroid.run.collection import read_runs
 
-    page = spread_page(read_runs([str(result.folder) for result in results], Path(out)))
-    return FitRuns([page.tables["spread"], *written(page, out)], content, several)
+    tables = merged_tables(read_runs([str(result.folder) for result in results], Path(out)))
+    return FitRuns([tables["spread"], *written(tables, out)], content, several)

@@ -48,7 +48,7 @@ def study(
     load_study(path)  # a wrong file is refused before anything heavy is imported
     from hydroid.estimate import finite
     from hydroid.parallel.cluster import open_workers
-    from hydroid.reporting.study_report import study_page
+    from hydroid.reporting.study_report import cell_table, runs_table
     from hydroid.run.lock import locked
     from hydroid.studies.execution import processes as open_processes
     from hydroid.studies.study import run_study
@@ -62,12 +62,12 @@ def study(
             count = len(list(folder.glob("runs/*.json")))
             kept = f"{folder} holds {count} runs that have ended; the same command goes on"
             raise Stopped(kept) from None
-    page = study_page(path.stem, runs)
-    failed = sum(bool(row.failed) for row in runs.rows)
-    lines = [page.tables["cells"], *([f"{failed} runs failed"] if failed else []), *written(page, folder)]
+    cells, failed = cell_table(runs), [row for row in runs.rows if row.failed]
+    failures = [f"failed: {row.cell}, seed {row.seed}: {row.failed}" for row in failed]
+    lines = [cells, *failures, *written({"cells": cells, "runs": runs_table(runs.rows)}, folder)]
     each = [
         {"cell": row.cell, "seed": row.seed, "failed": row.failed or None}
         | {name: finite(value) for name, value in row.values.items()}
         for row in runs.rows
     ]
-    return Result(lines, {"out": str(folder), "runs": each}, runs, page)
+    return Result(lines, {"out": str(folder), "runs": each}, runs)

@@ -58,7 +58,7 @@ def suggest(
     page = suggestion_page(problem.settings, advised, log_names(problem.logs), model.name)
     lines: list[Table | str] = [page.tables["missing_terms"]]
     for section in page.sections:
-        points = [f"- {point}" for point in (*section.points, *(tab.note for tab in section.tabs)) if point]
+        points = [f"- {point}" for point in section.points]
         if section.text or points:
             lines += [section.title, *([section.text] if section.text else []), *points]
     return Result([*lines, *written(page, out)], advised.content, advised, page)

@@ -1,8 +1,9 @@
 """`hydroid validate`: fits on logs that they were not fitted to."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hydroid.commands.inputs import as_list, open_model
 from hydroid.commands.logs import read_logs
@@ -13,7 +14,11 @@ from hydroid.errors import SettingsError
 if TYPE_CHECKING:
     from hydroid.commands.inputs import ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
+    from hydroid.estimate import JointVerdict
     from hydroid.fitting.validation import Prediction
+    from hydroid.identified_model import IdentifiedModel
+    from hydroid.log import Log
+    from hydroid.reporting.page import Section
 
 
 @command
@@ -26,9 +31,10 @@ def validate(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
-    """Test fits on logs that they were not fitted to: error indices (article, table 9) and plots.
+    """Test fits on logs that they were not fitted to: a verdict on each joint beside simple models' errors.
 
-    Each fit reads the logs with its own settings. The report of each run shows its unseen logs too.
+    Each fit reads the logs with its own settings. The report of each run shows its unseen logs too. Error
+    indices (article, table 9) and responses stand on the page.
 
     Example: hydroid validate OTHER.csv --fit runs/mech --fit runs/hyd
 
@@ -49,23 +55,60 @@ def validate(
     if leave_one_out and len(models) > 1:
         raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
-    from hydroid.fitting.validation import predicted, without_one
-    from hydroid.reporting.comparison import validation_page
-    from hydroid.reporting.drawing import draw
-    from hydroid.run.identity import was_fitted
+    from hydroid.reporting.fit_report import draw
+    from hydroid.reporting.page import unique
+    from hydroid.reporting.validation_report import validation_page
+    from hydroid.reporting.verdict_table import ordered, verdict_table
     from hydroid.run.record import keep_validation
 
-    folds = [without_one(models[0], read[0], i) for i in range(len(read[0]))] if leave_one_out else []
-    by_model: list[list[Prediction]] = []
+    predicted, verdicts, more = dict[str, Any](), dict[str, Any](), list[Any]()
     for model, own in zip(models, read, strict=True):
-        seen = [was_fitted(Path(model.source).parent, log) for log in own]
-        unseen = [True if folds else None if fitted is None else not fitted for fitted in seen]
-        by_model.append(list(map(predicted, folds or [model] * len(own), own, unseen)))
-    results = [result for own in by_model for result in own]
-    page = validation_page(results, models[0].settings.arm, folds)
-    lines = [page.tables["errors"], *(f"- {warning}" for warning in page.warnings), *written(page, out)]
-    if out is not None and not folds:
-        for model, own in zip(models, by_model, strict=True):
-            if (run := keep_validation(model, own)) is not None:
-                draw([run], run)
-    return Result(lines, {"results": [row for result in results for row in result.plain()]}, results, page)
+        name = unique(model.name, predicted)
+        test = _left_out if leave_one_out else _predicted
+        predictions, verdicts[name] = test(model, own, more)
+        predicted[name] = [replace(one, fit=name) for one in predictions]
+        if out is not None and not leave_one_out and (run := keep_validation(model, predictions)):
+            draw(run)
+    fits, arm = ordered(verdicts), models[0].settings.arm
+    results = [one for name in fits for one in predicted[name]]
+    page = validation_page(results, fits, arm, *more)
+    content = {
+        "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
+        "results": [row for one in results for row in one.plain(arm.joint_names)],
+    }
+    lines = [verdict_table(fits), *written(page, out)]
+    return Result(lines, content, results, page, details=[page.tables["errors"]])
+
+
+def _predicted(
+    model: "IdentifiedModel", logs: "Sequence[Log]", more: "list[Section]"
+) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
+    """Return predictions of logs, and the verdict by those that the fit has not seen."""
+    from hydroid.fitting.validation import predicted
+    from hydroid.fitting.verdict import judge
+    from hydroid.run.identity import was_fitted
+    from hydroid.run.record import fitted_by
+
+    seen = [was_fitted(Path(model.source).parent, log) for log in logs]
+    predictions = [
+        predicted(model, log, None if s is None else not s) for log, s in zip(logs, seen, strict=True)
+    ]
+    unseen = [one for one in predictions if one.unseen is not False]
+    return predictions, judge(model.settings, *fitted_by(model), unseen)
+
+
+def _left_out(
+    model: "IdentifiedModel", logs: "Sequence[Log]", more: "list[Section]"
+) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
+    """Return the prediction of each log by a fit to the others, and the verdict; baselines know all logs."""
+    from hydroid.fitting.validation import predicted, without_one
+    from hydroid.fitting.verdict import baselines_of, judge
+    from hydroid.reporting.page import Section
+    from hydroid.reporting.validation_report import side_by_side
+
+    folds = [without_one(model, logs, i) for i in range(len(logs))]
+    table = side_by_side({fold.source: (fold.settings, fold.values) for fold in folds})
+    more.append(Section("Without one log", tables={"folds": table}, folded=True))
+    predictions = [predicted(fold, log, unseen=True) for fold, log in zip(folds, logs, strict=True)]
+    fitted = [predicted(model, log, unseen=False) for log in logs]
+    return predictions, judge(model.settings, fitted, baselines_of(model.settings, logs), predictions)

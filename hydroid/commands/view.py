@@ -50,7 +50,7 @@ def view(
     Args:
         source (RUN|LOG): A run folder, whose first log drives the arm; or a log, with --fit.
         out (FILE|DIR): Write a film (.mp4, .gif) or several moments (.png) instead of opening a window; with
-            --collisions or --actuator, folder for their pages.
+            --collisions or --actuator, folder for their tables or figures.
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the arm's file and `hydraulics`
             in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
@@ -104,13 +104,13 @@ def view(
 def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | None") -> "Result[Clearance]":
     """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
     from hydroid.arm.model import ALONE, load_machine
-    from hydroid.reporting.collision_report import collision_page
+    from hydroid.reporting.collision_report import collision_tables, summary
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    page, nearest = collision_page(result, machine.arm.name), result.smallest
+    tables, nearest = collision_tables(result), result.smallest
     keys = ("from_s", "to_s", "depth_m", "deepest_at_s")
     meetings = [
         {"bodies": [m.first, m.second]} | dict(zip(keys, (m.begins, m.ends, m.depth, m.deepest), strict=True))
@@ -125,8 +125,8 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | 
         "checked_pairs": result.checked,
         "excluded": [[*pair] for pair in result.excluded],
     }
-    lines = [*page.tables.values(), page.lead, *written(page, out)]
-    return Result(lines, content, result, page, exit_status=1 if meetings else 0)
+    lines = [*tables.values(), summary(result), *written(tables, out)]
+    return Result(lines, content, result, exit_status=1 if meetings else 0)
 
 
 def _actuator(model: IdentifiedModel, joint: int, out: Path) -> Result[None]:

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from hydroid.log import Log
 from hydroid.log.log import Floats
 
-NAMES = ("does not move", "table of speeds", "nine numbers")
+NAMES = ("standing still", "speed tables", "nine numbers")
 """of the baselines, the simplest first"""
 LONGEST_DELAY = 1.0
 """between a command and its motion [s]"""

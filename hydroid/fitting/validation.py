@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import degrees, sqrt
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
-from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.summary import account
@@ -22,9 +21,6 @@ from hydroid.posterior.covariance import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
-
-STILL = 1e-9
-"""an angle whose rms distance from its mean is below this does not move, but for rounding [rad]"""
 
 
 @dataclass(frozen=True)
@@ -69,44 +65,21 @@ class Prediction:
     @property
     def indices(self) -> dict[int, ErrorIndices]:
         """Of the estimate to use, by joint."""
-        return {joint: pooled_indices([self.pair(joint)]) for joint in self.joints}
+        return {j: error_indices(self.log.angle[:, j - 1], self.error(j)) for j in self.joints}
 
-    def pair(self, joint: int, estimate: str | None = None) -> tuple[Array, Array]:
-        """Return the measured and the simulated angle of a joint [rad], both of shape (T,)."""
-        angles = self.response if estimate is None else self.simulated[estimate]
-        return self.log.angle[:, joint - 1], angles[:, self.joints.index(joint)]
+    def error(self, joint: int) -> Array:
+        """Return measured minus simulated angle of a joint [rad], shape (T,)."""
+        return self.log.angle[:, joint - 1] - self.response[:, self.joints.index(joint)]
 
-    @property
-    def as_expected(self) -> bool | None:
-        """Whether the error is no larger than the fitted logs lead to expect; None: a band is missing."""
-        if any(band.model_limits for band in self.bands.values()):
-            return False
-        return True if self.bands and all(band.exists for band in self.bands.values()) else None
-
-    @property
-    def rms_deg(self) -> float:
-        """Rms error over all joints [deg]."""
-        return degrees(sqrt(sum(i.rms**2 for i in self.indices.values()) / len(self.joints)))
-
-    @property
-    def finding(self) -> Finding:
-        """What the prediction shows: its error, and whether the fitted logs lead to expect it."""
-        numbers = {"rms": self.rms_deg}
-        if bands := list(self.bands.values()):
-            numbers["inside"] = 100 * min(band.inside for band in bands)
-            numbers["expected"] = degrees(sqrt(sum(band.expected**2 for band in bands) / len(bands)))
-        kinds = {True: "error as expected", False: "error not expected", None: "error without band"}
-        level = "warning" if self.as_expected is False else "note"
-        return Finding(kinds[self.as_expected], level, (self.fit, Path(self.log.source).name), numbers)
-
-    def plain(self) -> list[dict[str, Any]]:
-        """Return one mapping per joint, as JSON has them (docs/json.md)."""
+    def plain(self, names: Sequence[str]) -> list[dict[str, Any]]:
+        """Return one mapping per joint, as JSON has them (docs/json.md); `names` are of all joints."""
         rows: list[dict[str, Any]] = []
         for joint, indices in self.indices.items():
             row: dict[str, Any] = {
                 "fit": self.fit,
                 "log": self.log.source,
                 "joint": joint,
+                "name": names[joint - 1],
                 "mae_deg": finite(degrees(indices.mean_absolute)),
                 "rms_deg": finite(degrees(indices.rms)),
                 "max_deg": finite(degrees(indices.largest)),
@@ -124,15 +97,10 @@ class Prediction:
         return rows
 
 
-def pooled_indices(pairs: Sequence[tuple[Array, Array]]) -> ErrorIndices:
-    """Compare channels at once: measured and simulated [rad] of each, both of shape (T,).
-
-    In `fit` each channel has its own mean: how far apart the poses of two joints are is no motion.
-    """
-    error = np.concatenate([measured - simulated for measured, simulated in pairs])
-    motion = np.concatenate([measured - measured.mean() for measured, _ in pairs])
-    rms, spread = (float(np.sqrt(np.mean(a**2))) for a in (error, motion))
-    fit = 100 * (1 - rms / spread) if spread > STILL else float("nan")
+def error_indices(measured: Array, error: Array) -> ErrorIndices:
+    """Return the indices of an error of the measured angle [rad], both of shape (T,)."""
+    rms, spread = float(np.sqrt(np.mean(error**2))), float(np.std(measured))
+    fit = 100 * (1 - rms / spread) if spread > 1e-9 else float("nan")  # else it moves by rounding only
     return ErrorIndices(float(np.mean(np.abs(error))), rms, float(np.max(np.abs(error))), fit)
 
 

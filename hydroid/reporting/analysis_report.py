@@ -90,8 +90,8 @@ def _sensitivity_section(problem: Problem, theta: Array, sweep: Sweep, data: dic
             panels.append(Panel("time [s]", f"[{unit}]", family, values, 150))
         name = file_name(f"sensitivity_{Path(log).stem}_{short}", taken)
         title, chart = f"{what} of joint {channel.joint}", partial(Chart, tuple(panels), 2, bins=_BINS)
-        plots = (Plot(name, f"{title} in {log}. {_CAPTION}", chart),) if panels else ()
-        tabs.append(Tab(f"{title}, {log}", plots, "" if panels else "No parameter changes it."))
+        if panels:
+            tabs.append(Tab(f"{title}, {log}", (Plot(name, f"{title} in {log}. {_CAPTION}", chart),)))
         header = ("time_s", f"{short}_{unit}", *(f"{p.name}_{unit}_per_pct" for p in free))
         data[f"{name}.csv"] = numbers_csv(header, np.column_stack([time, output, slopes.T]))
         rows += [(log, f"{short} [{unit}]", p.name, float(r)) for p, r in zip(free, rms, strict=True)]

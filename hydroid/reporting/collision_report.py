@@ -1,14 +1,10 @@
-"""The report of a trajectory: which bodies meet, and how near they come over time."""
+"""Tables of a trajectory: which bodies meet, and how near they come over time."""
 
-from dataclasses import replace
-from functools import partial
 from itertools import groupby
 
 import numpy as np
 
 from hydroid.arm.collision import Clearance, Meeting
-from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel
-from hydroid.reporting.page import Page, Plot, Section
 from hydroid.reporting.table import Cell, Table
 
 SHAPES = (
@@ -17,16 +13,13 @@ SHAPES = (
 )
 
 
-def collision_page(clearance: Clearance, name: str) -> Page:
-    """Return the page of a trajectory of an arm; its tables are `nearest` and `collisions`."""
-    plot = Plot("clearance", "Smallest distance between bodies.", partial(clearance_chart, clearance), True)
-    tables = {"collisions": collision_table(clearance)} if clearance.meetings else {}
-    tables |= {"nearest": nearest_table(clearance)}
-    sections = Section("Clearance", text=SHAPES, plots=(plot,)), Section("Bodies", tables=tables)
-    return Page("collisions", f"Collisions of {name}", verdict(clearance), sections)
+def collision_tables(clearance: Clearance) -> dict[str, Table]:
+    """Return the tables `nearest` and, if bodies meet, `collisions`."""
+    meet = {"collisions": collision_table(clearance)} if clearance.meetings else {}
+    return meet | {"nearest": nearest_table(clearance)}
 
 
-def verdict(clearance: Clearance) -> str:
+def summary(clearance: Clearance) -> str:
     """Return the answer in a sentence."""
     k = clearance.smallest
     pair, at = " and ".join(clearance.nearest[k]), f"at {clearance.time[k]:.2f} s"
@@ -63,19 +56,6 @@ def nearest_table(clearance: Clearance) -> Table:
             share = 100 * clearance.nearest.count(pair) / len(clearance.time)
             rows[pair] = (*pair, 1e3 * float(clearance.distance[k]), float(clearance.time[k]), share)
     excluded = ", ".join("–".join(pair) for pair in clearance.excluded)
-    note = f"{clearance.checked} pairs of bodies were checked. The model excludes: {excluded or 'none'}."
+    note = f"{SHAPES} {clearance.checked} pairs were checked. The model excludes: {excluded or 'none'}."
     header = ("first", "second", "smallest distance [mm]", "at [s]", "share of the time [%]")
     return Table("Nearest bodies", header, tuple(rows.values()), note)
-
-
-def clearance_chart(clearance: Clearance) -> Chart:
-    """Draw the smallest distance over time, coloured by the bodies that it lies between."""
-    marks = [replace(ZERO, color="ink")]
-    for i, (first, second, *_) in enumerate(nearest_table(clearance).rows):
-        between = np.array([pair == (first, second) for pair in clearance.nearest])
-        between[:-1] |= between[1:]  # up to where the next pair begins
-        distance = np.where(between, 1e3 * clearance.distance, np.nan)
-        label, color = (f"{first} – {second}", SERIES[i]) if i < len(SERIES) else ("others", "grey")
-        marks.append(Mark("line", clearance.time, distance, color=color, label=label, width=2))
-    title = "Distance of the nearest bodies; below 0 they are inside each other"
-    return Chart((Panel("time [s]", "smallest distance [mm]", tuple(marks), title, 280),))

@@ -1,95 +1,107 @@
-"""The page of a fit, from what its run stores: prediction, what is known and what is not, what to do next."""
+"""The page of a fit, from what its run stores: the verdict, the prediction, what is known, what to do."""
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import yaml
 
 from hydroid.advice.proposals import action_findings, missing_findings
 from hydroid.errors import SettingsError
-from hydroid.estimate import FitSummary
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
+from hydroid.fitting.verdict import judge
 from hydroid.identified_model import IdentifiedModel
-from hydroid.posterior.flags import WEAK_ABOVE
+from hydroid.reporting import page_file
 from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
-from hydroid.reporting.page import Light, Page, Plot, Section, Tab, log_names
+from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
 from hydroid.reporting.parameters_report import parameter_section
-from hydroid.reporting.predictions import motion, prediction_section, response_data
-from hydroid.reporting.quantities_report import BEST_WITHIN, best_known, curves_csv, quantity_section
-from hydroid.reporting.suggestion_report import MOST_STEPS, suggestion_sections
+from hydroid.reporting.predictions import prediction_sections, response_data
+from hydroid.reporting.quantities_report import curves_csv, quantity_section, speed_section
+from hydroid.reporting.suggestion_report import suggestion_sections
 from hydroid.reporting.table import numbers_csv
-from hydroid.reporting.uncertainty_report import determined_sections, unknown_section, warnings
-from hydroid.reporting.verdict import verdict
-from hydroid.run.record import Record
-from hydroid.words import number
+from hydroid.reporting.uncertainty_report import direction_section, unknown_section, warnings
+from hydroid.reporting.verdict_table import lead, verdict_section
+from hydroid.run.record import Record, load_record
+from hydroid.settings.fit import FitSettings
+
+_MOST_STEPS = 3
+"""things to do that a page names"""
+
+
+def draw(run: str | Path, without: Collection[str] = (), *, figures: bool = False) -> Path:
+    """Draw the report of a finished run in its folder, from what it stores; return the page.
+
+    Args:
+        run: its folder.
+        without: names of validations that are left out.
+        figures: write every chart as PNG and SVG too, to figures/ beside the page.
+
+    Raises:
+        RunError: the folder holds no finished run of this version, or the page cannot be written.
+    """
+    folder, page = Path(run), fit_page(load_record(run, without))
+    page_file.write_page(page, folder)
+    if figures:
+        page_file.write_figures(page, folder / "figures")
+    return folder / f"{page.name}.html"
 
 
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, result = record.settings, record.summary, record.result
+    unseen = [*record.validations.values()]
+    fits = {str(summary.final): judge(settings, result.fitted, result.baselines, unseen)}
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
     predictions = [replace(p, fit=str(summary.final)) for p in record.predictions]
     logs = log_names([p.log for p in result.fitted])
     advice = () if result.advice is None else suggestion_sections(settings, result.advice, logs)
-    folded = (*advice, *determined_sections(summary, result.noise, logs), _search(record))
-    sections = (
-        Section("Do next", steps=_steps(record)),
-        prediction_section(predictions, settings.arm),
-        *quantity_section(settings, summary, [p.log for p in result.fitted]),
+    folded = (
         parameter_section(settings, summary),
-        unknown_section(summary),
+        *speed_section(settings, summary, [p.log for p in result.fitted]),
         *_actuators(record),
-        *motion(predictions, settings.arm),
-        *(replace(section, folded=True) for section in folded),
-        Section("Reproduce", facts=tuple(_facts(record)), folded=True),
+        *advice,
+        *direction_section(summary),
+        _search(record),
+        Section("Reproduce", facts=tuple(_facts(record))),
     )
-    ended = {None: ("fair", "Not refined."), True: ("good", "Yes."), False: ("bad", "No.")}[summary.converged]
-    judged = verdict({"The fit": predictions}, _known(summary), Light("Converged", *ended))
+    sections = (
+        verdict_section(fits),
+        *prediction_sections(predictions, settings.arm, fits),
+        *quantity_section(settings, summary),
+        unknown_section(summary),
+        Section("Do next", steps=_steps(record)),
+        *(replace(section, folded=True) for section in folded),
+    )
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
-    return Page(
-        "report", title, judged.prediction, sections, warnings(summary), made_by, _data(record), judged
-    )
+    return Page("report", title, lead(fits), sections, warnings(summary), made_by, _data(record))
 
 
-def fit_lines(summary: FitSummary) -> list[str]:
-    """Return what a terminal prints under the table of parameters."""
-    error = "diverges" if summary.rms_deg is None else f"has an rms error of {number(summary.rms_deg)} deg"
-    first = f"The estimate '{summary.final}' {error} on the fitted logs."
-    return [first, *best_known(summary.quantities), *warnings(summary)]
-
-
-def _known(summary: FitSummary) -> str:
-    """Say how many quantities and parameters the logs fix."""
-    free = [p for p in summary.estimate.values() if p.data_share is not None]
-    known = sum(p.sd is not None and p.sd <= WEAK_ABOVE * abs(p.value) for p in free)
-    fixed = sum(q.within <= BEST_WITHIN for q in summary.quantities.values())
-    return (
-        f"The logs fix {fixed} of the machine's properties, such as speeds and dead bands, and {known} of "
-        f"the {len(free)} parameters to {100 * WEAK_ABOVE:.0f} % or better."
-    )
+def next_step(settings: FitSettings, logs: str, run: str) -> Finding:
+    """Return what to do after a fit that no unseen log has tested; `logs` are those of the fit."""
+    if settings.stage == "mech":
+        command = f"hydroid fit-hyd {logs} --mech {shlex.quote(run)}"
+        return Finding("fit the hydraulics", "note", (), {"command": command})
+    command = f"hydroid validate OTHER.csv --fit {shlex.quote(run)}"
+    return Finding("predict unseen", "note", (), {"command": command})
 
 
 def _steps(record: Record) -> tuple[Finding, ...]:
     """Return what to do next, the first things first."""
-    settings, run, findings = record.settings, shlex.quote(record.folder), list[Finding]()
-    if settings.stage == "mech":
-        command = {"command": f"hydroid fit-hyd {record.given} --mech {run}"}
-        findings.append(Finding("fit the hydraulics", "note", (), command))
-    if not record.validations:
-        command = {"command": f"hydroid validate OTHER.csv --fit {run}"}
-        findings.append(Finding("predict unseen", "note", (), command))
+    findings = list[Finding]()
+    if record.settings.stage == "mech" or not record.validations:
+        findings.append(next_step(record.settings, record.given, record.folder))
     if record.result.advice is not None:
         content = record.result.advice.content
         findings += [f for f in missing_findings(content) if "command" in f.numbers]
-        findings += action_findings(content, settings)
-    return tuple(findings[:MOST_STEPS])
+        findings += action_findings(content, record.settings)
+    return tuple(findings[:_MOST_STEPS])
 
 
 def _actuators(record: Record) -> Iterator[Section]:
@@ -102,7 +114,9 @@ def _actuators(record: Record) -> Iterator[Section]:
     for joint in settings.outputs:
         with suppress(SettingsError):  # no force-stroke curve runs through its two points: it diverged
             actuator = joint_actuator(model, joint)
-            tabs.append(Tab(actuator.title, (actuator_plot(actuator, f"actuator_joint_{joint}"),)))
+            tabs.append(
+                Tab(actuator.joint.name, (actuator_plot(actuator, f"actuator_{actuator.joint.name}"),))
+            )
     if tabs:
         yield Section("The actuator", tabs=tuple(tabs))
 
@@ -139,10 +153,8 @@ def _facts(record: Record) -> Iterator[tuple[str, str]]:
     yield "command", f"hydroid fit-{settings.stage} {record.given} --config {config} --out {again}"
     kinds = {"objective", "search", "payloads", "priors"}
     for kind, given in settings.model_dump(mode="json", exclude_defaults=True, include=kinds).items():
-        yield (
-            kind,
-            yaml.safe_dump(given, default_flow_style=True, allow_unicode=True, width=10_000).strip()[1:-1],
-        )
+        text = yaml.safe_dump(given, default_flow_style=True, allow_unicode=True, width=10_000)
+        yield kind, text.strip()[1:-1]
 
 
 def _data(record: Record) -> dict[str, str]:

@@ -28,49 +28,50 @@ class Plot:
 
 @dataclass(frozen=True)
 class Tab:
-    """One of several groups of figures of which a reader sees one at a time."""
+    """One of several figures of which a reader sees one at a time.
+
+    Its button stands in a `row` and a `column`, where these are given; its `state` (`good`, `fair`, `bad`)
+    gives the colour.
+    """
 
     name: str
     plots: tuple[Plot, ...]
-    note: str = ""
+    row: str = ""
+    column: str = ""
+    state: str = ""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """One quantity on a bar from its lower to its upper bound; positions are parts of the bar, 0 to 1.
+    """One parameter on a bar from its lower to its upper bound; positions are parts of the bar, 0 to 1.
 
     Attributes:
         symbol, name: short, and in plain words.
         value, interval: in words, with the unit.
-        ends: the bounds in words; empty where there are none.
+        ends: the bounds in words.
         note: what is to be known about it.
-        state: `known`, `weak` or `unknown`.
         at: position of the value.
         band: ends of its 95 % interval.
         prior: ends of the interval that its prior gives.
-        dots: positions of other estimates.
     """
 
     symbol: str
     name: str
     value: str
-    interval: str = ""
-    ends: tuple[str, str] = ("", "")
-    note: str = ""
-    state: str = "known"
-    at: float | None = None
-    band: tuple[float, float] | None = None
-    prior: tuple[float, float] | None = None
-    dots: tuple[float, ...] = ()
+    interval: str
+    ends: tuple[str, str]
+    note: str
+    at: float
+    band: tuple[float, float] | None
+    prior: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
 class Section:
     """A heading with text, points to note, facts, tables by file name, bars and figures.
 
-    `steps` are findings that say what to do and what it would bring; their number `command` does it. `more`
-    are tables that are shown on demand. All of a `folded` section is. `link` is a page that has more,
-    relative to this one.
+    `steps` are findings that say what to do and what it would bring; their number `command` does it. `cards`
+    are small tables side by side, `more` those that are shown on demand. All of a `folded` section is.
     """
 
     title: str
@@ -78,38 +79,18 @@ class Section:
     points: tuple[str, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
     tables: Mapping[str, Table] = field(default_factory=dict[str, Table])
+    cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
     tabs: tuple[Tab, ...] = ()
     bars: tuple[Bar, ...] = ()
     steps: tuple[Finding, ...] = ()
     more: Mapping[str, Table] = field(default_factory=dict[str, Table])
     folded: bool = False
-    link: str = ""
 
     @property
-    def all_plots(self) -> Iterator[Plot]:
-        """Its figures, and those of its tabs."""
-        yield from self.plots
-        for tab in self.tabs:
-            yield from tab.plots
-
-
-@dataclass(frozen=True)
-class Light:
-    """One question with its answer: `good`, `fair`, `bad`, or `open` where nobody has looked."""
-
-    question: str
-    state: str
-    answer: str
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The answer in a sentence on the prediction and one on the parameters, and lights."""
-
-    prediction: str
-    parameters: str = ""
-    lights: tuple[Light, ...] = ()
+    def columns(self) -> list[str]:
+        """Of its tabs' buttons."""
+        return list(dict.fromkeys(tab.column for tab in self.tabs if tab.column))
 
 
 @dataclass(frozen=True)
@@ -121,10 +102,9 @@ class Page:
         title: of the page.
         lead: the answer in a sentence.
         sections: in order.
-        warnings: what a reader must know before using the answer; stands at the top.
+        warnings: what a reader must know before using the answer; stand behind the first section.
         versions: of the software, printed at the foot.
         data: further files by name, such as CSV for scripts.
-        verdict: stands above all sections.
     """
 
     name: str
@@ -134,18 +114,19 @@ class Page:
     warnings: tuple[str, ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
     data: Mapping[str, str] = field(default_factory=dict[str, str])
-    verdict: Verdict | None = None
 
     @property
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from section.all_plots
+            yield from section.plots
+            for tab in section.tabs:
+                yield from tab.plots
 
     @property
     def tables(self) -> dict[str, Table]:
         """All tables by file name."""
-        return {n: table for s in self.sections for n, table in {**s.tables, **s.more}.items()}
+        return {n: t for s in self.sections for n, t in {**s.tables, **s.cards, **s.more}.items()}
 
 
 def log_names(logs: Sequence[Log]) -> list[str]:

@@ -7,6 +7,7 @@ import base64
 import gzip
 import json
 import math
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -18,22 +19,31 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from hydroid.files import write_atomic
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page
+from hydroid.reporting.table import Table
 
 
 def write_page(page: Page, out: Path) -> list[Path]:
-    """Write a report to the folder `out`: the page, its tables as CSV, Markdown and LaTeX, and its data.
+    """Write a report to the folder `out`: the page, its tables as CSV, and its data.
 
     Raises:
         RunError: the folder cannot be written.
     """
-    content: dict[str, str] = {}
-    for name, table in page.tables.items():
-        written = {"csv": table.csv(), "md": table.markdown(), "tex": table.latex()}
-        content |= {f"tables/{name}.{ending}": text for ending, text in written.items()}
-    content |= {**page.data, f"{page.name}.html": _html(page)}
+    content = {**page.data, f"{page.name}.html": html(page)}
     for name, text in content.items():
         write_atomic(out / name, text)
-    return [out / name for name in content]
+    return [*write_tables(page.tables, out), *(out / name for name in content)]
+
+
+def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
+    """Write tables by name as CSV, to tables/ in the folder `out`.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    files = {out / "tables" / f"{name}.csv": table.csv() for name, table in tables.items()}
+    for file, text in files.items():
+        write_atomic(file, text)
+    return [*files]
 
 
 def write_figures(page: Page, out: Path) -> list[Path]:
@@ -66,7 +76,8 @@ def plain(drawn: Any) -> Any:
             return vars(drawn)
 
 
-def _html(page: Page) -> str:
+def html(page: Page) -> str:
+    """Return the page as one file."""
     loader = PackageLoader("hydroid", "reporting")
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True

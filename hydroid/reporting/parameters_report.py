@@ -1,6 +1,6 @@
 """Parameters between their bounds, as bars and as a table."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -14,33 +14,23 @@ from hydroid.reporting.table import Cell, Given, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.words import number, plain
 
-_STATES = {Flag.WEAK: "weak", Flag.UNIDENTIFIABLE: "unknown", Flag.NO_EFFECT: "unknown"}
-
 Intervals = Mapping[str, tuple[float, float]]
 
 
 def parameter_section(
-    settings: FitSettings,
-    summary: FitSummary,
-    profiles: Intervals | None = None,
-    others: Sequence[Mapping[str, float]] = (),
+    settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None
 ) -> Section:
     """Return the section with all parameters that the fit estimates as bars, and with all in its table.
 
-    `profiles` are further intervals by parameter, `others` further estimates; without these the fit's own.
+    `profiles` are further intervals by parameter.
     """
-    text = (
-        "Bar: from bound to bound. Orange: the estimate and its 95 % interval. Grey: its prior. Blue: other "
-        "estimates."
-    )
+    text = "Bar: from bound to bound. Orange: the estimate and its 95 % interval. Grey: its prior."
     free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
     if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:
         supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
         text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar. {text}"
-    estimates = summary.estimates.items()
-    dots = others or [e.values for n, e in estimates if n != summary.final and e.rms_deg is not None]
     bars = tuple(
-        _bar(settings, p, summary.estimate[p.name], [values[p.name] for values in dots])
+        _bar(settings, p, summary.estimate[p.name])
         for p in settings.parameter_set().parameters
         if p.lower < p.upper and summary.estimate[p.name].flag != Flag.FIXED
     )
@@ -48,9 +38,7 @@ def parameter_section(
     return Section("Parameters", text, bars=bars, more=tables)
 
 
-def _bar(
-    settings: FitSettings, parameter: Parameter, estimate: ParameterEstimate, dots: Sequence[float]
-) -> Bar:
+def _bar(settings: FitSettings, parameter: Parameter, estimate: ParameterEstimate) -> Bar:
     low, high, prior = parameter.lower, parameter.upper, parameter.prior
 
     def place(value: float) -> float:
@@ -65,11 +53,9 @@ def _bar(
         " to ".join(map(number, ends)) if known else "",
         (plain(float(f"{low:.3g}")), plain(float(f"{high:.3g}"))),
         status(estimate),
-        _STATES.get(Flag(estimate.flag or Flag.IDENTIFIABLE), "known"),
         place(estimate.value),
         (place(ends[0]), place(ends[1])) if known else None,
         None if prior is None else (place(prior.value(-NORMAL)), place(prior.value(NORMAL))),
-        tuple(map(place, dots)),
     )
 
 

@@ -15,6 +15,7 @@ from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import motion_section
 from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name, unique
 from hydroid.reporting.table import Cell, Table, numbers_csv
+from hydroid.reporting.verdict_table import Verdicts
 from hydroid.settings.arm import Arm
 from hydroid.words import number
 
@@ -79,26 +80,32 @@ def joint_responses(predictions: Sequence[Prediction], arm: Arm) -> list[JointRe
     return list(records.values())
 
 
-def prediction_section(predictions: Sequence[Prediction], arm: Arm) -> Section:
-    """Return the section with one tab per log, and the table of errors."""
-    responses = joint_responses(predictions, arm)
-    bins = min(_MOST, max(150, 9000 // max(len(responses), 1)))  # a page of many responses stays small
-    tabs: dict[str, Tab] = {}
-    for i, one in enumerate(responses):
-        plot = Plot(f"response_{i + 1}", f"{one.name} in {one.log}", partial(draw, one, bins), zoom=True)
-        plots = (*(tabs[one.log].plots if one.log in tabs else ()), plot)
-        tabs[one.log] = Tab(one.log, plots, _KINDS[one.of.unseen].capitalize())
-    text = "Angle; measured minus simulated angle with the 95 % prediction band; command."
-    errors = {"errors": error_table(predictions, arm)}
-    return Section("Prediction", text, tabs=tuple(tabs.values()), more=errors)
+def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdicts) -> tuple[Section, ...]:
+    """Return the arm in motion, and each joint's error in each log with the responses behind it.
 
-
-def motion(predictions: Sequence[Prediction], arm: Arm) -> tuple[Section, ...]:
-    """Return the section with the arm in motion in each log, as the first prediction of the log has it."""
+    The first prediction of a log is the one that moves, and whose errors are shown; they are coloured by the
+    tolerances of the first of the fits.
+    """
     names, first = _names(predictions), dict[str, Prediction]()
     for one in predictions:
         first.setdefault(names[one.log.source], one)
-    return motion_section(arm, first)
+    responses = joint_responses(predictions, arm)
+    bins = min(_MOST, max(150, 9000 // max(len(responses), 1)))  # a page of many responses stays small
+    tolerances = {one.joint: one.tolerance_deg for one in next(iter(fits.values()), ())}
+    tabs: list[Tab] = []
+    for i, one in enumerate(responses):
+        plot = Plot(f"response_{i + 1}", f"{one.name} in {one.log}", partial(draw, one, bins), zoom=True)
+        error = degrees(float(np.sqrt(np.mean((one.measured - next(iter(one.simulated.values()))) ** 2))))
+        state = _state(error, tolerances.get(one.joint, np.inf))
+        row = f"{one.log} {_KINDS[one.of.unseen]}".strip()
+        tabs.append(Tab(f"{error:.2g}°", (plot,), row, one.name, state))
+    text = "Rms error of each joint in each log; choose one to see the response with its 95 % band."
+    errors = {"errors": error_table(predictions, arm)}
+    return (*motion_section(arm, first), Section("Errors by log", text, tabs=tuple(tabs), more=errors))
+
+
+def _state(error: float, tolerance: float) -> str:
+    return "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
 
 
 def error_table(predictions: Sequence[Prediction], arm: Arm) -> Table:
@@ -132,7 +139,7 @@ def response_data(predictions: Sequence[Prediction], arm: Arm) -> dict[str, str]
     """Return all responses as CSV by file."""
     taken: set[str] = set()
     return {
-        f"responses/{file_name(f'{Path(one.log).stem}_joint_{one.joint}', taken)}.csv": one.csv()
+        f"responses/{file_name(f'{Path(one.log).stem}_{one.name}', taken)}.csv": one.csv()
         for one in joint_responses(predictions, arm)
     }
 
@@ -155,10 +162,11 @@ def draw(response: JointResponse, bins: int = _MOST) -> Chart:
         if name in response.bands:
             # nor must a band that the parameters leave open
             widest = 2.0 * float(np.nanmax(np.abs(residual), initial=1e-6))
-            half = np.fmin(np.degrees(response.bands[name]), widest)
-            label = f"95 % band of {name}"
+            half = np.degrees(response.bands[name])
+            useless = ", wider than the motion" if np.mean(2 * half) > np.ptp(measured) else ""
+            band, half = f"95 % band of {name}{useless}", np.fmin(half, widest)
             middle.insert(
-                0, Mark("band", log.time, -half, half, color=color, label=label, alpha=0.18, off=off)
+                0, Mark("band", log.time, -half, half, color=color, label=band, alpha=0.18, off=off)
             )
     panels = [
         Panel("", "angle [deg]", tuple(upper), f"{response.name} in {response.log}", 280),

@@ -1,62 +1,51 @@
-"""What the logs determine, in the words of an engineer: table, figure and lines of a fit's quantities."""
+"""What the logs determine, in the words of an engineer: cards, curves of speed, and their numbers."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
-from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Section
 from hydroid.reporting.table import Table
 from hydroid.settings.fit import FitSettings
-from hydroid.words import number
 
 BEST_WITHIN = 0.3
-"""half of a 95 % interval, relative to the value, up to which a property counts as fixed"""
+"""half of a 95 % interval, relative to the value, up to which a property counts as known"""
+_MOST = 8
+"""quantities of a joint that its card shows, the best known ones"""
 _CAPTION = (
     "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond "
     "the logs. Ticks: those that they hold."
 )
 
 
-def quantity_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
-    """Return the section with all quantities and the curves of speed; none where there are none."""
-    if not summary.quantities:
-        return ()
-    names = settings.arm.joint_names
-    speeds = {name: curve for name, curve in summary.curves.items() if "_speed" in name}
-    plots = (Plot("speed", _CAPTION, partial(draw_speeds, speeds, logs, names)),) if speeds else ()
-    return (Section("What is known", tables={"quantities": quantity_table(summary, names)}, plots=plots),)
-
-
-def quantity_table(summary: FitSummary, joints: Sequence[str]) -> Table:
-    """Return the quantities that are determined, each with its 95 % interval; `joints` are all names."""
-    rows = tuple(
-        (
-            *(None if one.joint is None else joints[one.joint - 1], one.label, one.unit),
-            *(one.value, *one.interval, 100 * one.within),
-        )
-        for one in summary.quantities.values()
-        if one.within <= 1.0
+def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Section, ...]:
+    """Return the section with a card of the quantities that are known for each joint; none without any."""
+    names, cards = settings.arm.joint_names, dict[str, Table]()
+    known = sorted(
+        (q for q in summary.quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within
     )
-    note = "from, to: 95 % interval, right only if the model is. docs/quantities.md defines each."
-    header = ("joint", "quantity", "unit", "value", "from", "to", "± [%]")
-    return Table("Quantities", header, rows, note, ("± [%]",))
+    for joint in dict.fromkeys(q.joint for q in summary.quantities.values()):
+        rows = tuple(
+            (q.label, f"{q.value:.3g} {q.unit} ± {100 * q.within:.2g} %")
+            for q in [q for q in known if q.joint == joint][:_MOST]
+        )
+        name = "machine" if joint is None else names[joint - 1]
+        if rows:
+            cards[f"known_{name}"] = Table(name, ("quantity", "value"), rows)
+    text = "With 95 % intervals, which are right only if the model is. estimate.yaml has all quantities."
+    return (Section("What is known", text, cards=cards),) if cards else ()
 
 
-def best_known(quantities: Mapping[str, QuantityEstimate]) -> Iterator[str]:
-    """Yield a line for each of the best-known quantities, the best first, under a heading; or nothing."""
-    best = sorted((q for q in quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within)[:6]
-    several = len({q.joint for q in quantities.values()}) > 1
-    for i, q in enumerate(best):
-        if i == 0:
-            yield "Best determined, with 95 % intervals:"
-        ends = " to ".join(number(end) for end in q.interval if end is not None)
-        of = f"joint {q.joint}: " if several else ""
-        yield f"  {of}{q.label}: {f'{number(q.value)} {q.unit}'.rstrip()} ({ends})"
+def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
+    """Return the section with the curves of speed; none where there are none."""
+    speeds = {name: curve for name, curve in summary.curves.items() if "_speed" in name}
+    plot = Plot("speed", _CAPTION, partial(draw_speeds, speeds, logs, settings.arm.joint_names))
+    return (Section("Speeds", plots=(plot,)),) if speeds else ()
 
 
 def curves_csv(curves: Mapping[str, CurveEstimate]) -> str:

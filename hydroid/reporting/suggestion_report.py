@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hydroid.advice.proposals import Advice, action_findings, missing_findings, residual_findings
-from hydroid.reporting.page import Page, Section, Verdict
-from hydroid.reporting.residual_chart import residual_tabs
+from hydroid.reporting.page import Page, Section
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.fit import FitSettings
 
@@ -35,7 +34,7 @@ def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], 
     steps = (*found, *action_findings(advice.content, settings))[:MOST_STEPS]
     sections = suggestion_sections(settings, advice, logs)
     sections = (Section("Do next", steps=steps), *sections) if steps else sections
-    return Page("suggestions", "What to change next", lead, sections, verdict=Verdict(lead))
+    return Page("suggestions", "What to change next", lead, sections)
 
 
 def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[str]) -> tuple[Section, ...]:
@@ -54,7 +53,6 @@ def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[st
         Section(
             "What the residual shows",
             points=tuple(str(finding) for finding in residual_findings(checks, places)),
-            tabs=residual_tabs(checks, places),
         ),
         Section(
             "What each action would bring",

@@ -1,4 +1,4 @@
-"""A table for readers (terminal, Markdown, LaTeX, page) and for scripts (CSV, JSON)."""
+"""A table for readers (terminal, page) and for scripts (CSV, JSON)."""
 
 import csv
 import io
@@ -60,27 +60,6 @@ class Table:
         buffer = io.StringIO()
         csv.writer(buffer, lineterminator="\n").writerows([self.header, *self.rows])
         return buffer.getvalue()
-
-    def markdown(self) -> str:
-        """Return title, pipe table and note; numbers are right-aligned."""
-        note = f"\n\n{_markdown(self.note)}" if self.note else ""
-        rules = ["---:" if right else "---" for right in self.numeric]
-        lines = [map(_markdown, self.header), rules, *(map(_markdown, row) for row in self.shown)]
-        body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-        return f"**{_markdown(self.title)}**\n\n{body}{note}\n"
-
-    def latex(self) -> str:
-        """Return a `table` environment that needs no package."""
-        columns = "".join("r" if right else "l" for right in self.numeric)
-        head, *rows = (" & ".join(map(_latex, row)) + r" \\" for row in (self.header, *self.shown))
-        lines = [
-            *(r"\begin{table}", r"\centering", rf"\caption{{{_latex(self.title)}}}"),
-            *(rf"\begin{{tabular}}{{{columns}}}", r"\hline", head, r"\hline", *rows, r"\hline"),
-            r"\end{tabular}",
-            *([r"\par\smallskip\footnotesize " + _latex(self.note)] if self.note else []),
-            r"\end{table}",
-        ]
-        return "\n".join(lines) + "\n"
 
     def show(self) -> None:
         """Print the table within the width of the terminal or of COLUMNS; elsewhere lines have any length.
@@ -158,23 +137,3 @@ def shown(cell: Cell) -> str:
     if isinstance(cell, float):
         return plain(cell) if isinstance(cell, Given) else number(cell)
     return "" if cell is None else str(cell)
-
-
-_MARKDOWN = {ord(c): f"\\{c}" for c in r"\`*_<>|&$~"} | {ord(c): " " for c in "\r\n"}
-_LATEX = str.maketrans(
-    {c: f"\\{c}" for c in "&%$#_{}"}
-    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-    | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
-    | {"·": r"\(\cdot\)", "²": r"\(^2\)", "×": r"\(\times\)", "–": "--", "\n": " ", "\r": " "}
-)
-
-
-def _markdown(text: str) -> str:
-    # ]( and ][ make a link of a bracket
-    return text.translate(_MARKDOWN).replace("](", r"\](").replace("][", r"\][")
-
-
-def _latex(text: str) -> str:
-    safe = text.translate(_LATEX)
-    # [ or * after a line break \\ would be its option
-    return f"{{{safe[0]}}}{safe[1:]}" if safe.startswith(("[", "*")) else safe

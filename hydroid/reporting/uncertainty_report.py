@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -12,18 +12,11 @@ from hydroid.fitting.summary import account
 from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.posterior.profile import THRESHOLD, Profile
+from hydroid.posterior.profile import Profile
 from hydroid.problem.problem import Problem
-from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.page import Page, Plot, Section, Verdict, log_names
+from hydroid.reporting.page import Page, Section
 from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.table import Table
-from hydroid.run.record import ChannelNoise, channel_noise
-
-_PROFILES = (
-    "The error, in units of the noise, with one parameter held and the others fitted again. The interval is "
-    "where it stays below the threshold."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,41 +61,43 @@ def _profile_findings(profiles: Sequence[Profile]) -> Iterator[Finding]:
 
 
 def uncertainty_page(study: UncertaintyStudy) -> Page:
-    """Return the page of a study; its tables are `parameters`, `directions` and `noise`."""
+    """Return the page of a study; its tables are `parameters` and `directions`."""
     problem, summary = study.problem, study.summary
     rank, count = study.identifiability.rank, len(study.identifiability.names)
     lead = f"The logs determine {rank} combinations of {count} parameters to {100 * WEAK_ABOVE:.0f} %."
-    profiles = (Plot("profiles", _PROFILES, partial(draw_profiles, study)),) if study.profiles else ()
     sections = (
         parameter_section(problem.settings, summary, study.intervals),
-        *([Section("Profiles", plots=profiles)] if profiles else []),
         unknown_section(summary),
-        *determined_sections(summary, channel_noise(problem, study.uncertainty), log_names(problem.logs)),
+        *direction_section(summary),
     )
-    verdict = Verdict(lead, f"At {study.source}.")
-    return Page(
-        "identifiability", "What the logs determine", lead, sections, warnings(summary), verdict=verdict
-    )
+    return Page("analysis", f"What the logs determine at {study.source}", lead, sections, warnings(summary))
+
+
+_MOST_WARNINGS = 3
+"""that stand at the top of a page and in a terminal; the others stand below"""
 
 
 def warnings(summary: FitSummary) -> tuple[str, ...]:
-    """Return what must be read before any use of the estimate."""
-    return tuple(str(finding) for finding in summary.findings if finding.level != "note")
+    """Return what must be read before any use of the estimate, at most three things."""
+    return tuple(map(str, _warnings(summary)[:_MOST_WARNINGS]))
 
 
 def unknown_section(summary: FitSummary) -> Section:
     """Return the section of all other findings."""
-    points = tuple(str(finding) for finding in summary.findings if finding.level == "note")
+    others = _warnings(summary)[_MOST_WARNINGS:], [f for f in summary.findings if f.level == "note"]
+    points = tuple(str(finding) for some in others for finding in some)
     return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
 
 
-def determined_sections(
-    summary: FitSummary, noise: Sequence[ChannelNoise], names: Sequence[str]
-) -> Iterator[Section]:
-    """Yield the folded sections on directions and noise; `names` are of the logs."""
-    if summary.covariance is not None and summary.covariance.parameters:
-        yield Section("Directions", tables={"directions": direction_table(summary.covariance)}, folded=True)
-    yield Section("Noise", tables={"noise": noise_table(noise, names)}, folded=True)
+def _warnings(summary: FitSummary) -> list[Finding]:
+    return [finding for finding in summary.findings if finding.level != "note"]
+
+
+def direction_section(summary: FitSummary) -> tuple[Section, ...]:
+    """Return the folded section on directions; none where no parameter is free."""
+    if summary.covariance is None or not summary.covariance.parameters:
+        return ()
+    return (Section("Directions", tables={"directions": direction_table(summary.covariance)}, folded=True),)
 
 
 def direction_table(known: Covariance) -> Table:
@@ -121,50 +116,3 @@ def direction_table(known: Covariance) -> Table:
         "parameters that change together, in these proportions of their values",
     )
     return Table("", header, tuple(rows))
-
-
-def noise_table(noise: Sequence[ChannelNoise], names: Sequence[str]) -> Table:
-    """Return the noise of every channel, and where it was taken from."""
-    rows = [
-        {
-            "log": names[one.log],
-            "joint": one.joint,
-            "signal": f"{one.signal} [{one.unit}]",
-            "rms residual": one.residual,
-            "noise, standard deviation": one.level,
-            "correlation time [s]": one.correlation_s,
-            "effective sample size": one.effective_samples,
-            "source": one.source,
-        }
-        for one in noise
-    ]
-    return Table.of("", rows, optional=("rms residual", "source"))
-
-
-def draw_profiles(study: UncertaintyStudy) -> Chart:
-    """Draw the deviance around each profiled parameter's interval, with the linear approximation."""
-    units = {p.name: p.unit for p in study.problem.parameters.parameters}
-    panels: list[Panel] = []
-    for profile in study.profiles:
-        own, values, limit = study.summary.estimate[profile.name], profile.values, np.array([THRESHOLD])
-        low, high = np.clip(profile.interval, values[0], values[-1]).tolist()
-        margin = 0.3 * (high - low)  # drawn beyond each end
-        fine = np.union1d(np.linspace(low - margin, high + margin, 201), values)
-        fine = fine[(fine >= values[0]) & (fine <= values[-1])]
-        # between its points the square root is taken for linear, as in the interval
-        root = np.sqrt(np.maximum(profile.deviance, 0.0)) * np.sign(values - own.value)
-        ends = np.array([[low], [high]])
-        marks = [
-            Mark("spans", ends[0], end=ends[1], color="sky", label="95 % interval", alpha=0.2),
-            Mark("line", fine, np.interp(fine, values, root) ** 2, color="blue", label="profile"),
-            Mark("points", values, profile.deviance, color="blue", width=6),
-            Mark("rule", y=limit, color="orange", label="threshold of 95 %", width=1),
-        ]
-        if own.sd:
-            line, label = ((fine - own.value) / own.sd) ** 2, "linear approximation"
-            marks.append(Mark("line", fine, line, color="grey", label=label, width=1, look="dashed"))
-        across = f"{profile.name} [{units[profile.name]}]"
-        limits = min(-0.2, 1.2 * float(profile.deviance.min())), 2.5 * THRESHOLD
-        around = (low - margin, high + margin)
-        panels.append(Panel(across, "deviance", tuple(marks), "", 240, around, limits))
-    return Chart(tuple(panels), columns=min(2, len(panels)))

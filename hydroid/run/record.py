@@ -14,7 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from hydroid.advice.proposals import Advice
@@ -22,13 +21,10 @@ from hydroid.errors import RunError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
 from hydroid.fitting.fit import Fit
-from hydroid.fitting.validation import Prediction, fitted
+from hydroid.fitting.validation import Prediction
+from hydroid.fitting.verdict import Baselines
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.noise import Noise
-from hydroid.problem.channels import Channel
-from hydroid.problem.problem import Problem
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings
@@ -50,21 +46,6 @@ class Effort:
     ending: str
 
 
-@dataclass(frozen=True)
-class ChannelNoise:
-    """One compared signal: its rms residual and its noise in `unit`, and the noise's correlation."""
-
-    log: int
-    joint: int
-    signal: str
-    unit: str
-    residual: float
-    level: float
-    correlation_s: float
-    effective_samples: float
-    source: str
-
-
 @dataclass(frozen=True, eq=False)
 class FitResult:
     """The arrays of a fit.
@@ -75,7 +56,7 @@ class FitResult:
         front: non-dominated candidates, (n, P), with objectives by segment and overall, (n, S + 1).
         segments: objectives of each estimate by segment, shape (S,).
         refinements: what each took.
-        noise: of every compared signal.
+        baselines: fitted to the same logs, by joint and name.
         advice: None where the final estimate diverged.
     """
 
@@ -84,7 +65,7 @@ class FitResult:
     front: tuple[Array, Array]
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
-    noise: tuple[ChannelNoise, ...]
+    baselines: Baselines
     advice: Advice | None
 
 
@@ -129,39 +110,20 @@ class Record:
         return (*self.validations.values(), *self.result.fitted)
 
 
-def fit_result(problem: Problem, fit: Fit, advice: Advice | None) -> FitResult:
-    """Return what a run stores beside its summary; `problem` is that of the last refinement."""
+def fit_result(
+    fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines, advice: Advice | None
+) -> FitResult:
+    """Return what a run stores beside its summary."""
     theta, evaluation = fit.front
     return FitResult(
-        fitted(problem, fit),
+        fitted,
         fit.history,
         (theta, evaluation.values),
         {name: estimate.segments for name, estimate in fit.estimates.items()},
         tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
-        channel_noise(problem, fit.uncertainty),
+        baselines,
         advice,
     )
-
-
-def channel_noise(problem: Problem, known: Uncertainty) -> tuple[ChannelNoise, ...]:
-    """Return the noise of every compared signal."""
-
-    def row(channel: Channel, noise: Noise) -> ChannelNoise:
-        angle = channel.quantity == "angle"
-        factor = (np.degrees(1) if angle else 1e-5) / channel.weight
-        return ChannelNoise(
-            channel.log,
-            channel.joint,
-            channel.quantity.replace("_", " "),
-            "deg" if angle else "bar",
-            factor * float(np.sqrt(np.mean(known.jacobian.residual[channel.rows] ** 2))),
-            factor * noise.level,
-            noise.correlation_time * problem.logs[channel.log].period,
-            noise.effective_sample_size,
-            noise.source,
-        )
-
-    return tuple(map(row, problem.channels, known.noise))
 
 
 def save_result(folder: Path, result: FitResult) -> None:
@@ -193,6 +155,19 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
     for one in unseen:
         write_atomic(folder / VALIDATIONS / file_name(Path(one.log.source).name, taken) / RESULT, pack(one))
     return folder
+
+
+def fitted_by(model: IdentifiedModel) -> tuple[tuple[Prediction, ...], Baselines]:
+    """Return what the run that a model is from made of its own logs, and the baselines; none of other models.
+
+    Raises:
+        RunError: what the run stored is damaged, or of another version.
+    """
+    source = Path(model.source)
+    if source.name != NAME or not (source.parent / RESULT).is_file():
+        return (), {}
+    result = _read(source.parent / RESULT, FitResult)
+    return result.fitted, result.baselines
 
 
 def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:

@@ -53,6 +53,8 @@ class FitSettings(Settings):
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
     outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
+    tolerance_deg: Annotated[float, Field(gt=0)] | None = None
+    """rms error on unseen logs up to which a joint is predicted [deg]; null: 2 % of its travel there"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True

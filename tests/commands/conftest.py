@@ -6,7 +6,7 @@ import pytest
 from command_line import Ended, Run, run
 
 import hydroid
-from hydroid.reporting import drawing
+from hydroid.reporting import page_file
 
 LOG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
@@ -33,7 +33,7 @@ def array(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, hyd
     folder = tmp_path_factory.mktemp("array")
     (folder / "a.csv").write_text("\n".join(LOG.read_text().splitlines()[:401]) + "\n")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, "write_page", lambda *_: [])  # figures take longest
+        patch.setattr(page_file, "write_page", lambda *_: [])  # figures take longest
         done = hydroid.fit_mech(folder / "a.csv", runs=3, set=SMALL, out=folder)
     return folder, {one.problem.settings.search.seed: one for one in done.results}
 

@@ -22,7 +22,7 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     run = tmp_path / "run"
     estimate = yaml.safe_load((run / "estimate.yaml").read_text())
     assert estimate | {"out": "run"} == found
-    for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.tex", "result.npz"):
+    for name in ("report.html", "history.csv", "pareto.csv", "tables/parameters.csv", "result.npz"):
         assert (run / name).stat().st_size > 0
     described = json.loads((run / "run.json").read_text())
     assert described["status"] == "done"
@@ -35,17 +35,22 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     other = hydroid_cli("fit-hyd", "--resume", "--out", "run", code=2)
     assert "is a run of fit-mech, not of fit-hyd" in other.err
 
-    (row,) = json.loads(hydroid_cli("validate", short, "--fit=run", "--json", "--out=val").out)["results"]
+    done = json.loads(hydroid_cli("validate", short, "--fit=run", "--json", "--out=val").out)
+    (row,), (verdict,) = done["results"], done["verdict"]
+    assert (verdict["fit"], verdict["name"], verdict["unseen_deg"]) == ("run", "shoulder", None)
+    assert verdict["fitted_deg"] == pytest.approx(found["rms_deg"])
+    assert set(verdict["baselines_deg"]) == {"standing still", "speed tables", "nine numbers"}
     assert set(row) >= {"fit", "log", "joint", "mae_deg", "rms_deg", "max_deg", "fit_percent"}
     assert 0 <= row["inside_percent"] <= 100
     assert row["rms_deg"] == pytest.approx(found["estimates"]["refined"]["rms_deg"], rel=1e-9)
 
     done = hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "sim.csv")
     assert done.out == "sim.csv\n"
-    done = hydroid_cli("validate", "sim.csv", "--fit", "run", "--json", "--out", "val2")
-    assert json.loads(done.out)["results"][0]["max_deg"] < 1e-6  # its own prediction
+    done = json.loads(hydroid_cli("validate", "sim.csv", "--fit", "run", "--json", "--out", "val2").out)
+    assert done["results"][0]["max_deg"] < 1e-6  # its own prediction
+    assert done["verdict"][0]["verdict"] == "predicts"
     assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
-    assert (run / "responses" / "sim_joint_2.csv").exists()
+    assert (run / "responses" / "sim_shoulder.csv").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 

@@ -73,4 +73,4 @@ def test_delays_between_samples_act_in_between() -> None:
 def test_a_joint_without_commands_stands() -> None:
     log = recorded(1, joints=2)
     log.command[:, 1] = 0
-    assert list(fit_baselines([log], 2, LIMITS)) == ["does not move"]
+    assert list(fit_baselines([log], 2, LIMITS)) == ["standing still"]

@@ -11,7 +11,7 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import search
-from hydroid.fitting.validation import pooled_indices
+from hydroid.fitting.validation import error_indices
 from hydroid.parameters import relative_error
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
@@ -168,9 +168,9 @@ def test_shared_and_own_parameters_of_joints():
 def test_error_indices_against_their_definitions():
     rng = np.random.default_rng(0)
     measured, error = rng.normal(size=500), 0.1 * rng.normal(size=500)
-    indices = pooled_indices([(measured, measured - error)])
+    indices = error_indices(measured, error)
     assert indices.largest == pytest.approx(np.abs(error).max())
     assert indices.mean_absolute <= indices.rms <= indices.largest
-    assert pooled_indices([(measured, measured)]).fit == 100
-    assert pooled_indices([(measured, np.full(500, measured.mean()))]).fit == pytest.approx(0, abs=1e-9)
-    assert np.isnan(pooled_indices([(np.ones(5), np.zeros(5))]).fit)
+    assert error_indices(measured, 0 * measured).fit == 100
+    assert error_indices(measured, measured - measured.mean()).fit == pytest.approx(0, abs=1e-9)
+    assert np.isnan(error_indices(np.ones(5), np.ones(5)).fit)

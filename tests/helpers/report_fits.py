@@ -8,7 +8,8 @@ import numpy as np
 from hydroid.estimate import CurveEstimate, QuantityEstimate
 from hydroid.fitting.fit import Estimate, Fit
 from hydroid.fitting.summary import summarise
-from hydroid.fitting.validation import Prediction
+from hydroid.fitting.validation import Prediction, fitted
+from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
 from hydroid.posterior.covariance import Uncertainty, uncertainty_from
@@ -54,7 +55,8 @@ def make_problem(
     for number, source in enumerate(sources):
         time = np.arange(samples + 10 * number) * 0.01
         command = np.repeat(rng.uniform(-90, 90, (len(time) // 10 + 1, 7)), 10, axis=0)[: len(time)]
-        logs.append(Log(source, time, command, np.cumsum(command, axis=0) * 1e-4 + 0.3, 0.01))
+        angle = np.cumsum(command, axis=0) * 1e-4 + 0.3 + 0.05 * np.sin(20 * time)[:, None]
+        logs.append(Log(source, time, command, angle, 0.01))
     problem.logs = tuple(logs)
     problem.outputs = [joint - 1 for joint in outputs]
     channels = [log.angle[:, k] for log in logs for k in problem.outputs]
@@ -163,8 +165,9 @@ def make_record(
     """What the run of a fit stores, with predictions of unseen logs by name."""
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
-    summary = summarise(problem, fit)
-    return Record(folder, identity, problem.settings, summary, fit_result(problem, fit, None), unseen or {})
+    predictions, baselines = fitted(problem, fit), baselines_of(problem.settings, problem.logs)
+    result = fit_result(fit, predictions, baselines, None)
+    return Record(folder, identity, problem.settings, summarise(problem, fit), result, unseen or {})
 
 
 def make_prediction(

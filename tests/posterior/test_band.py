@@ -8,12 +8,10 @@ from conftest import TRUTH as ARTICLE
 from conftest import noisy, step_log
 
 import hydroid
-from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
-from hydroid.posterior.band import Band, prediction_bands, start_effects
+from hydroid.posterior.band import prediction_bands, start_effects
 from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.reporting.comparison import validation_page
 
 TRUTH = ARTICLE | {"K": 1.0, "D": 60.0, "S": 100.0}
 CHANGES = {
@@ -51,8 +49,6 @@ def test_a_band_holds_what_the_model_explains(fitted, factor, limits):
         start = start_effects(Problem(settings, [log]), model.theta, {2: band.noise})[2]
         assert band.error**2 == pytest.approx(band.expected**2 - np.sum(start**2) / len(log.time), rel=0.3)
         assert band.limit > band.expected
-    one = Prediction("one", log, (2,), {"one": response}, {2: band})
-    assert (one.finding.kind == "error not expected") is limits
 
 
 def test_a_band_includes_what_the_noise_of_the_start_does(fitted):
@@ -84,15 +80,3 @@ def test_leaving_out_each_log_predicts_it(fitted):
     assert max(spread) < 5
     with pytest.raises(hydroid.errors.SettingsError, match="two logs"):
         hydroid.validate(logs[:1], fit=model, out=None, leave_one_out=True)
-
-
-def test_without_a_band_nothing_is_called_as_expected(fitted):
-    settings, model = fitted
-    log = driven(settings, [-30.0, 50.0, 20.0, -70.0], 2, TRUTH)
-    response = predict(model, log, settings.outputs)
-    band = Band(0.002, np.full(len(response), np.inf), inside=1.0, error=0.01, expected=np.inf, limit=np.inf)
-    one = Prediction("one", log, (2,), {"one": response}, {2: band})
-    assert one.finding.kind == "error without band"
-    page = validation_page([one], settings.arm)
-    assert page.verdict is not None
-    assert [light.state for light in page.verdict.lights][-1] == "open"

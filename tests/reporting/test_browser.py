@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
-from hydroid.reporting.comparison import validation_page
+from hydroid.fitting.verdict import judge
 from hydroid.reporting.fit_report import fit_page
 from hydroid.reporting.page_file import write_page
+from hydroid.reporting.validation_report import validation_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -74,9 +75,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     fit = make_fit(problem, effects=(1e-3, 1e-3, 0.0, 1e-3))
     folder = tmp_path_factory.mktemp("pages")
     log = replace(problem.logs[0], source="unseen.csv")
-    results = [make_prediction(log, fit=name) for name in ("a", "b")]
-    arm = problem.settings.arm
-    for page in (fit_page(make_record(problem, fit)), validation_page(results, arm)):
+    results = [make_prediction(log, (2, 3), fit=name) for name in ("a", "b")]
+    arm, fits = problem.settings.arm, {p.fit: judge(problem.settings, [], {}, [p]) for p in results}
+    for page in (fit_page(make_record(problem, fit)), validation_page(results, fits, arm)):
         write_page(page, folder)
     return {name: folder / f"{name}.html" for name in ("report", "validation")}
 

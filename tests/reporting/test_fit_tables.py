@@ -8,7 +8,6 @@ from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
-from hydroid.fitting.validation import fitted, pooled_indices
 from hydroid.reporting.page import log_names
 from hydroid.reporting.parameters_report import parameter_table
 from hydroid.reporting.table import Table
@@ -51,14 +50,6 @@ def test_flags_and_findings_name_what_the_data_cannot_tell():
     expected = ["at lower bound", "fixed", "no effect", "at upper bound"]
     assert column(parameter_table(problem.settings, summarise(problem, at)), "flag") == expected
     assert Finding("at bound", "warning", ("M2",), {"side": "upper"}) in summarise(problem, at).findings
-
-
-def test_the_fit_of_all_joints_measures_each_about_its_own_mean():
-    problem = make_problem(("a.csv", "b.csv"), outputs=(2, 3))
-    pairs = [p.pair(joint) for p in fitted(problem, make_fit(problem)) for joint in p.joints]
-    error = sum(np.sum((measured - simulated) ** 2) for measured, simulated in pairs)
-    spread = sum(np.sum((measured - np.mean(measured)) ** 2) for measured, _ in pairs)
-    assert pooled_indices(pairs).fit == pytest.approx(100 * (1 - np.sqrt(error / spread)))
 
 
 @pytest.mark.parametrize(

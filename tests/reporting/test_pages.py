@@ -13,11 +13,13 @@ from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.errors import RunError
 from hydroid.fitting.search import HISTORY
-from hydroid.reporting.comparison import comparison_page, validation_page
+from hydroid.fitting.verdict import judge
 from hydroid.reporting.fit_report import fit_page
 from hydroid.reporting.page import Page, Section
-from hydroid.reporting.page_file import write_figures, write_page
+from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.table import Table
+from hydroid.reporting.validation_report import validation_page
+from hydroid.reporting.verdict_table import ordered
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -59,7 +61,7 @@ def test_writing_again_changes_no_byte(written):
     before = files(path)
     write_page(fit_page(record), path)
     assert files(path) == before
-    assert {"report.html", "tables/parameters.csv", "tables/errors.tex", "history.csv"} <= set(before)
+    assert {"report.html", "tables/parameters.csv", "tables/verdict.csv", "history.csv"} <= set(before)
 
 
 def test_every_chart_becomes_a_figure_well_formed_and_undated(written, tmp_path: Path):
@@ -97,46 +99,52 @@ def test_the_page_loads_nothing_from_elsewhere_and_a_name_is_text(written):
     assert "<b>&_" not in re.sub(r"<script.*?</script>", "", source, flags=re.DOTALL)
 
 
-def test_a_fit_that_did_not_converge_says_so_first(written):
+def test_a_fit_that_did_not_converge_says_so(written):
     _, problem, fit, _ = written
     ending = next(e for e in type(fit.refinement.ending) if not e.converged)
     ended = {"refined": replace(fit.refinement, ending=ending)}
     page = fit_page(make_record(problem, replace(fit, refinements=ended)))
     assert ending.value in page.warnings[0]
-    assert page.verdict is not None
-    assert {light.question: light.state for light in page.verdict.lights}["Converged"] == "bad"
 
 
-def test_an_unseen_log_comes_first_and_in_the_verdict():
+def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
     problem = make_problem()
-    log = replace(problem.logs[0], source="b.csv")
-    record = make_record(problem, make_fit(problem), {"b.csv": make_prediction(log)})
-    page = fit_page(record)
-    (section,) = [s for s in page.sections if s.title == "Prediction"]
-    assert [tab.name for tab in section.tabs] == ["b.csv", "a.csv"]
-    assert "predicts 1 unseen log with an error of 0.57°" in page.lead
-    assert not any("has not seen" in step.what for step in page.sections[0].steps)
+    log, fit = replace(problem.logs[0], source="b.csv"), make_fit(problem)
+    page = fit_page(make_record(problem, fit))
+    assert [row["verdict"] for row in page.sections[0].tables["verdict"].records()] == ["? not tested"]
+    assert page.lead == "shoulder: not tested."
+    page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=0.001)}))
+    assert page.sections[0].tables["verdict"].records()[0]["verdict"] == "✓ predicts"
+    errors = next(section for section in page.sections if section.title == "Errors by log")
+    assert [(tab.row, tab.column, tab.state) for tab in errors.tabs] == [
+        ("b.csv unseen", "shoulder", "good"),
+        ("a.csv fitted", "shoulder", "fair"),
+    ]
+    (steps,) = [section.steps for section in page.sections if section.title == "Do next"]
+    assert not any("has not seen" in step.what for step in steps)
 
 
-def test_runs_side_by_side_share_the_charts_of_a_log():
+def test_a_fit_that_fails_says_so_in_every_place():
     problem = make_problem()
-    record = make_record(problem, make_fit(problem))
-    page = comparison_page({"a": record, "b": record})
-    (plot,) = page.sections[0].tabs[0].plots
-    labels = {mark.label for panel in plot.draw().panels for mark in panel.marks}
-    assert {label.partition(" (")[0] for label in labels} >= {"a", "b", "measured"}
-    assert page.tables["parameters"].header == ("name", "unit", "a", "b", "spread [%]")
+    log, fit = replace(problem.logs[0], source="b.csv"), make_fit(problem)
+    page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=1.0)}))
+    text = Reader(html(page)).text
+    assert "✗ predicts no better than standing still" in text
+    assert "✓" not in text
+    assert page.lead == "shoulder: predicts no better than standing still."
 
 
-@pytest.mark.parametrize(("error", "state"), [(0.01, "good"), (0.2, "fair")])
-def test_a_validation_says_whether_the_error_is_as_expected(error: float, state: str):
+def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     problem = make_problem()
-    one = make_prediction(problem.logs[0], error=error)
-    band = replace(one.bands[2], inside=0.5 if error > 0.1 else 0.96, error=error)
-    page = validation_page([replace(one, bands={2: band})], problem.settings.arm)
-    assert page.verdict is not None
-    assert [light.state for light in page.verdict.lights] == [state]
-    assert len(page.warnings) == (state == "fair")
+    settings, log = problem.settings, problem.logs[0]
+    predictions = [make_prediction(log, fit=name, error=e) for name, e in (("bad", 0.2), ("good", 0.001))]
+    fits = ordered({p.fit: judge(settings, [], {}, [p]) for p in predictions})
+    assert list(fits) == ["good", "bad"]
+    page = validation_page(predictions, fits, settings.arm)
+    assert page.lead == "good: shoulder: predicts."
+    (tab,) = next(section for section in page.sections if section.title == "Errors by log").tabs
+    labels = {mark.label for panel in tab.plots[0].draw().panels for mark in panel.marks}
+    assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):

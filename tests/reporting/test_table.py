@@ -3,18 +3,15 @@
 import csv
 import io
 import math
-import re
 from decimal import Decimal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from markdown_it import MarkdownIt
 
 from hydroid.reporting.table import Given, Table
 from hydroid.words import number
 
-HOSTILE = r"<b>&_%$#{}~^|\*`[x](http://e.org).csv"
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc",)), max_size=30)
 
 
@@ -35,34 +32,12 @@ def test_csv_gives_back_every_bit_and_letter(values: list[float | str]):
 def test_bounds_keep_their_bits_in_csv_and_their_digits_elsewhere():
     bounds = table(Given(0.1 + 0.2), Given(57.95))
     assert bounds.csv().splitlines()[1] == f"{0.1 + 0.2!r},57.95"
-    assert "| 0.3 | 57.95 |" in bounds.markdown()
+    assert bounds.shown == [["0.3", "57.95"]]
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_shown_number_is_right_to_four_digits(value: float):
     assert abs(Decimal(number(value)) - Decimal(value)) <= abs(Decimal(value)) * Decimal("5.01e-4")
-
-
-@pytest.mark.parametrize("name", [HOSTILE, r"\|", "**bold**", "<script>", "`x`", "[x][y]", "_a_ ~~b~~"])
-def test_markdown_shows_a_hostile_name_as_it_is(name: str):
-    source = Table(name, ("h",), ((name,),), name).markdown()
-    tokens = MarkdownIt("gfm-like", {"linkify": False}).parse(source)
-    title, header, cell, note = [token for token in tokens if token.type == "inline"]
-    for token in (title, cell, note):
-        kinds = {child.type for child in token.children or []}
-        assert kinds <= {"text", "text_special", "strong_open", "strong_close"}
-        assert "".join(child.content for child in token.children or []) == name
-    assert header.content == "h"
-
-
-def test_latex_leaves_no_special_letter_bare():
-    source = Table(HOSTILE, (HOSTILE,), ((HOSTILE,), ("[2ex]",), ("*",)), HOSTILE).latex()
-    # what stays after all legal commands are taken out
-    rest = re.sub(r"\\text(backslash|asciitilde|asciicircum|less|greater|bar)\{\}", "", source)
-    rest = re.sub(r"\\[&%$#_{}]", "", rest)
-    assert not set("%$#_~^<>|") & set(rest)
-    assert rest.count("{") == rest.count("}")
-    assert "\n{[}2ex] \\\\" in source  # else a length for the line break before it
 
 
 def test_without_a_terminal_no_line_is_cut(

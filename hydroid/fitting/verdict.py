@@ -1,0 +1,132 @@
+"""The verdict on a fit, joint by joint: what it predicts, beside what anybody would try first.
+
+Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
+the joint's travel in the unseen logs. The first of these that is true is the verdict:
+
+1. does not fit: on the fitted logs the error is outside the tolerance, and a baseline is as good; where there
+   are unseen logs, one must be as good there too;
+2. not tested: no unseen log drives the joint;
+3. predicts: the error on the unseen logs is within the tolerance and, unless that is stated, below those of
+   all baselines;
+4. predicts no better than a baseline: one is as good on the unseen logs; the simplest such is named;
+5. fits but does not predict: the error on the unseen logs is more than twice that on the fitted ones, or it
+   diverges;
+6. predicts roughly: none of these. It is better than every baseline, and outside the tolerance.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from hydroid.estimate import JointVerdict, finite
+from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
+from hydroid.fitting.validation import Prediction
+from hydroid.log import Log
+from hydroid.parameters import Array
+from hydroid.settings.fit import FitSettings
+
+SHARE = 0.02
+"""of a joint's travel that its error may be where no tolerance is stated"""
+WORSE = 2.0
+"""times the error on fitted logs, beyond which a fit does not predict"""
+HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
+"""over which a predicted change of an angle is compared [s]"""
+ANYWHERE = np.array([-np.inf, np.inf])
+
+Baselines = Mapping[int, Mapping[str, Baseline]]
+"""by joint, numbered from 1, and by name, the simplest first"""
+
+
+def baselines_of(settings: FitSettings, logs: Sequence[Log]) -> Baselines:
+    """Fit the baselines of all compared joints to logs."""
+    arm = settings.arm
+    limits = dict(enumerate(zip(arm.lower, arm.upper, strict=True), start=1))
+    return {joint: fit_baselines(logs, joint, np.array(limits[joint])) for joint in settings.outputs}
+
+
+def judge(
+    settings: FitSettings,
+    fitted: Sequence[Prediction],
+    baselines: Baselines,
+    unseen: Sequence[Prediction] = (),
+) -> tuple[JointVerdict, ...]:
+    """Return the verdict on each compared joint.
+
+    Args:
+        settings: of the fit.
+        fitted: what it makes of its own logs; none of values that are no fit's.
+        baselines: fitted to the same logs; none: a joint is compared with standing still.
+        unseen: its predictions of other logs.
+    """
+    return tuple(
+        _judge(settings, fitted, unseen, baselines.get(j) or {NAMES[0]: Baseline(j, ANYWHERE)})
+        for j in settings.outputs
+    )
+
+
+def _judge(
+    settings: FitSettings,
+    fitted: Sequence[Prediction],
+    unseen: Sequence[Prediction],
+    rivals: Mapping[str, Baseline],
+) -> JointVerdict:
+    joint = rivals[NAMES[0]].joint
+    own, new = ([p for p in some if p.log.driven[joint - 1]] for some in (fitted, unseen))
+    judged = new or own
+    travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in judged), default=0.0)
+    tolerance = settings.tolerance_deg or float(np.degrees(SHARE * travel))
+    errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
+    by_rival = [
+        {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
+        for some in (own, new)
+    ]
+    word = _word(errors, by_rival, tolerance, stated=settings.tolerance_deg is not None)
+    ahead = {"the fit": [p.error(joint) for p in judged]}
+    ahead |= {name: [one.errors([p.log]) for p in judged] for name, one in rivals.items()}
+    return JointVerdict(
+        joint=joint,
+        name=settings.arm.joint_names[joint - 1],
+        verdict=word,
+        fitted_deg=finite(errors[0]),
+        unseen_deg=finite(errors[1]),
+        tolerance_deg=tolerance,
+        baselines_deg=by_rival[1] or by_rival[0],
+        horizons_deg={
+            name: tuple(_change_deg(some, judged, seconds) for seconds in HORIZONS)
+            for name, some in ahead.items()
+        },
+    )
+
+
+def _word(
+    errors: Sequence[float | None], rivals: Sequence[Mapping[str, float]], tolerance: float, *, stated: bool
+) -> str:
+    """Return the verdict from errors [deg] on the fitted and on the unseen logs, and the baselines' there."""
+    (fitted, unseen), (there, here) = errors, rivals
+    as_good = [] if unseen is None else [name for name, error in here.items() if not unseen < error]
+    misfit = fitted is not None and not fitted <= tolerance and not fitted < min(there.values())
+    if misfit and (unseen is None or as_good):
+        return "does not fit"
+    if unseen is None:
+        return "not tested"
+    if unseen <= tolerance and (stated or not as_good):
+        return "predicts"
+    if as_good:
+        return f"predicts no better than {as_good[0]}"
+    if fitted is not None and not unseen <= WORSE * fitted:
+        return "fits but does not predict"
+    return "predicts roughly"
+
+
+def rms_deg(errors: Iterable[Array]) -> float:
+    """Return the rms of errors [rad] over all samples [deg]; NaN where one diverged."""
+    return float(np.degrees(np.sqrt(np.mean(np.concatenate([*errors]) ** 2))))
+
+
+def _change_deg(errors: Sequence[Array], of: Sequence[Prediction], seconds: float) -> float | None:
+    """Return the rms error of the angle's change over a time [deg]; None: no log lasts so long."""
+    changes: list[Array] = []
+    for error, prediction in zip(errors, of, strict=True):
+        ahead = round(seconds / prediction.log.period)
+        changes.append(error[ahead:] - error[: max(len(error) - ahead, 0)])
+    return finite(rms_deg(changes)) if sum(map(len, changes)) else None

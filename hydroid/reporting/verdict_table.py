@@ -1,0 +1,84 @@
+"""The verdict on fits as a terminal and a page show it: one row a joint, beside the baselines."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hydroid.estimate import JointVerdict
+from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.verdict import HORIZONS
+from hydroid.reporting.page import Section, short_name
+from hydroid.reporting.table import Cell, Given, Table
+from hydroid.words import listed
+
+_SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
+"""of verdicts; all others are a ✗"""
+_NOTE = (
+    "rms errors in deg over the logs that drive the joint. Last three columns: no motion, a table of mean "
+    "speeds and nine numbers a joint, fitted to the same logs, on the unseen logs if there are any."
+)
+
+Verdicts = Mapping[str, Sequence[JointVerdict]]
+"""by fit"""
+
+
+def verdict_table(fits: Verdicts) -> Table:
+    """Return the verdicts on each joint of each fit."""
+
+    def row(fit: str, one: JointVerdict) -> dict[str, Cell]:
+        errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg}
+        errors |= {name: one.baselines_deg.get(name) for name in NAMES}
+        return {
+            **({"fit": short_name(fit)} if len(fits) > 1 else {}),
+            "joint": one.name,
+            "verdict": f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}",
+            **{name: None if error is None else Given(f"{error:.2g}") for name, error in errors.items()},
+        }
+
+    rows = (row(fit, one) for fit, verdicts in fits.items() for one in verdicts)
+    return Table.of("Verdict", rows, _NOTE, NAMES[:2])
+
+
+def horizon_table(fits: Verdicts) -> Table:
+    """Return the rms error of each angle's change over some times, of the fits and the baselines."""
+    rows = (
+        {
+            "joint": one.name,
+            "of": short_name(fit) if name == "the fit" else name,
+            **{f"{seconds:g} s": error for seconds, error in zip(HORIZONS, errors, strict=True)},
+        }
+        for fit, verdicts in fits.items()
+        for one in verdicts
+        for name, errors in one.horizons_deg.items()
+    )
+    note = "rms error [deg] of how far the angle turns in this time, from any moment of the logs on."
+    return Table.of("Error of the motion ahead", rows, note)
+
+
+def verdict_section(fits: Verdicts) -> Section:
+    """Return the section that every page of predictions begins with."""
+    return Section("Verdict", tables={"verdict": verdict_table(fits)}, more={"horizons": horizon_table(fits)})
+
+
+def ordered(fits: Verdicts) -> Verdicts:
+    """Return the fits, the smallest errors first: in parts of the tolerance, averaged over the joints."""
+
+    def size(name: str) -> float:
+        errors = (v.fitted_deg if v.unseen_deg is None else v.unseen_deg for v in fits[name])
+        sizes = [
+            np.inf if error is None else error / one.tolerance_deg
+            for error, one in zip(errors, fits[name], strict=True)
+        ]
+        return float(np.mean(sizes))
+
+    return {name: fits[name] for name in sorted(fits, key=size)}
+
+
+def lead(fits: Verdicts) -> str:
+    """Say of the first of the fits which joints it predicts, and what is wrong with the others."""
+    name, verdicts = next(iter(fits.items()))
+    of = f"{short_name(name)}: " if len(fits) > 1 else ""
+    by_word: dict[str, list[str]] = {}
+    for one in verdicts:
+        by_word.setdefault(one.verdict, []).append(one.name)
+    return of + "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items()) + "."

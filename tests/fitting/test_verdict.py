@@ -1,0 +1,98 @@
+"""The verdict: one of few words for every joint, and bad ones where a fit is bad."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from hydroid import load_settings
+from hydroid.fitting.baselines import NAMES
+from hydroid.fitting.validation import Prediction
+from hydroid.fitting.verdict import HORIZONS, judge
+from hydroid.log import Log
+
+SETTINGS = load_settings("fit-mech")
+TIME = np.arange(1200) * 0.01
+COMMAND = np.tile(np.sign(np.sin(TIME))[:, None] * 50, 7)
+LOG = Log("a.csv", TIME, COMMAND, np.radians(50) * np.tile(np.sin(TIME)[:, None], 7), 0.01)
+"""each joint turns by 100 deg: within 2 deg it is predicted"""
+
+
+@dataclass
+class Off:
+    """A baseline with one error everywhere [deg]; it is called with the log that it has seen, or another."""
+
+    seen: float
+    unseen: float
+    joint: int = 2
+
+    def errors(self, logs) -> np.ndarray:
+        return np.concatenate(
+            [np.full(len(log.time), np.radians(self.seen if log is LOG else self.unseen)) for log in logs]
+        )
+
+
+def predicted(error: float, log: Log) -> Prediction:
+    return Prediction("fit", log, (2,), {"fit": log.angle[:, [1]] - np.radians(error)})
+
+
+def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None):
+    settings = SETTINGS.model_copy(update={"tolerance_deg": tolerance})
+    rivals = {2: dict(zip(NAMES, (Off(40, 40), Off(8, 8), Off(*nine)), strict=True))}
+    own = [] if fitted is None else [predicted(fitted, LOG)]
+    others = [] if unseen is None else [predicted(unseen, log or replace(LOG, source="b.csv"))]
+    (one,) = judge(settings, own, rivals, others)
+    return one
+
+
+ROWS = {
+    "nothing unseen": ((1.0, None), {}, "not tested"),
+    "nothing unseen, worse than nine numbers": ((6.0, None), {}, "does not fit"),
+    "nothing unseen, worse than nine numbers, but good": ((1.0, None), {"nine": (0.5, 9)}, "not tested"),
+    "small error": ((1.0, 1.9), {}, "predicts"),
+    "small error from a smaller one": ((0.1, 1.9), {}, "predicts"),
+    "small error, smaller from nine numbers": (
+        (1.0, 1.9),
+        {"nine": (1, 1.5)},
+        "predicts no better than nine numbers",
+    ),
+    "that is within what the user asked for": ((1, 1.9), {"nine": (1, 1.5), "tolerance": 2}, "predicts"),
+    "better than anything, not good": ((2.5, 4.5), {}, "predicts roughly"),
+    "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),
+    "worse than the user allows": ((0.4, 0.7), {"tolerance": 0.5}, "predicts roughly"),
+    "much worse than on its own logs": ((1.0, 4.5), {}, "fits but does not predict"),
+    "worse than nine numbers": ((1.0, 5.5), {}, "predicts no better than nine numbers"),
+    "worse than a table: the simplest is named": ((1.0, 9.0), {}, "predicts no better than speed tables"),
+    "worse than standing still": ((1.0, 50.0), {}, "predicts no better than standing still"),
+    "worse than nine numbers everywhere": ((6.0, 6.0), {}, "does not fit"),
+    "worse on its logs, better on others": ((6.0, 4.0), {}, "predicts roughly"),
+    "diverged on others": ((1.0, np.nan), {}, "predicts no better than standing still"),
+    "diverged": ((np.nan, np.nan), {}, "does not fit"),
+    "no fit's": ((None, 1.0), {}, "predicts"),
+    "no fit's, and bad": ((None, 9.0), {}, "predicts no better than speed tables"),
+}
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_every_joint_has_one_verdict(row: str):
+    (fitted, unseen), how, expected = ROWS[row]
+    assert verdict(fitted, unseen, **how).verdict == expected
+
+
+def test_a_log_that_does_not_drive_the_joint_tests_nothing():
+    still = replace(LOG, source="b.csv", command=0 * LOG.command)
+    assert verdict(1.0, 0.01, log=still).verdict == "not tested"
+
+
+def test_the_errors_are_those_of_the_joint_by_name():
+    one = verdict(1.0, 3.0)
+    assert (one.joint, one.name, one.tolerance_deg) == (2, "shoulder", pytest.approx(2.0, rel=1e-3))
+    assert (one.fitted_deg, one.unseen_deg) == (pytest.approx(1.0), pytest.approx(3.0))
+    assert list(one.baselines_deg) == [*NAMES]
+    assert one.baselines_deg["nine numbers"] == pytest.approx(5.0)
+
+
+def test_the_error_of_a_change_is_of_what_the_angle_turns_in_that_time():
+    drift = replace(predicted(0, LOG), simulated={"fit": LOG.angle[:, [1]] - np.radians(0.5) * TIME[:, None]})
+    (one,) = judge(SETTINGS, [drift], {})
+    assert one.horizons_deg["the fit"] == pytest.approx([0.5 * seconds for seconds in HORIZONS])

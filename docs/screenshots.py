@@ -35,7 +35,6 @@ KINDS = {
     "validate": ("validate", OTHER, LOG, "--fit", "fit-hyd", "--fit", "fit-mech"),
     "identifiability": ("analyse", LOG, "--fit", "fit-mech", "--profile", "K,D"),
     "sensitivity": ("analyse", LOG, "--fit", "fit-hyd", "--sensitivity"),
-    "surface": ("analyse", LOG, "--fit", "fit-mech", "--over", "K,D", "--points", "9"),
     "suggest": ("suggest", "--fit", "fit-mech"),
     "design": ("design", "--fit", "fit-mech", "--duration", "12"),
     "collect": ("report", "--merge", "fit-mech", "fit-mech-2"),

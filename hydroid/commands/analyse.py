@@ -9,7 +9,6 @@ from hydroid.commands.logs import problem_of
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, rows, written
-from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.findings import Finding
 from hydroid.identified_model import start_values
@@ -29,9 +28,6 @@ def analyse(
     fit: "ModelSource | None" = None,
     profile: str | list[str] = "",
     sensitivity: bool = False,
-    over: Sequence[str | Sequence[str]] = (),
-    points: int = 31,
-    around: float | None = None,
     out: "Source | None" = "runs/analysis",
     config: "ConfigSource | None" = None,
     set: "SettingChanges" = None,
@@ -44,26 +40,20 @@ def analyse(
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 
-        study = hydroid.analyse("a.csv", fit="runs/a", over=["K,D"])
+        study = hydroid.analyse("a.csv", fit="runs/a")
         print(study.result.uncertainty.interval)
 
     Args:
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of the
             parameters].
         profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
-        sensitivity: Add the effect of each free parameter on each output over time (article, figure 10): for
-            1 % of the parameter, and for 20 values within its bounds. Both are also written as CSV.
-        over (K,D): Add the error over two parameters, the others at the estimate (article, figure 11). Repeat
-            it for several pairs. The setting objective.norm says which error: inf, 2 (rms) or 1.
-        points (3 to 301): Grid points along each axis of --over.
-        around (0.001 to 1000): With --over: plus and minus so many % around the estimate [default: from bound
-            to bound].
+        sensitivity: Add the effect of 1 % of each free parameter on each output over time (article, figure
+            10). It is also written as CSV.
 
     Raises:
         SettingsError: a name that is no free parameter.
         RunError: the simulation diverged, or the folder cannot be written.
     """
-    pairs = [_pair(pair) for pair in over or ()]
     if fit is None:
         model = start_values(load_settings(config or "fit-mech", set))
     else:
@@ -73,27 +63,19 @@ def analyse(
     from hydroid.reporting.analysis_report import analysis_page
     from hydroid.reporting.uncertainty_report import uncertainty_page
 
-    grid = points, None if around is None else around / 100
     with Progress() as progress:
         study = _uncertainty(problem, model.theta, model.source, names(profile), progress)
         theta = study.uncertainty.theta
         sweep = sweeps.sweep(problem, theta, progress) if sensitivity else None
-        surfaces = [sweeps.surface(problem, theta, pair, *grid, progress) for pair in pairs]
-    page = analysis_page(problem, theta, uncertainty_page(study), sweep, surfaces)
-    error = "error" if problem.settings.objective.relative else "error_deg"
-    lowest, estimate = ([f"first_{at}", f"second_{at}", f"{at}_{error}"] for at in ("lowest", "estimate"))
-    keys = {
-        "sensitivity": ("log", "output", "parameter", "rms_per_percent"),
-        "surface": ("parameters", *lowest, *estimate),
-    }
-    tables = {name: page.tables[name] for name in keys if name in page.tables}
+    page = analysis_page(problem, theta, uncertainty_page(study), sweep)
+    tables = {name: page.tables[name] for name in ("sensitivity",) if name in page.tables}
     known = study.summary.plain()
     for name, parameter in known["estimate"].items():
         interval = study.intervals.get(name)
         parameter["profile_interval"] = interval and [*map(finite, interval)]
     content = {"at": study.source, "rank": study.identifiability.rank}
     content |= {name: known[name] for name in ("findings", "estimate")}
-    content |= {name: rows(table, *keys[name]) for name, table in tables.items()}
+    content |= {n: rows(t, "log", "output", "parameter", "rms_per_percent") for n, t in tables.items()}
     notes = [f"- {finding}" for finding in study.summary.findings]
     lines = [page.tables["parameters"], *tables.values(), *notes, *written(page, out)]
     return Result(lines, content, study, page)
@@ -128,11 +110,3 @@ def _uncertainty(
     values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
     moved = Finding("moved", "warning", (), {"values": values})
     return replace(at(theta, f"a better optimum than that of {source}"), moved=(moved,))
-
-
-def _pair(given: str | Sequence[str]) -> tuple[str, str]:
-    pair = names(given if isinstance(given, str) else [*given])
-    if len(pair) != 2:
-        hint = "such as K,D"
-        raise SettingsError("is no pair of parameters", where=f"--over {','.join(pair)}", hint=hint)
-    return pair[0], pair[1]

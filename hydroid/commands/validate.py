@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
     from hydroid.identified_model import IdentifiedModel
     from hydroid.log import Log
-    from hydroid.reporting.page import Section
 
 
 @command
@@ -61,17 +60,17 @@ def validate(
     from hydroid.reporting.verdict_table import ordered, verdict_table
     from hydroid.run.record import keep_validation
 
-    predicted, verdicts, more = dict[str, Any](), dict[str, Any](), list[Any]()
+    predicted, verdicts = dict[str, Any](), dict[str, Any]()
     for model, own in zip(models, read, strict=True):
         name = unique(model.name, predicted)
         test = _left_out if leave_one_out else _predicted
-        predictions, verdicts[name] = test(model, own, more)
+        predictions, verdicts[name] = test(model, own)
         predicted[name] = [replace(one, fit=name) for one in predictions]
         if out is not None and not leave_one_out and (run := keep_validation(model, predictions)):
             draw(run)
     fits, arm = ordered(verdicts), models[0].settings.arm
     results = [one for name in fits for one in predicted[name]]
-    page = validation_page(results, fits, arm, *more)
+    page = validation_page(results, fits, arm)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
         "results": [row for one in results for row in one.plain(arm.joint_names)],
@@ -81,7 +80,7 @@ def validate(
 
 
 def _predicted(
-    model: "IdentifiedModel", logs: "Sequence[Log]", more: "list[Section]"
+    model: "IdentifiedModel", logs: "Sequence[Log]"
 ) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
     """Return predictions of logs, and the verdict by those that the fit has not seen."""
     from hydroid.fitting.validation import predicted
@@ -98,17 +97,13 @@ def _predicted(
 
 
 def _left_out(
-    model: "IdentifiedModel", logs: "Sequence[Log]", more: "list[Section]"
+    model: "IdentifiedModel", logs: "Sequence[Log]"
 ) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
     """Return the prediction of each log by a fit to the others, and the verdict; baselines know all logs."""
     from hydroid.fitting.validation import predicted, without_one
     from hydroid.fitting.verdict import baselines_of, judge
-    from hydroid.reporting.page import Section
-    from hydroid.reporting.validation_report import side_by_side
 
     folds = [without_one(model, logs, i) for i in range(len(logs))]
-    table = side_by_side({fold.source: (fold.settings, fold.values) for fold in folds})
-    more.append(Section("Without one log", tables={"folds": table}, folded=True))
     predictions = [predicted(fold, log, unseen=True) for fold, log in zip(folds, logs, strict=True)]
     fitted = [predicted(model, log, unseen=False) for log in logs]
     return predictions, judge(model.settings, fitted, baselines_of(model.settings, logs), predictions)

@@ -104,13 +104,13 @@ def view(
 def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | None") -> "Result[Clearance]":
     """Find which bodies meet along a trajectory, when and how deep, and how near they come otherwise."""
     from hydroid.arm.model import ALONE, load_machine
-    from hydroid.reporting.collision_report import collision_tables, summary
+    from hydroid.reporting.collision_report import collision_table, summary
 
     machine = load_machine(settings.arm, pair=ALONE not in logs)
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    tables, nearest = collision_tables(result), result.smallest
+    tables, nearest = {"collisions": collision_table(result)} if result.meetings else {}, result.smallest
     keys = ("from_s", "to_s", "depth_m", "deepest_at_s")
     meetings = [
         {"bodies": [m.first, m.second]} | dict(zip(keys, (m.begins, m.ends, m.depth, m.deepest), strict=True))
@@ -125,7 +125,7 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings", out: "Source | 
         "checked_pairs": result.checked,
         "excluded": [[*pair] for pair in result.excluded],
     }
-    lines = [*tables.values(), summary(result), *written(tables, out)]
+    lines = [*tables.values(), summary(result), *(written(tables, out) if tables else [])]
     return Result(lines, content, result, exit_status=1 if meetings else 0)
 
 

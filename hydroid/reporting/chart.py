@@ -25,8 +25,8 @@ class Mark:
     """One thing drawn in a panel.
 
     Attributes:
-        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`; `bars` from
-            x to `end` at the height y; `spans`, from x to `end` over the whole height; `rule` at a value y,
+        kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`; `spans`,
+            from x to `end` over the whole height; `rule` at a value y,
             or at a value x where y is empty; `area` inside polygons that NaN separates; `text` at points.
         x, y, end: as the kind says, shapes (n,).
         color: its name.
@@ -38,7 +38,7 @@ class Mark:
         texts: what a `text` says at each of its points.
     """
 
-    kind: Literal["line", "step", "points", "band", "bars", "spans", "rule", "area", "text"]
+    kind: Literal["line", "step", "points", "band", "spans", "rule", "area", "text"]
     x: Array = field(default_factory=_none)
     y: Array = field(default_factory=_none)
     end: Array = field(default_factory=_none)
@@ -79,7 +79,6 @@ class Panel:
         height: in the page [px].
         x_limits, y_limits: of the axes; None: around all that is drawn.
         log_x, log_y: whether an axis is logarithmic.
-        names: of the heights 0, 1, … of the y axis, from the top.
         equal: whether a unit is as long on both axes.
     """
 
@@ -92,7 +91,6 @@ class Panel:
     y_limits: tuple[float, float] | None = None
     log_x: bool = False
     log_y: bool = False
-    names: tuple[str, ...] = ()
     equal: bool = False
 
 

@@ -13,7 +13,7 @@
 
   const color = (name) => getComputedStyle(page).getPropertyValue(`--${name}`).trim();
   const numbers = (values) => (values ?? []).map((v) => v ?? NaN);
-  const sizes = { circle: "circle", diamond: "diamond", square: "square", dash: "dash" };
+  const sizes = { circle: "circle", diamond: "diamond", dash: "dash" };
 
   // [low, high] of all marks that are shown along an axis, with a margin
   function extent(panel, axis, shown) {
@@ -22,8 +22,7 @@
     for (const mark of panel.marks) {
       if (mark.label && shown.get(mark.label) === false) continue;
       if (mark.kind === "spans" || (mark.kind === "rule" && axis === "x")) continue;
-      const others = axis === "y" ? ["y", ...(mark.kind === "band" ? ["end"] : [])]
-        : ["x", ...(mark.kind === "bars" ? ["end"] : [])];
+      const others = axis === "y" && mark.kind === "band" ? ["y", "end"] : [axis];
       for (const name of others) for (const v of mark[name] ?? [])
         if (v !== null && (!log || v > 0)) { low = Math.min(low, v); high = Math.max(high, v); }
     }
@@ -50,8 +49,6 @@
       made = [figure.patch({ x, y, fill_color: paint, fill_alpha: alpha, line_color: null })];
     else if (mark.kind === "text")
       made = [figure.text({ x, y, text: mark.texts, text_color: paint, text_font_size: "12px", x_offset: 4, y_offset: -4, angle: Math.PI / 6 })];
-    else if (mark.kind === "bars")
-      made = [figure.segment({ x0: x, x1: end, y0: y, y1: y, ...line })];
     else {
       const models = mark.kind === "rule"
         ? (y.length ? y : x).map((at) => new Bokeh.Span({ location: at, dimension: y.length ? "width" : "height", level: "underlay", ...line }))
@@ -89,20 +86,14 @@
         ends[0] -= room; ends[1] += room;
       }
     }
-    const n = panel.names.length;
-    const y_range = new Bokeh.Range1d(n ? { start: n - 0.4, end: -0.6 } : { start: ys[0], end: ys[1] });
+    const y_range = new Bokeh.Range1d({ start: ys[0], end: ys[1] });
     const figure = Bokeh.Plotting.figure({
       output_backend: "svg", // sharp on paper too
       height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
       x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
       x_axis_label: panel.x || null, y_axis_label: panel.y || null,
-      min_border_left: n ? 0 : 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
+      min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
-    if (n) {
-      const axis = figure.yaxes[0];
-      axis.ticker = new Bokeh.FixedTicker({ ticks: panel.names.map((_, i) => i) });
-      axis.major_label_overrides = new Map(panel.names.map((name, i) => [i, name]));
-    }
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
     if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
     if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
@@ -178,7 +169,7 @@
         button.setAttribute("aria-pressed", on);
         for (const p of panels) {
           p.made.filter((one) => one.tags?.[0] === mark.label).forEach((one) => { one.visible = on; });
-          if (p.panel.y_limits || p.panel.names.length) continue;
+          if (p.panel.y_limits) continue;
           const [start, end] = extent(p.panel, "y", shown);
           p.y_range.setv({ start, end });
         }

@@ -2,8 +2,6 @@
 
 from itertools import groupby
 
-import numpy as np
-
 from hydroid.arm.collision import Clearance, Meeting
 from hydroid.reporting.table import Cell, Table
 
@@ -11,12 +9,6 @@ SHAPES = (
     "Bodies are as large as the shapes that collide in the MJCF; a mesh counts as its convex hull, hoses and "
     "cylinders are not checked. A body is not held against the one that it hangs on."
 )
-
-
-def collision_tables(clearance: Clearance) -> dict[str, Table]:
-    """Return the tables `nearest` and, if bodies meet, `collisions`."""
-    meet = {"collisions": collision_table(clearance)} if clearance.meetings else {}
-    return meet | {"nearest": nearest_table(clearance)}
 
 
 def summary(clearance: Clearance) -> str:
@@ -43,19 +35,5 @@ def collision_table(clearance: Clearance) -> Table:
         worst = max(times, key=lambda meeting: meeting.depth)
         rows.append((*pair, len(times), times[0].begins, times[0].ends, 1e3 * worst.depth, worst.deepest))
     header = ("first", "second", "times", "first from [s]", "to [s]", "depth [mm]", "at [s]")
-    note = "depth: the largest of all times. --json lists every time."
+    note = f"depth: the largest of all times. --json lists every time. {SHAPES}"
     return Table("Bodies that meet", header, tuple(rows), note)
-
-
-def nearest_table(clearance: Clearance) -> Table:
-    """Return the pairs of bodies that were the nearest at any time, the nearest of all first."""
-    rows: dict[tuple[str, str], tuple[Cell, ...]] = {}
-    for k in np.argsort(clearance.distance, kind="stable").tolist():
-        pair = clearance.nearest[k]
-        if pair not in rows:
-            share = 100 * clearance.nearest.count(pair) / len(clearance.time)
-            rows[pair] = (*pair, 1e3 * float(clearance.distance[k]), float(clearance.time[k]), share)
-    excluded = ", ".join("–".join(pair) for pair in clearance.excluded)
-    note = f"{SHAPES} {clearance.checked} pairs were checked. The model excludes: {excluded or 'none'}."
-    header = ("first", "second", "smallest distance [mm]", "at [s]", "share of the time [%]")
-    return Table("Nearest bodies", header, tuple(rows.values()), note)

@@ -34,7 +34,6 @@ _LOOKS: dict[str, Any] = {
     "dashed": (0, (5, 3)),
     "dotted": ":",
     "diamond": "D",
-    "square": "s",
     "dash": "|",
 }
 _STYLE: dict[str, Any] = {
@@ -111,9 +110,6 @@ def _panel(axes: Axes, panel: Panel) -> None:
             axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_minor_locator(NullLocator())
             axis.set_major_formatter(FuncFormatter(lambda value, _: plain(float(f"{value:.4g}"))))
-    if panel.names:
-        axes.set_yticks(range(len(panel.names)), panel.names)
-        axes.set_ylim(len(panel.names) - 0.4, -0.6)
     if panel.x_limits:
         axes.set_xlim(*panel.x_limits)
     if panel.y_limits:
@@ -135,8 +131,6 @@ def _draw(axes: Axes, mark: Mark) -> None:
             axes.plot(x, y, _LOOKS.get(mark.look, "o"), ms=mark.width, zorder=3, **look)
         case "band":
             axes.fill_between(x, y, end, lw=0, **look)
-        case "bars":
-            axes.hlines(y, x, end, **line)
         case "spans":
             ends = np.column_stack([x, end, np.full(len(x), np.nan)]).ravel()
             axes.fill_between(ends, 0, 1, transform=axes.get_xaxis_transform(), lw=0, zorder=0, **look)

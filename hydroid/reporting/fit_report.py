@@ -21,8 +21,8 @@ from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
 from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
 from hydroid.reporting.parameters_report import parameter_section
-from hydroid.reporting.predictions import prediction_sections, response_data
-from hydroid.reporting.quantities_report import curves_csv, quantity_section, speed_section
+from hydroid.reporting.predictions import prediction_sections
+from hydroid.reporting.quantities_report import quantity_section, speed_section
 from hydroid.reporting.suggestion_report import suggestion_sections
 from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.uncertainty_report import direction_section, unknown_section, warnings
@@ -167,6 +167,4 @@ def _data(record: Record) -> dict[str, str]:
     return {
         "history.csv": numbers_csv(HISTORY, result.history),
         "pareto.csv": numbers_csv(header, np.column_stack([theta, objectives])),
-        "tables/curves.csv": curves_csv(record.summary.curves),
-        **response_data(record.predictions, record.settings.arm),
     }

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import degrees
-from pathlib import Path
 
 import numpy as np
 
-from hydroid.files import file_name
 from hydroid.fitting.validation import Prediction
 from hydroid.parameters import Array
 from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import motion_section
 from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name, unique
-from hydroid.reporting.table import Cell, Table, numbers_csv
+from hydroid.reporting.table import Cell, Table
 from hydroid.reporting.verdict_table import Verdicts
 from hydroid.settings.arm import Arm
 from hydroid.words import number
@@ -48,14 +46,6 @@ class JointResponse:
     def measured(self) -> Array:
         """Angle [rad], shape (T,)."""
         return self.of.log.angle[:, self.joint - 1]
-
-    def csv(self) -> str:
-        """Return the whole record and all responses, in deg and %."""
-        log, angles = self.of.log, {"measured": self.measured, **self.simulated}
-        angles |= {f"{name} half_band": half for name, half in self.bands.items()}
-        columns = {"time_s": log.time, "command_pct": log.command[:, self.joint - 1]}
-        columns |= {f"{name}_deg": np.degrees(angle) for name, angle in angles.items()}
-        return numbers_csv(tuple(columns), np.column_stack(list(columns.values())))
 
 
 def joint_responses(predictions: Sequence[Prediction], arm: Arm) -> list[JointResponse]:
@@ -133,15 +123,6 @@ def error_table(predictions: Sequence[Prediction], arm: Arm) -> Table:
     optional = "mean absolute [deg]", "largest [deg]", "inside band [%]", "expected [deg]"
     rows = (row(one, joint) for one in predictions for joint in one.joints)
     return Table.of("Errors", rows, note, optional)
-
-
-def response_data(predictions: Sequence[Prediction], arm: Arm) -> dict[str, str]:
-    """Return all responses as CSV by file."""
-    taken: set[str] = set()
-    return {
-        f"responses/{file_name(f'{Path(one.log).stem}_{one.name}', taken)}.csv": one.csv()
-        for one in joint_responses(predictions, arm)
-    }
 
 
 def draw(response: JointResponse, bins: int = _MOST) -> Chart:

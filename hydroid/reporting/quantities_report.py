@@ -48,17 +48,6 @@ def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log
     return (Section("Speeds", plots=(plot,)),) if speeds else ()
 
 
-def curves_csv(curves: Mapping[str, CurveEstimate]) -> str:
-    """Return all curves as CSV, one point per row; an end without limit is empty."""
-    header = ("curve", "joint", "quantity", "unit", "along", "at", "value", "from", "to")
-    rows = tuple(
-        (name, curve.joint, curve.label, curve.unit, curve.along, at, value, *ends)
-        for name, curve in curves.items()
-        for at, value, ends in zip(curve.at, curve.value, curve.interval, strict=True)
-    )
-    return Table("", header, rows).csv()
-
-
 def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
     """Draw each joint's speed against command with its band and, in stage 2, at 50 % over its travel."""
     panels: list[Panel] = []

@@ -1,47 +1,25 @@
-"""Several models: the page of a validation, and tables of runs side by side."""
+"""The page of a validation, and tables of runs that differ in their seeds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from hydroid.fitting.validation import Prediction
 from hydroid.parameters import Array
-from hydroid.reporting.page import Page, Section, short_name, unique
+from hydroid.reporting.page import Page
 from hydroid.reporting.parameters_report import status
-from hydroid.reporting.predictions import prediction_sections, response_data
-from hydroid.reporting.table import Cell, Table
+from hydroid.reporting.predictions import prediction_sections
+from hydroid.reporting.table import Table
 from hydroid.reporting.verdict_table import Verdicts, lead, verdict_section
 from hydroid.run.collection import Runs
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings
 
 
-def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *more: Section) -> Page:
+def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm) -> Page:
     """Return the page of several fits on several logs; its tables are `verdict` and `errors`."""
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    sections = verdict_section(fits), *prediction_sections(ordered, arm, fits), *more
-    return Page("validation", "Validation", lead(fits), sections, data=response_data(ordered, arm))
-
-
-def side_by_side(models: Mapping[str, tuple[FitSettings, Mapping[str, float]]]) -> Table:
-    """Return the free parameters of models by name, one column each, and how far apart their values are."""
-    units = {
-        n: p.unit
-        for settings, _ in models.values()
-        for n, p in settings.parameters.items()
-        if p.fixed is None
-    }
-
-    def row(name: str, unit: str) -> dict[str, Cell]:
-        cells: dict[str, float | None] = {}
-        for model, (_, values) in models.items():
-            cells[unique(short_name(model), cells)] = values.get(name)
-        known = np.array([value for value in cells.values() if value is not None])
-        spread = 100 * float(known.std(ddof=1) / known.mean()) if len(known) > 1 and known.any() else None
-        return {"name": name, "unit": unit, **cells, "spread [%]": spread}
-
-    note = "spread: standard deviation of the values relative to their mean."
-    return Table.of("Parameters side by side", (row(*one) for one in units.items()), note, ("spread [%]",))
+    sections = verdict_section(fits), *prediction_sections(ordered, arm, fits)
+    return Page("validation", "Validation", lead(fits), sections)
 
 
 def merged_tables(runs: Runs) -> dict[str, Table]:

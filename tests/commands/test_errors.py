@@ -33,7 +33,6 @@ WRONG = [
     ("validate {log} --fit {root}/configs/fit-mech.yaml", "settings", "these are settings"),
     ("validate {log} --fit {root}/README.md", "settings", "README.md: is no estimate"),
     ("analyse {log} --profile Z", "settings", "no free parameter 'Z' to profile"),
-    ("analyse {log} --over K", "settings", "--over K: is no pair of parameters"),
     ("analyse", "settings", "no log is given"),
     ("simulate {log} --fit p.yaml --out o.csv", "settings", "'M6' is missing"),
     ("simulate {log} --fit no.yaml", "settings", "no.yaml"),

@@ -50,7 +50,6 @@ def test_fit_validate_and_simulate_walk_through(short: Path, hydroid_cli: Run, t
     assert done["results"][0]["max_deg"] < 1e-6  # its own prediction
     assert done["verdict"][0]["verdict"] == "predicts"
     assert (run / "validations" / "sim.csv" / "result.npz").exists()  # and the fit's own report shows it
-    assert (run / "responses" / "sim_shoulder.csv").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "sim.csv", "val", "val2"]
 
 
@@ -74,7 +73,7 @@ def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cl
 def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_path: Path):
     values = tmp_path / "values.yaml"
     values.write_text("{K: 1.5, D: 400, S: 80, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4.0, M6: 4.7}")
-    how = ["--fit", values, "--profile", "S", "--over", "K,D", "--points", 3, "--sensitivity"]
+    how = ["--fit", values, "--profile", "S", "--sensitivity"]
     done = hydroid_cli("analyse", short, *how, "--set", "objective.noise_deg=0.5", "--out", "told", "--json")
     found = json.loads(done.out)
     assert ["M1"] in [f["subjects"] for f in found["findings"] if f["kind"] == "no effect"]
@@ -85,8 +84,7 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
     assert rows["M1"]["data_share"] == 0
     assert rows["S"]["profile_interval"] is not None
     assert {row["parameter"] for row in found["sensitivity"]} == set(rows)
-    assert found["surface"][0]["parameters"] == "K, D"
-    for name in ("analysis.html", "tables/parameters.csv", "surface_K_D.csv"):
+    for name in ("analysis.html", "tables/parameters.csv", "tables/sensitivity.csv"):
         assert (tmp_path / "told" / name).stat().st_size > 0
 
 

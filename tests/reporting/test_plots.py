@@ -146,16 +146,13 @@ def test_every_kind_of_mark_can_be_drawn():
         Mark("step", x, x),
         Mark("points", x, x, look="diamond", label="p"),
         Mark("band", x, x, x + 1, alpha=0.3),
-        Mark("bars", x, x, x + 1, label="b"),
         Mark("spans", x[:1], end=x[1:2]),
         Mark("rule", y=x[:1], look="dashed"),
         Mark("rule", x[:1], look="dotted"),
         Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
         Mark("text", x, x, texts=("a", "b", "c")),
     )
-    check(
-        Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4], names=("a", "b"))), columns=2)
-    )
+    check(Chart((Panel("x", "y", marks, log_x=True), Panel("x", "", marks[1:4])), columns=2))
 
 
 @pytest.mark.parametrize("samples", [1, 7, 2000, 2001, 100_003])

@@ -66,7 +66,7 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
     from hydroid.reporting.page_file import write_page, write_tables
 
     write = write_tables if isinstance(report, Mapping) else write_page
-    return [str(write(report, Path(out))[-1])]  # pyright: ignore[reportArgumentType]
+    return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
 
 
 def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:

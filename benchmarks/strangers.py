@@ -327,7 +327,7 @@ def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[fl
     """Run what `hydroid init` prints; `rich`: with the settings of `richer`.
 
     Returns:
-        Rms error of each joint on the unseen log [deg], the joints that the verdict blames the model for,
+        Rms error of each joint on the unseen log [deg], the joints that are not predicted by the verdict,
         numbered from 1, and the seconds to the end of the fit.
     """
     mine, began = folder / "mine", time.perf_counter()
@@ -336,11 +336,9 @@ def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[fl
         richer(mine / "fit.yaml")
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
     seconds = time.perf_counter() - began
-    judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").result[
-        0
-    ]
-    errors = [float(np.degrees(indices.rms)) for indices in judged.indices.values()]
-    return errors, [joint for joint, band in judged.bands.items() if band.model_limits], seconds
+    judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").plain()
+    errors = [row["rms_deg"] for row in judged["results"]]
+    return errors, [one["joint"] for one in judged["verdict"] if one["verdict"] != "predicts"], seconds
 
 
 def main() -> None:
@@ -349,7 +347,7 @@ def main() -> None:
     home = Path(given.folder)
     shutil.rmtree(home, ignore_errors=True)
     good, silent = 0, 0
-    table("machine | joints | unseen rms [deg] | good at most | blamed joints | s")
+    table("machine | joints | unseen rms [deg] | good at most | named joints | s")
     for number in range(given.first, given.first + given.machines):
         rng = np.random.default_rng([given.seed, number])
         machine, folder = random_machine(rng, number), home / f"{number:02d}"

@@ -39,32 +39,27 @@ class ErrorIndices:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What one model, or each estimate of one fit, makes of a log's commands.
+    """What a model makes of a log's commands.
 
     Attributes:
         fit: name of the model.
         log: what it is compared with.
         joints: K that are compared, numbered from 1.
-        simulated: their angles [rad], shape (T, K), by estimate; the first is the one to use.
-        bands: prediction bands of the first by joint; empty of a model that is no fit.
+        response: their angles [rad], shape (T, K).
+        bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
     """
 
     fit: str
     log: Log
     joints: tuple[int, ...]
-    simulated: Mapping[str, Array]
+    response: Array
     bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
     unseen: bool | None = None
 
     @property
-    def response(self) -> Array:
-        """The angles of the estimate to use [rad], shape (T, K)."""
-        return next(iter(self.simulated.values()))
-
-    @property
     def indices(self) -> dict[int, ErrorIndices]:
-        """Of the estimate to use, by joint."""
+        """By joint."""
         return {j: error_indices(self.log.angle[:, j - 1], self.error(j)) for j in self.joints}
 
     def error(self, joint: int) -> Array:
@@ -113,11 +108,11 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     joints = tuple(model.settings.outputs)
     response = predict(model, log, joints)
     bands = prediction_bands(model, log, response)
-    return Prediction(model.name, log, joints, {model.name: response}, bands, unseen)
+    return Prediction(model.name, log, joints, response, bands, unseen)
 
 
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
-    """Return what the estimates of a fit make of its own logs, the final estimate first."""
+    """Return what the final estimate of a fit makes of its own logs."""
     known = fit.uncertainty.posterior
     slopes = np.nan_to_num(fit.uncertainty.jacobian.slopes[known.box.varied])
     bands: list[dict[int, Band]] = [{} for _ in problem.logs]
@@ -129,12 +124,10 @@ def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
             inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
             expected = float(np.sqrt(np.mean(sd**2) + level**2))
             bands[channel.log][channel.joint] = Band(level, half, inside, rms, expected, np.inf)
-    names, joints = dict.fromkeys([fit.final, *fit.estimates]), tuple(problem.settings.outputs)
+    joints = tuple(problem.settings.outputs)
     return tuple(
-        Prediction(
-            fit.final, log, joints, {n: fit.estimates[n].responses[i] for n in names}, bands[i], unseen=False
-        )
-        for i, log in enumerate(problem.logs)
+        Prediction(fit.final, *one, unseen=False)
+        for one in zip(problem.logs, [joints] * len(bands), fit.best.responses, bands, strict=True)
     )
 
 

@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from hydroid.advice.proposals import action_findings, missing_findings
 from hydroid.errors import SettingsError
@@ -68,7 +67,7 @@ def fit_page(record: Record) -> Page:
         *advice,
         *direction_section(summary),
         _search(record),
-        Section("Reproduce", facts=tuple(_facts(record))),
+        Section("Reproduce", facts=(("command", _command(record)),)),
     )
     sections = (
         verdict_section(fits),
@@ -133,8 +132,8 @@ def _search(record: Record) -> Section:
         (one.name, f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}")
         for one in result.refinements
     ]
-    first = record.summary.final, record.summary.searched
-    segments = dict(sorted(result.segments.items(), key=lambda one: (one[0] != first[0], one[0] != first[1])))
+    names = dict.fromkeys([str(record.summary.final), *result.segments])
+    segments = {name: result.segments[name] for name in names}
     plots = (
         Plot("learning", "Best candidate so far.", partial(learning, result.history, objective)),
         Plot(
@@ -146,15 +145,10 @@ def _search(record: Record) -> Section:
     return Section("How the search went", facts=tuple(facts), plots=plots)
 
 
-def _facts(record: Record) -> Iterator[tuple[str, str]]:
-    """Yield the command, and the settings that are not the defaults."""
-    run, settings = record.folder, record.settings
-    config, again = shlex.quote(f"{run}/config.yaml"), shlex.quote(f"{run}-again")
-    yield "command", f"hydroid fit-{settings.stage} {record.given} --config {config} --out {again}"
-    kinds = {"objective", "search", "payloads", "priors"}
-    for kind, given in settings.model_dump(mode="json", exclude_defaults=True, include=kinds).items():
-        text = yaml.safe_dump(given, default_flow_style=True, allow_unicode=True, width=10_000)
-        yield kind, text.strip()[1:-1]
+def _command(record: Record) -> str:
+    """Return the command that makes the fit again."""
+    config, again = (shlex.quote(f"{record.folder}{end}") for end in ("/config.yaml", "-again"))
+    return f"hydroid fit-{record.settings.stage} {record.given} --config {config} --out {again}"
 
 
 def _data(record: Record) -> dict[str, str]:

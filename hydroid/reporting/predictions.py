@@ -49,24 +49,18 @@ class JointResponse:
 
 
 def joint_responses(predictions: Sequence[Prediction], arm: Arm) -> list[JointResponse]:
-    """Return the records of all joints, each with all models; fits that read a log differently stay apart.
-
-    Of one fit all estimates are shown, of several fits the one to use of each.
-    """
-    several, names = len({p.fit for p in predictions}) > 1, _names(predictions)
-    records: dict[object, JointResponse] = {}
+    """Return the records of all joints, each with all models; fits that read a log differently stay apart."""
+    names, records = _names(predictions), dict[object, JointResponse]()
     for one in predictions:
         log, name = one.log, names[one.log.source]
         for column, joint in enumerate(one.joints):
             key = name, joint, log.angle[:, joint - 1].tobytes(), log.command[:, joint - 1].tobytes()
             record = JointResponse(name, joint, arm.joint_names[joint - 1], one)
             record = records.setdefault(key, record)
-            shown = (
-                {unique(short_name(one.fit), record.simulated): one.response} if several else one.simulated
-            )
-            record.simulated.update({label: angles[:, column] for label, angles in shown.items()})
+            label = unique(short_name(one.fit), record.simulated)
+            record.simulated[label] = one.response[:, column]
             if joint in one.bands:
-                record.bands[next(iter(shown))] = one.bands[joint].half
+                record.bands[label] = one.bands[joint].half
     return list(records.values())
 
 

@@ -72,16 +72,14 @@ class Table:
         console, endless = Console(), Console(width=_UNLIMITED)
         limited = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
         width = console.width if limited else _UNLIMITED
-        table = self._rich(())
-        size = table.__rich_measure__(endless, endless.options)
+        table, needed = self._rich(()), 0
         for left_out in range(len(self.optional) + 1):
-            if size.maximum > width:
-                table = self._rich(self.optional[:left_out], tight=True)
-                size = table.__rich_measure__(endless, endless.options)
-            if size.minimum <= width:
+            table = self._rich(self.optional[:left_out])
+            needed = table.__rich_measure__(endless, endless.options).minimum
+            if needed <= width:
                 break
         # width and height, or rich may take 80 columns for granted
-        Console(width=max(width, size.minimum), height=1).print(table)
+        Console(width=max(width, needed), height=1).print(table)
 
     def records(self) -> list[dict[str, str | int | float | None]]:
         """Return rows by column name for JSON, which has no NaN or infinity: these become None."""
@@ -100,8 +98,8 @@ class Table:
         kinds = ({type(cell) for cell in column if cell is not None} for column in columns)
         return tuple(bool(kind) and str not in kind for kind in kinds)
 
-    def _rich(self, left_out: Sequence[str], *, tight: bool = False) -> "rich.table.Table":
-        """Return the table for a terminal; headers of numbers are broken into words where it is tight."""
+    def _rich(self, left_out: Sequence[str]) -> "rich.table.Table":
+        """Return the table for a terminal; headers of numbers are broken into words."""
         from rich import box
         from rich.table import Table as RichTable
         from rich.text import Text
@@ -116,7 +114,7 @@ class Table:
             name, right = self.header[i], self.numeric[i]
             widest = max(map(len, (name, *(row[i] for row in self.shown))))
             table.add_column(
-                Text(name.replace(" ", "\n") if right and tight else name),
+                Text(name.replace(" ", "\n") if right else name),
                 justify="right" if right else "left",
                 no_wrap=right,  # rich wraps words where room is short, but never numbers
                 min_width=None if right else min(widest, _TEXT_WIDTH),

@@ -33,7 +33,7 @@ class Off:
 
 
 def predicted(error: float, log: Log) -> Prediction:
-    return Prediction("fit", log, (2,), {"fit": log.angle[:, [1]] - np.radians(error)})
+    return Prediction("fit", log, (2,), log.angle[:, [1]] - np.radians(error))
 
 
 def verdict(fitted=None, unseen=None, nine=(5, 5), tolerance=None, log=None):
@@ -93,6 +93,6 @@ def test_the_errors_are_those_of_the_joint_by_name():
 
 
 def test_the_error_of_a_change_is_of_what_the_angle_turns_in_that_time():
-    drift = replace(predicted(0, LOG), simulated={"fit": LOG.angle[:, [1]] - np.radians(0.5) * TIME[:, None]})
+    drift = replace(predicted(0, LOG), response=LOG.angle[:, [1]] - np.radians(0.5) * TIME[:, None])
     (one,) = judge(SETTINGS, [drift], {})
     assert one.horizons_deg["the fit"] == pytest.approx([0.5 * seconds for seconds in HORIZONS])

@@ -103,7 +103,7 @@ def test_what_is_not_finite_is_left_out():
         check(learning(history, problem.settings.objective))
 
 
-def test_a_response_shows_measured_angle_every_estimate_residual_pressures_and_command():
+def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_command():
     problem = make_problem()
     fit = make_fit(problem)
     (record,) = responses(problem, fit)
@@ -114,13 +114,11 @@ def test_a_response_shows_measured_angle_every_estimate_residual_pressures_and_c
     assert len(draw(record).panels) == 3  # pressures are drawn where they are logged
     measured = np.degrees(record.measured)
     assert labelled(upper)["measured"].y == pytest.approx(measured)
-    for name, estimate in fit.estimates.items():
-        simulated = np.degrees(estimate.responses[0][:, 0])
-        ((label, mark),) = labelled(upper, f"{name} (").items()
-        assert mark.y == pytest.approx(simulated)
-        assert f"{np.degrees(estimate.rms):.3g}"[:3] in label
-        assert labelled(middle)[label].y == pytest.approx(measured - simulated)
-        assert mark.off == (name != fit.final)  # the others are shown when a reader asks for them
+    simulated = np.degrees(fit.best.responses[0][:, 0])
+    ((label, mark),) = labelled(upper, "refined (").items()
+    assert mark.y == pytest.approx(simulated)
+    assert f"{np.degrees(fit.best.rms):.3g}"[:3] in label
+    assert labelled(middle)[label].y == pytest.approx(measured - simulated)
     band = labelled(middle)["95 % band of refined"]
     assert np.all(band.end > 0)
     assert np.array_equal(band.y, -band.end)

@@ -81,31 +81,26 @@ def status(estimate: ParameterEstimate) -> str:
 
 
 def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: bounds, every estimate, intervals, share of the data, effect, flag."""
-    several, others = bool(summary.left_out_deg), [n for n in summary.estimates if n != summary.final]
+    """Return one row per parameter: bounds, estimate, intervals, share of the data, effect, flag."""
+    several = bool(summary.left_out_deg)
 
     def row(p: Parameter) -> dict[str, Cell]:
         one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
         bounds = (Given(given[0]), Given(given[1])) if given else (p.lower, p.upper)
-        values = {name: e.values[p.name] for name, e in summary.estimates.items()} or {"value": one.value}
-        ends = {"": one.interval} | ({"by log ": one.interval_by_log} if several else {})
-        if profiles:
-            ends["profile "] = profiles.get(p.name, (None, None))
-        return {
+        low, high = bounds if bounds[0] < bounds[1] else (None, None)
+        cells: dict[str, Cell] = {
             "name": p.name,
             "unit": p.unit,
-            **dict(zip(("lower", "upper"), bounds if bounds[0] < bounds[1] else (None, None), strict=True)),
-            **values,
-            "sd": one.sd,
-            **{
-                f"{of}{side}": end
-                for of, pair in ends.items()
-                for side, end in zip(("from", "to"), pair, strict=True)
-            },
-            "data [%]": None if one.data_share is None else 100 * one.data_share,
-            "effect [deg]": one.effect_deg,
-            "flag": status(one),
+            "lower": low,
+            "upper": high,
+            "value": one.value,
         }
+        intervals = {"": one.interval} | ({"by log ": one.interval_by_log} if several else {})
+        intervals |= {"profile ": profiles.get(p.name, (None, None))} if profiles else {}
+        for of, (start, end) in intervals.items():
+            cells |= {f"{of}from": start, f"{of}to": end}
+        share = None if one.data_share is None else 100 * one.data_share
+        return cells | {"data [%]": share, "effect [deg]": one.effect_deg, "flag": status(one)}
 
     note = (
         "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. effect: rms "
@@ -113,5 +108,5 @@ def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Interv
         f"{' by log: interval from the differences between logs.' if several else ''}"
     )
     by_log = ("by log from", "by log to") if several else ()
-    optional = (*others[1:], "sd", *by_log, "effect [deg]", "data [%]", *others[:1], "lower", "upper")
+    optional = (*by_log, "effect [deg]", "data [%]", "lower", "upper")
     return Table.of("Parameters", map(row, settings.parameter_set().parameters), note, optional)

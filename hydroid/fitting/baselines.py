@@ -118,7 +118,7 @@ def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline
         command, angle = log.command[:, still.joint - 1], log.angle[:, still.joint - 1]
         late = round(delay / log.period)
         step = np.diff(angle[late:]) / log.period
-        margin = 0.01 * np.ptp(still.limits)  # at an end of its range no command moves it
+        margin = 0.01 * np.ptp(angle)  # at an end of its range no command moves it
         free = (angle[late:-1] > still.limits[0] + margin) & (angle[late:-1] < still.limits[1] - margin)
         used = free & (command[: len(step)] != 0)
         commands.append(command[: len(step)][used])

@@ -69,26 +69,14 @@ class Prediction:
     def plain(self, names: Sequence[str]) -> list[dict[str, Any]]:
         """Return one mapping per joint, as JSON has them (docs/json.md); `names` are of all joints."""
         rows: list[dict[str, Any]] = []
-        for joint, indices in self.indices.items():
-            row: dict[str, Any] = {
-                "fit": self.fit,
-                "log": self.log.source,
-                "joint": joint,
-                "name": names[joint - 1],
-                "mae_deg": finite(degrees(indices.mean_absolute)),
-                "rms_deg": finite(degrees(indices.rms)),
-                "max_deg": finite(degrees(indices.largest)),
-                "fit_percent": finite(indices.fit),
-            }
-            if (band := self.bands.get(joint)) is not None:
-                row |= {
-                    "noise_deg": degrees(band.noise),
-                    "expected_deg": finite(degrees(band.expected)),
-                    "model_error_deg": degrees(band.model_error),
-                    "inside_percent": 100 * band.inside,
-                    "model_limits": band.model_limits,
-                }
-            rows.append(row)
+        for joint, one in self.indices.items():
+            row = {"fit": self.fit, "log": self.log.source, "joint": joint, "name": names[joint - 1]}
+            errors = {"mae": one.mean_absolute, "rms": one.rms, "max": one.largest}
+            if band := self.bands.get(joint):
+                row |= {"inside_percent": 100 * band.inside, "model_limits": band.model_limits}
+                errors |= {"noise": band.noise, "expected": band.expected, "model_error": band.model_error}
+            row |= {f"{name}_deg": finite(degrees(error)) for name, error in errors.items()}
+            rows.append(row | {"fit_percent": finite(one.fit)})
         return rows
 
 

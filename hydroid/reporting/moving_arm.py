@@ -18,8 +18,8 @@ from hydroid.reporting.outlines import Shape, body_poses, shapes, sight
 from hydroid.reporting.page import Plot, Section, Tab
 from hydroid.settings.arm import Arm
 
-MOST, FEWEST = 1200, 100
-"""moments of all logs of a page together, and of each at least"""
+MOST, LOGS = 1200, 8
+"""moments of all logs of a page together, and logs that it shows in motion"""
 RATE = 10.0
 """moments in a second; the page draws what lies between them"""
 VIEW = 112.0, -16.0
@@ -55,16 +55,13 @@ class MovingArm:
 
 
 def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Section, ...]:
-    """Return the section with one tab per log, by its name. A prediction that diverged has none."""
-    finite = {name: one for name, one in predictions.items() if np.isfinite(one.response).all()}
+    """Return the section with a tab for each of the first logs, by name; none for what diverged."""
+    finite = [item for item in predictions.items() if np.isfinite(item[1].response).all()][:LOGS]
     if not finite:
         return ()
-    model, most = load_model(arm).compile(), max(FEWEST, MOST // len(finite))
-    tabs: list[Tab] = []
-    for i, (name, one) in enumerate(finite.items()):
-        draw = partial(moving_arm, model, arm.joint_names, one, most)
-        tabs.append(Tab(name, (Plot(f"motion_{i + 1}", name, draw),)))
-    return (Section("The arm in motion", _CAPTION, tabs=tuple(tabs)),)
+    draw = partial(moving_arm, load_model(arm).compile(), arm.joint_names, most=MOST // len(finite))
+    plots = (Plot(f"motion_{i}", name, partial(draw, one)) for i, (name, one) in enumerate(finite, 1))
+    return (Section("The arm in motion", _CAPTION, tabs=tuple(Tab(p.caption, (p,)) for p in plots)),)
 
 
 def moving_arm(

@@ -15,7 +15,7 @@ from hydroid.settings.fit import FitSettings
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
-_MOST = 8
+_MOST = 5
 """quantities of a joint that its card shows, the best known ones"""
 _CAPTION = (
     "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond "

@@ -31,9 +31,10 @@ def recorded(seed: int, model: Baseline = TRUE, noise: float = 0.0, joints: int 
     return replace(silent, angle=np.tile(angle[:, None], (1, joints)))
 
 
-def test_nine_numbers_recover_their_own_equations() -> None:
-    logs = [recorded(seed) for seed in (1, 2)]
-    fitted = fit_baselines(logs, 1, LIMITS)["nine numbers"]
+@pytest.mark.parametrize("limits", [LIMITS, np.array([-np.inf, np.inf])], ids=["limited", "unlimited"])
+def test_nine_numbers_recover_their_own_equations(limits: np.ndarray) -> None:
+    logs = [recorded(seed, replace(TRUE, limits=limits)) for seed in (1, 2)]
+    fitted = fit_baselines(logs, 1, limits)["nine numbers"]
     assert fitted.delay == pytest.approx(TRUE.delay, abs=0.002)
     for name in ("lag", "dead_band", "exponent", "speed"):
         assert getattr(fitted, name) == pytest.approx(getattr(TRUE, name), rel=0.01)

@@ -107,12 +107,13 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     problem = make_problem()
     fit = make_fit(problem)
     (record,) = responses(problem, fit)
-    log = record.of.log
+    (one,) = record.of
+    log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
-    upper, middle, pressure, lower = draw(replace(record, of=replace(record.of, log=pressed))).panels
+    upper, middle, pressure, lower = draw(replace(record, of=(replace(one, log=pressed),))).panels
     assert labelled(pressure)["chamber A"].y == pytest.approx(np.full(len(log.time), 50.0))
     assert len(draw(record).panels) == 3  # pressures are drawn where they are logged
-    measured = np.degrees(record.measured)
+    measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     simulated = np.degrees(fit.best.responses[0][:, 0])
     ((label, mark),) = labelled(upper, "refined (").items()

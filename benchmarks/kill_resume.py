@@ -2,11 +2,10 @@
 
     python benchmarks/kill_resume.py [--kills 100] [--seed 1] [--only ga nsga2 refinement multistart study]
 
-Five kinds of run: simple GA, NSGA-II, the joint refinement, multi-start least squares, and a study of
-several seeds. Every run is killed (SIGKILL) twice before it may end, so that resumed runs are killed as well.
-Half of the moments are drawn from the time that the run takes, the earlier the likelier; the others follow
-files: the temporary twin of a checkpoint or of any file appears, or the refinement's checkpoint grows. All
-files are compared, but for the log, the lock and the last checkpoint but one.
+Every run is killed (SIGKILL) twice before it may end, so that resumed runs are killed as well. Half of the
+moments are drawn from the time that the run takes, the earlier the likelier; the others follow files: the
+temporary twin of a checkpoint or of any file appears, or the checkpoint grows. All files are compared but
+for the log, the lock and the last checkpoint but one.
 
 Nothing in hydroid knows of this. To save time, processes are forked from one that has the imports and figures
 stay empty; to be hit more often, the checkpoint is written after every generation, not every five seconds.
@@ -20,21 +19,17 @@ import signal
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
-from common import Clock, options
+from common import EXAMPLES, Clock, options
 
 from hydroid.commands.app import main as hydroid
 from hydroid.fitting import checkpoints
 from hydroid.reporting import page_file
 
-LOG = Path(__file__).parents[1] / "examples" / "logs" / "rig_shoulder_1.csv"
-SAMPLES = 600
 GA = "--algorithm ga --set search.ga.population=10 --set search.ga.generations="
 KINDS = {
     "ga": GA + "30 --no-refinement",
@@ -85,65 +80,44 @@ def moment(folder: Path, duration: float, rng: random.Random) -> Callable[[], bo
     return enough
 
 
-def phase(folder: Path) -> str:
-    """What a killed run was doing, from what it left: the last of its seeds that had begun."""
-    run = max(folder.glob("seed-*"), default=folder, key=lambda p: int(p.name.removeprefix("seed-")))
-    if list(run.rglob(".*.part")):
-        return "inside a file's write"
-    if not (run / "run.json").exists():
-        return "before the run had begun"
-    if (run / "estimate.yaml").exists():
-        return "report, or between runs"
-    if not (run / "checkpoint.npz").exists():
-        return "search"
-    with np.load(run / "checkpoint.npz", allow_pickle=False) as stored:
-        refines = any(name.startswith(("refined/", "joint/")) for name in stored.files)
-    return "refinement" if refines else "search"
-
-
 def files(folder: Path) -> dict[str, bytes | dict[str, object]]:
     """Return all that a run stored, by name; of run.json without how long the run took."""
+    kept = (p for p in folder.rglob("*") if p.is_file())
     course = {".lock", "run.log", "checkpoint.previous.npz"}
-    content = {
-        str(p.relative_to(folder)): p for p in folder.rglob("*") if p.is_file() and p.name not in course
-    }
-    return {name: json.loads(p.read_bytes()) | {"seconds": 0} if p.name == "run.json" else p.read_bytes()
-            for name, p in content.items()}  # fmt: skip
+    return {str(p.relative_to(folder)):
+            json.loads(p.read_bytes()) | {"seconds": 0} if p.name == "run.json" else p.read_bytes()
+            for p in kept if p.name not in course}  # fmt: skip
 
 
-def study(kind: str, work: Path, share: int, rng: random.Random) -> tuple[Counter[str], int]:
-    """Kill runs of a kind; return how often each phase was met, and how many runs differ."""
+def study(kind: str, work: Path, share: int, rng: random.Random) -> int:
+    """Kill runs of a kind; return how many differ."""
     whole, killed = work / "whole" / "run", work / "killed" / "run"
-    whole.parent.mkdir()
-    killed.parent.mkdir()
+    for folder in (whole, killed):
+        folder.parent.mkdir()
     began = time.monotonic()
     finish(whole, kind)
     duration, expected = time.monotonic() - began, files(whole)
-    met, trials, failed = Counter[str](), 0, 0
-    while met.total() < share:
+    kills, trials, failed = 0, 0, 0
+    while kills < share:
         shutil.rmtree(killed, ignore_errors=True)
-        for _ in range(2):
-            if finish(killed, kind, moment(killed, duration, rng)):
-                met[phase(killed)] += 1
+        kills += sum(finish(killed, kind, moment(killed, duration, rng)) for _ in range(2))
         finish(killed, kind)
         left = files(killed)
         differing = [n for n in sorted(expected.keys() | left.keys()) if expected.get(n) != left.get(n)]
         trials, failed = trials + 1, failed + bool(differing)
         print(f"{kind}: differs in {', '.join(differing)}\n" * bool(differing), end="")
-    runs = f"{trials} runs of {duration:.1f} s: {trials - failed} of {trials} bit-identical"
-    print(f"{kind:10} {met.total():4} kills in {runs}", flush=True)
-    return met, failed
+    same = f"{trials - failed} of {trials} bit-identical"
+    print(f"{kind:10} {kills:4} kills in {trials} runs of {duration:.1f} s: {same}", flush=True)
+    return failed
 
 
 if __name__ == "__main__":
     given = options(__doc__, kills=100, seed=1, only=list(KINDS))
-    rng, clock, bad, met = random.Random(given.seed), Clock(), 0, Counter[str]()
+    rng, clock, bad = random.Random(given.seed), Clock(), 0
     for kind in given.only:
         with tempfile.TemporaryDirectory() as place:
-            lines = LOG.read_text().splitlines()[: SAMPLES + 1]
+            lines = (EXAMPLES / "logs" / "rig_shoulder_1.csv").read_text().splitlines()[:601]
             (Path(place) / "log.csv").write_text("\n".join(lines) + "\n")
-            phases, failed = study(kind, Path(place), -(-given.kills // len(given.only)), rng)
-            met, bad = met + phases, bad + failed
-    print(*(f"  {count:3}  {what}" for what, count in met.most_common()), sep="\n")
-    print(f"{met.total()} kills, {bad} runs that differ, {clock}")
+            bad += study(kind, Path(place), -(-given.kills // len(given.only)), rng)
+    print(f"{bad} runs that differ, {clock}")
     sys.exit(bool(bad))

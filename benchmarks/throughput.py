@@ -3,8 +3,8 @@
     python benchmarks/throughput.py
 
 A population (70 candidates, 7,500 steps, objectives included) against `mujoco.batch.Batch.rollout` alone
-on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; the
-search's own share of the wall time; and how fast a plant steps, as a multiple of real time.
+on the same model and candidates, set up beforehand; `locked` against `passive`; stage 2 against stage 1; and
+how fast a plant steps, as a multiple of real time.
 """
 
 import time
@@ -20,7 +20,6 @@ from hydroid import load_settings
 from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
-from hydroid.fitting.search import search
 from hydroid.plant import load_plant
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
@@ -29,10 +28,9 @@ CANDIDATES, REPEATS = 70, 9
 ALL = list(range(1, 8))
 
 
-def make_problem(config: str, joints: list[int], other_joints: str, algorithm: str = "ga") -> Problem:
+def make_problem(config: str, joints: list[int], other_joints: str) -> Problem:
     """A problem whose data are commands of some joints, and stage 1's response to them at the truth."""
-    changes = {"simulation.other_joints": other_joints, "search.algorithm": algorithm}
-    settings = load_settings(config, changes)
+    settings = load_settings(config, {"simulation.other_joints": other_joints})
     log = pseudo_random_log(settings.arm.pose("study"), joints, duration=75.01)
     if config == "article-mech":
         log = simulate_log(settings, log, ARTICLE_TRUTH, "truth")
@@ -47,11 +45,8 @@ def population(problem: Problem) -> np.ndarray:
 
 def bare_rollout(problem: Problem) -> Callable[[], object]:
     """Return MuJoCo's own rollout of the same candidates, written without hydroid's simulation."""
-    log, candidates, arm = (
-        problem.logs[0],
-        problem.bindings.candidates(population(problem)),
-        problem.settings.arm,
-    )
+    log, arm = problem.logs[0], problem.settings.arm
+    candidates = problem.bindings.candidates(population(problem))
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
     reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
@@ -92,23 +87,6 @@ def in_turn(calls: dict[str, Callable[[], object]]) -> dict[str, np.ndarray]:
     return {name: np.array(times[1:]) for name, times in rounds.items()}
 
 
-def search_share(algorithm: str) -> float:
-    """Return the share of a search's wall time [%] that is not spent in evaluating populations."""
-    problem, spent = make_problem("article-mech", [2], "locked", algorithm), []
-    evaluate = problem.evaluate
-
-    def timed(theta: np.ndarray) -> object:
-        started = time.perf_counter()
-        result = evaluate(theta)
-        spent.append(time.perf_counter() - started)
-        return result
-
-    problem.evaluate = timed  # type: ignore[method-assign]
-    started = time.perf_counter()
-    search(problem, lambda row: None, lambda simulated, rms: None, {})
-    return 100 * (1 - sum(spent) / (time.perf_counter() - started))
-
-
 def plant_steps(joints: list[int], steps: int = 2000) -> tuple[float, float]:
     """Return the seconds that a step of a plant with hydraulics on some joints takes, and its period."""
     plant = load_plant("article-hyd", overrides={"start_pose": "study"}, joints=joints)
@@ -138,8 +116,6 @@ if __name__ == "__main__":
     table("evaluation of the seven-joint model | seconds | against passive")
     for name in problems:
         row(f"{name} | {np.median(took[name]):.3f} | {np.median(took[name] / took['passive']):.2f}")
-    for algorithm in ("ga", "nsga2"):
-        print(f"search overhead, {algorithm}, locked: {search_share(algorithm):.2f} % of the wall time")
     table("joints with hydraulics | step [µs] | times real time")
     for some in ([2], ALL):
         step, period = plant_steps(some)

@@ -14,8 +14,10 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     "unreadable": ("{what}", "{hint}"),
     "layout": ("{what}", ""),
     # its columns
-    "no such joint": ("log.joints.{0}: the arm has joints 1 to {joints}", ""),
-    "no output joint": ("outputs: there is no joint {0}; the arm has joints 1 to {joints}", ""),
+    "no such joint": (
+        "there is no joint {0}; the arm has joints 1 to {joints}",
+        "correct outputs or log.joints",
+    ),
     "no output angle": (
         "output joint {0} has no angle column",
         "map it in log.joints, or choose another output",
@@ -23,7 +25,8 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     "absent joints": ("holds nothing of joint{s} {names}", ""),
     "missing column": (
         "the {part} lacks {missing}",
-        "the columns are: {columns}; set the right names in {settings}{remedy}",
+        "the columns are: {columns}; set the right names in {settings} (`hydroid convert LOG --out LOG.csv` "
+        "guesses them), or a joint that is not in the log to null: log.joints.{joint}=null",
     ),
     "column twice": ("has {count:.0f} columns of this name", "rename all but one"),
     "shared column": ("one column cannot be {names}", "correct log.joints in the config"),
@@ -44,6 +47,10 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         OUTSIDE,
         "correct the cells, or unit, scale and offset of {column} in log.{quantity}, or the joint's range",
     ),
+    "slightly outside": (
+        OUTSIDE,
+        "it is used as it is: correct the joint's range, or log.{quantity} of {column}, if it is wrong",
+    ),
     "outside in another range": (OUTSIDE, RANGE),
     "outside in another unit": (OUTSIDE, "if angles are in {other}, set log.angle.unit: {other}"),
     "outside, turned": (
@@ -56,7 +63,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     ),
     "wrap": ("{0} wraps by 360 deg and was joined{rows}", ""),
     "repair": (
-        "repaired: {cells} filled, {samples} inserted{lost}",
+        "repaired: cells filled: {cells:.0f}, samples inserted: {samples:.0f}, rows left out: {lost:.0f}",
         "angles interpolated, commands held",
     ),
     # its time
@@ -64,7 +71,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "time does not increase: {time:.12g} s follows {before:.12g} s{rows}",
         "delete or sort the lines, or log the time with more digits",
     ),
-    "too short": ("lasts {duration:.6g} s ({samples}); at least 0.5 s is needed", "{remedy}"),
+    "too short": ("lasts {duration:.6g} s (samples: {samples:.0f}); at least 0.5 s is needed", "{remedy}"),
     "too slow": ("has a sample every {period:.6g} s, at most {slowest:g} s can be used", "{remedy}"),
     "gap": (
         "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
@@ -89,15 +96,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         f"{UNIT}command.scale is 1",
         "command [%] = scale · cell + offset: for ±10 V set log.command.scale: 10",
     ),
-    "raised range": ("command of joint{s} {names} rests at the middle of {range}", RANGE),
-    "small range": (
-        "no command exceeds {largest:g} %, yet joint {0} turns by {travel:.3g} deg",
-        RANGE,
-    ),
-    "sluggish": (
-        "no angle exceeds {most:g} deg, and joint {0} hardly follows strong commands",
-        "if angles are in rad, set log.angle.unit: rad",
-    ),
+    "range": ("the command of joint{s} {names} looks like {range}", "if so, set log.command.scale: {scale}"),
     # its motion
     "undriven": ("no joint is driven", "check log.command"),
     "angle is constant": (
@@ -121,8 +120,9 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "if the command is logged with the opposite sign, set log.joints.{0}.command.scale: -1",
     ),
     "no motion": (
-        "strong commands hardly move joint {0}, by {most:.2g} deg at most",
-        "check log.joints: is this the angle of that command?",
+        "strong commands hardly move joint{s} {names}: by {most:.2g} deg at most",
+        "check log.joints (is this the angle of that command?), and if angles are in rad, "
+        "set log.angle.unit: rad",
     ),
     "at a stop": (
         "joint {0} is driven against the end of its travel for {seconds:.3g} s",

@@ -1,12 +1,11 @@
 """Files that hold arrays -> a table: MATLAB's .mat (v4 to v7 by scipy, v7.3 by h5py), Parquet by pyarrow.
 
-A vector is a column of the variable's name; column k of a matrix is `name[k]`, counted from 1, and its longer
-axis is the time; fields of structs follow after a dot; element k of a struct array is `name[k]`. Two structs
-are read by what they mean: Simulink's "structure with time" (`log.time`, signals by label: `log.boom`),
-and structs with the fields Name and Data, as ControlDesk writes them: each is a column of its Name.
+A vector is a column of the variable's name; column k of a matrix is `name[k]`, counted from 1, and its
+longer axis is the time; fields of structs follow after a dot; element k of a cell array is `name[k]`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import LogError
-from hydroid.log.table import ArrayTable, optional_package, readable
+from hydroid.log.table import Recording, Signal, Table, in_rows, optional_package, readable
 
-Columns = dict[str, NDArray[Any]]
-OBJECTS = (
-    "objects such as timeseries can only be read by MATLAB: there, save their arrays with "
-    "time = {0}.Time; data = {0}.Data; save('arrays.mat', 'time', 'data')"
-)
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ArrayTable(Table):
+    """Columns that are in memory, shape (R,) each; text has the dtype object."""
+
+    columns: Mapping[str, NDArray[Any]]
+    clocks: frozenset[str] = frozenset()
+
+    def read(self, signals: Sequence[Signal]) -> Recording:
+        """Read columns, which must be numbers of one length."""
+        first, *_ = names = [signal.name for signal in signals]
+        rows = len(self.columns[first])
+        for name in names:
+            values, where = self.columns[name], f"{self.source}, column {name}"
+            if values.dtype.kind not in "fiub":
+                example = str(values[0])[:30] if len(values) else ""
+                raise LogError(f"holds text, such as {example!r}", where=where, hint="store it as numbers")
+            if len(values) != rows:
+                what = f"holds {len(values)} values, but column {first} holds {rows}"
+                raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
+        values = np.stack([self.columns[name].astype(np.float64) for name in names], axis=1)
+        return in_rows(self, signals, values, clocks=self.clocks.intersection(names))
 
 
 def open_mat(path: Path, *, hdf5: bool) -> ArrayTable:
@@ -29,15 +45,21 @@ def open_mat(path: Path, *, hdf5: bool) -> ArrayTable:
     Raises:
         LogError: it is damaged, has no arrays, or needs a package that is not installed.
     """
-    variables = (_read_hdf5 if hdf5 else _read_mat)(path)
-    columns: Columns = dict(pair for name, value in variables.items() for pair in _columns(name, value))
-    objects = [name for name, value in variables.items() if value is None]
-    hint = OBJECTS.format(*objects[:1]) if objects else "save commands, angles and time as arrays or structs"
+    with readable(path, "a MATLAB file"):
+        if hdf5:
+            columns = dict(_hdf5_columns(path))
+        else:
+            from scipy.io import loadmat
+
+            columns = dict(_columns("", loadmat(str(path), simplify_cells=True)))
     if not columns:
+        hint = (
+            "save commands, angles and time as arrays or structs; of a timeseries ts in MATLAB: "
+            "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
+        )
         raise LogError("holds no array of numbers", where=str(path), hint=hint)
-    remarks = (f"{', '.join(objects)}: {hint}",) if objects else ()
     layout = f"MATLAB file (v{'7.3' if hdf5 else '4 to 7'})"
-    return ArrayTable(source=str(path), layout=layout, names=tuple(columns), columns=columns, remarks=remarks)
+    return ArrayTable(source=str(path), layout=layout, names=tuple(columns), columns=columns)
 
 
 def open_parquet(path: Path) -> ArrayTable:
@@ -48,7 +70,7 @@ def open_parquet(path: Path) -> ArrayTable:
     """
     arrow = optional_package("pyarrow", "parquet", str(path))
     parquet = optional_package("pyarrow.parquet", "parquet", str(path))
-    columns, clocks = Columns(), set[str]()
+    columns, clocks = dict[str, NDArray[Any]](), set[str]()
     with readable(path, "Parquet"):
         table = parquet.read_table(str(path))
         for name, column in zip(table.column_names, table.columns, strict=True):
@@ -69,17 +91,15 @@ def open_parquet(path: Path) -> ArrayTable:
 
 
 def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the columns of one variable, by name."""
-    if isinstance(value, list):
-        value = {f"[{k}]": inner for k, inner in enumerate(value, 1)}
+    """Yield the columns of one variable, by name; of a file all but MATLAB's own."""
     if isinstance(value, dict):
-        if isinstance(value.get("Name"), str) and "Data" in value:
-            name, value = value["Name"].strip("'\" ") or f"{name}.Data", {"": value["Data"]}
-        elif _is_numbers(value.get("time")) and (signals := _simulink_signals(value.get("signals"))):
-            value = {"time": np.ravel(value["time"])} | signals
-        for field, inner in value.items():
-            yield from _columns(name + (field if field[:1] in ("", "[") else f".{field}"), inner)
-    elif _is_numbers(value) and value.size > 1:
+        for key, inner in value.items():
+            if not key.startswith("__"):
+                yield from _columns(f"{name}.{key}" if name else key, inner)
+    elif isinstance(value, list) or getattr(value, "dtype", None) == "O":
+        for k, inner in enumerate(value, 1):
+            yield from _columns(f"{name}[{k}]", inner)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1:
         array = value.squeeze()
         array = array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
         parts = array.reshape(len(array), -1).T
@@ -87,64 +107,13 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
             yield (name if len(parts) == 1 else f"{name}[{k}]"), values
 
 
-def _is_numbers(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
-
-
-def _simulink_signals(signals: Any) -> dict[str, Any]:
-    """Return the values of the signals of a "structure with time" by label; {}: it is another struct."""
-    parts = signals if isinstance(signals, list) else [signals]
-    if not all(isinstance(part, dict) and "values" in part for part in parts):
-        return {}
-    labels = [part.get("label") for part in parts]
-    names = [
-        label if isinstance(label, str) and label else f"signals[{k}]" for k, label in enumerate(labels, 1)
-    ]
-    return {name: part["values"] for name, part in zip(names, parts, strict=True)}
-
-
-def _read_mat(path: Path) -> Mapping[str, Any]:
-    from scipy.io import loadmat
-
-    with readable(path, "a MATLAB file"):
-        variables = loadmat(str(path), simplify_cells=True)
-    kept = {name: _plain(value) for name, value in variables.items() if not name.startswith("__")}
-    if kept.get("None", 0) is None:  # scipy's name for an object, whose own name is in its first field
-        kept |= {entry["s0"].decode(): kept.pop("None", None) for entry in np.ravel(variables["None"])}
-    return kept
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of scipy's with lists for struct arrays and cells, and None for MATLAB's objects."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if type(value).__name__ in ("MatlabOpaque", "MatlabFunction", "MatlabObject"):
-        return None
-    if isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-        return [_plain(inner) for inner in value]
-    return value
-
-
-def _read_hdf5(path: Path) -> Mapping[str, Any]:
+def _hdf5_columns(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the columns of a v7.3 file: its arrays are stored transposed, its structs as groups."""
     h5py = optional_package("h5py", "mat", str(path))
-
-    def plain(item: Any) -> Any:
-        """Return an item as scipy does: arrays are stored transposed, text as numbers, structs as groups."""
-        kind = item.attrs.get("MATLAB_class", b"")
-        kind = kind.decode() if isinstance(kind, bytes) else str(kind)
-        if isinstance(item, h5py.Group):
-            fields = {name: plain(item[name]) for name in item}
-            if {*map(type, fields.values())} == {list} and len({*map(len, fields.values())}) == 1:
-                return [dict(zip(fields, row, strict=True)) for row in zip(*fields.values(), strict=True)]
-            return fields
-        if item.attrs.get("MATLAB_empty", 0):
-            return "" if kind == "char" else np.zeros(0)
-        if kind == "char":
-            return "".join(map(chr, np.ravel(item[()])))
-        if h5py.check_ref_dtype(item.dtype) is not None:
-            return [plain(file[reference]) for reference in np.ravel(item[()], order="F")]
-        numbers = kind in ("", "double", "single", "logical") or kind.removeprefix("u").startswith("int")
-        return np.asarray(item[()]).T.squeeze() if numbers else None
-
-    with readable(path, "a MATLAB file"), h5py.File(path, "r") as file:
-        return {name: plain(file[name]) for name in file if not name.startswith("#")}
+    found = dict[str, Any]()
+    with h5py.File(path, "r") as file:
+        file.visititems(found.__setitem__)
+        for name, item in found.items():
+            text = item.attrs.get("MATLAB_class") == b"char" or "MATLAB_empty" in item.attrs
+            if isinstance(item, h5py.Dataset) and not text and not name.startswith("#"):
+                yield from _columns(name.replace("/", "."), np.asarray(item[()]).T)

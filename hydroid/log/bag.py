@@ -7,9 +7,8 @@ settings, over the time that all interpolated ones have: angles are interpolated
 column has the name that the settings give it.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, fields, is_dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +22,20 @@ from hydroid.log.table import Recording, Signal, Table, in_rows, optional_packag
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BagTable(Table):
-    """The channels of a bag, by column their topic; its rows are at `period` [s]."""
+    """The channels of a bag, by name: values by the time of their messages [ns]; rows are at `period` [s].
 
-    topics: Mapping[str, str]
+    The times of the topics `unstamped` are those of recording.
+    """
+
+    channels: Mapping[str, Mapping[int, float]]
+    unstamped: Set[str]
     period: float
 
     def read(self, signals: Sequence[Signal]) -> Recording:
-        """Read columns; those that share no time are refused, and so is a damaged message."""
+        """Read columns; those that share no time are refused."""
         time, *names = self.names
         held = {s.name: s.kind == "command" for s in signals if s.name != time} or {names[0]: False}
-        topics = sorted({self.topics[name] for name in held})
-        samples, unstamped = dict[str, dict[int, float]](), set[str]()
-        for topic, stamp, recorded, numbers in _messages(Path(self.source), topics):
-            unstamped |= set() if stamp else {topic}
-            for name in numbers.keys() & held.keys():
-                samples.setdefault(name, {}).setdefault(stamp or recorded, numbers[name])
-        if missing := [name for name in held if name not in samples]:
-            raise LogError("holds no message", where=f"{self.source}, column {missing[0]}")
-        at = {name: np.array(sorted(of_name)) for name, of_name in samples.items()}
+        at = {name: np.array(sorted(self.channels[name])) for name in held}
         smooth = [at[name] for name in held if not held[name] and len(at[name]) > 1] or [*at.values()]
         start, end = max(int(times[0]) for times in smooth), min(int(times[-1]) for times in smooth)
         if end - start < self.period * 1e9:
@@ -50,29 +45,50 @@ class BagTable(Table):
         grid = np.arange(rows, dtype=np.float64) * self.period
         series = {time: grid}
         for name, times in at.items():
-            values = np.array([samples[name][key] for key in times.tolist()])
+            values = np.array([self.channels[name][key] for key in times.tolist()])
             series[name] = _resampled((times - start) / 1e9, values, grid, held=held[name])
+        topics = {name.partition(".")[0] for name in held}
         said = (
             (topics, f"resampled to {self.period:g} s"),
-            (sorted(unstamped), "no header stamp, so the time of recording counts"),
-            ([name for name in held if held[name] and at[name][0] > start], "0 until the first message"),
+            (topics & self.unstamped, "no header stamp, so the time of recording counts"),
+            ({name for name in held if held[name] and at[name][0] > start}, "0 until the first message"),
         )
-        remarks = tuple(f"{', '.join(columns)}: {what}" for columns, what in said if columns)
+        remarks = tuple(f"{', '.join(sorted(columns))}: {what}" for columns, what in said if columns)
         values = np.stack([series[signal.name] for signal in signals], axis=1)
         return in_rows(self, signals, values, remarks=remarks)
 
 
 def open_bag(path: Path, time: str, period: float) -> BagTable:
-    """Find the channels of a bag; `time` is the name of its time column, `period` that of its rows [s].
+    """Read the channels of a bag; `time` is the name of its time column, `period` that of its rows [s].
 
     Raises:
         LogError: it is damaged, has no channel of numbers, or rosbags is not installed.
     """
-    topics = {name: topic for topic, _, _, numbers in _messages(path, first=20) for name in numbers}
-    if not topics:
+    highlevel = optional_package("rosbags.highlevel", "ros", str(path))
+    typesys = optional_package("rosbags.typesys", "ros", str(path))
+    latest = typesys.get_typestore(typesys.Stores.LATEST)  # for bags that do not hold their definitions
+    channels, unstamped = dict[str, dict[int, float]](), set[str]()
+    with readable(path, "a bag"), highlevel.AnyReader([path], default_typestore=latest) as reader:
+        for connection, recorded, data in reader.messages():
+            if len(data) > 20_000:
+                continue  # an image or a point cloud
+            message = reader.deserialize(data, connection.msgtype)
+            stamp = getattr(getattr(message, "header", None), "stamp", None)
+            at = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
+            if not at:
+                unstamped.add(connection.topic)
+            for name, number in _numbers(message, f"{connection.topic}."):
+                channels.setdefault(name, {}).setdefault(at or recorded, number)
+    if not channels:
         raise LogError("holds no channel of numbers", where=str(path))
-    layout = {".bag": "ROS 1 bag", ".mcap": "MCAP"}.get(path.suffix, "ROS 2 bag")
-    return BagTable(source=str(path), layout=layout, names=(time, *topics), topics=topics, period=period)
+    return BagTable(
+        source=str(path),
+        layout={".bag": "ROS 1 bag", ".mcap": "MCAP"}.get(path.suffix, "ROS 2 bag"),
+        names=(time, *channels),
+        channels=channels,
+        unstamped=unstamped,
+        period=period,
+    )
 
 
 def _resampled(at: Floats, values: Floats, grid: Floats, *, held: bool) -> Floats:
@@ -84,29 +100,6 @@ def _resampled(at: Floats, values: Floats, grid: Floats, *, held: bool) -> Float
     far = np.diff(at)[after - 1] > max(0.1, 3 * float(np.median(np.diff(at))))
     between = (grid > at[after - 1] + 1e-9) & (grid < at[after] - 1e-9)
     return np.where(far & between, np.nan, np.interp(grid, at, values))
-
-
-def _messages(
-    path: Path, topics: Collection[str] | None = None, first: int | None = None
-) -> Iterator[tuple[str, int, int, dict[str, float]]]:
-    """Yield topic, stamp (0: none) and time of recording [ns], and numbers by column, of messages.
-
-    Of all topics or some, of each all messages or the `first` ones.
-    """
-    highlevel = optional_package("rosbags.highlevel", "ros", str(path))
-    typesys = optional_package("rosbags.typesys", "ros", str(path))
-    latest = typesys.get_typestore(typesys.Stores.LATEST)  # for bags that do not hold their definitions
-    with readable(path, "a bag"), highlevel.AnyReader([path], default_typestore=latest) as reader:
-        for connection in reader.connections:
-            topic = connection.topic
-            if topics is None or topic in topics:
-                for _, recorded, data in islice(reader.messages(connections=[connection]), first):
-                    if len(data) > 20_000:
-                        continue  # an image or a point cloud
-                    message = reader.deserialize(data, connection.msgtype)
-                    stamp = getattr(getattr(message, "header", None), "stamp", None)
-                    stamp = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
-                    yield topic, stamp, recorded, dict(_numbers(message, f"{topic}."))
 
 
 def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:

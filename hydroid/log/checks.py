@@ -15,11 +15,14 @@ from hydroid.units import UNITS, likely_time_unit
 DEGREE = UNITS["deg"].factor
 
 
-def check_recording(recording: Recording, settings: LogSettings) -> list[LogFinding]:
-    """Return every fault of the recording, in the order in which a user should mend them."""
+def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> list[LogFinding]:
+    """Return every fault of the recording, in the order in which a user should mend them.
+
+    `repaired`: gaps up to `settings.repair_s` are no faults.
+    """
     return [
         *_holes(recording, settings.repair_s),
-        *_time(recording, settings),
+        *_time(recording, settings, repaired),
         *together(_outside(recording)),
         *_jumps(recording),
         *together(_stated_units(recording)),
@@ -41,37 +44,38 @@ def _holes(recording: Recording, longest: float) -> Iterator[LogFinding]:
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
 
 
-def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
+def _time(recording: Recording, settings: LogSettings, repaired: bool) -> Iterator[LogFinding]:
     """A time that falls, is too short or slow, or has gaps; a row without one is reported elsewhere."""
     signal, rows = recording.signals[0], np.flatnonzero(~np.isnan(recording.time))
-    time, steps = recording.time[rows], np.diff(recording.time[rows])
+    time = recording.time[rows]
+    steps, apart = np.diff(time), np.diff(rows)
     if len(back := np.flatnonzero(steps <= 0)):
         pair = {"time": time[back[0] + 1], "before": time[back[0]]}
         yield recording.finding("error", "time order", rows[1:][back], signal, **pair)
         return
     period, duration = sample_period(time), np.ptp(time) if len(time) else 0.0
     unit = likely_time_unit(period / signal.gain)
-    spelt = {"min": "minutes", "h": "hours", "day": "days"}.get(unit, unit)
-    remedy = f"if the time is in {spelt}, set log.time.unit: {unit}" if unit else "set log.time.unit"
+    remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "set log.time.unit"
     slowest = 10 * settings.period_s  # else held commands would not explain the motion
     if len(time) < 2 or duration < 0.5:
-        samples = f"{len(time)} sample{'s' * (len(time) != 1)}"
-        yield recording.finding("error", "too short", duration=duration, samples=samples, remedy=remedy)
+        numbers = {"duration": duration, "samples": len(time), "remedy": remedy}
+        yield recording.finding("error", "too short", **numbers)
         return
     if period > slowest:
-        yield recording.finding(
-            "error", "too slow", (), signal, period=period, slowest=slowest, remedy=remedy
-        )
+        numbers = {"period": period, "slowest": slowest, "remedy": remedy}
+        yield recording.finding("error", "too slow", (), signal, **numbers)
         return
-    per_row, longest = steps / np.diff(rows), settings.repair_s
-    gaps = np.flatnonzero(steps > (np.diff(rows) - 1 + GAP) * period)
-    uneven = np.flatnonzero(np.abs(per_row - period) > 0.25 * period)
+    longest, per_row = settings.repair_s, steps / apart
+    short = steps <= longest * (1 + 1e-9) + period
+    gaps = np.flatnonzero((steps > (apart - 1 + GAP) * period) & ~(repaired & short))
+    bridged = per_row > GAP * period
+    uneven = np.flatnonzero((np.abs(per_row - period) > 0.25 * period) & ~bridged)
     if len(gaps):
-        kind = "short gap" if steps[gaps].max() <= longest * (1 + 1e-9) + period else "gap"
+        kind = "short gap" if short[gaps].all() else "gap"
         numbers = {"gap": steps[gaps[0]], "period": period, "longest": longest}
         yield recording.finding("error", kind, rows[1:][gaps], signal, **numbers)
     elif len(uneven):
-        numbers = {"least": per_row.min(), "most": per_row.max(), "period": period}
+        numbers = {"least": per_row.min(), "most": per_row[~bridged].max(), "period": period}
         yield recording.finding("warning", "jitter", rows[1:][uneven], signal, **numbers)
 
 
@@ -79,15 +83,27 @@ def _outside(recording: Recording) -> Iterator[LogFinding]:
     """Values outside their limits; if they are many, another range, unit or sign may explain them."""
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rounding = 1e-6 if signal.kind == "command" else 0.0
-        rows = np.flatnonzero((values < signal.low - rounding) | (values > signal.high + rounding))
+        beyond = np.fmax(signal.low - values, values - signal.high)
+        rows = np.flatnonzero(beyond > rounding)
         if len(rows):
             many = len(rows) > 0.05 * (values != 0).sum()
             kind, remedy = _explained(signal, values) if many else ("outside", {})
+            slight = np.nanmax(beyond) <= signal.slack
             unit = {"command": "%", "angle": "deg", "pressure": "bar"}[signal.kind]
             numbers = {"value": values[rows[0]], "low": signal.low, "high": signal.high}
             numbers = {name: number / UNITS[unit].factor for name, number in numbers.items()}
-            more = {"quantity": signal.kind, "unit": unit, "column": signal.name}
-            yield recording.finding("error", kind, rows, signal, signal.joint, **numbers, **more, **remedy)
+            yield recording.finding(
+                "warning" if slight else "error",
+                "slightly outside" if slight else kind,
+                rows,
+                signal,
+                signal.joint,
+                quantity=signal.kind,
+                unit=unit,
+                column=signal.name,
+                **numbers,
+                **remedy,
+            )
 
 
 def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
@@ -95,15 +111,12 @@ def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
     if signal.kind == "command" and (likely := likely_range(values)) and likely.name != "%":
         return "outside in another range", likely.remedy(signal.gain, signal.offset)
     if signal.kind == "angle":
-        degrees = abs(abs(signal.gain) - DEGREE) < 1e-12
-        scale = f"{-signal.gain / (DEGREE if abs(signal.gain) < 0.1 else 1):g}"
+        degrees = abs(signal.gain) < 0.1
         unit, other = ("rad", values / DEGREE) if degrees else ("deg", values * DEGREE)
-        explanations = [
-            ("outside in another unit", {"other": unit}, other),
-            ("outside, turned", {"scale": scale}, 2 * signal.offset - values),
-        ]
-        if not degrees and np.nanmax(np.abs(values)) <= np.pi:  # degrees read as radians turn far more
-            explanations = explanations[1:]
+        scale = f"{-signal.gain / (DEGREE if degrees else 1):g}"
+        explanations = [("outside, turned", {"scale": scale}, 2 * signal.offset - values)]
+        if degrees or np.nanmax(np.abs(values)) > np.pi:  # degrees read as radians turn far more
+            explanations.insert(0, ("outside in another unit", {"other": unit}, other))
         for kind, remedy, changed in explanations:
             if np.nanmin(changed) >= signal.low and np.nanmax(changed) <= signal.high:
                 return kind, remedy
@@ -115,10 +128,9 @@ def _jumps(recording: Recording) -> Iterator[LogFinding]:
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         if signal.kind == "angle" and not np.isfinite(signal.high):
             rows = np.flatnonzero(~np.isnan(values))
-            steps = np.diff(values[rows])
-            if len(far := np.flatnonzero(np.abs(steps) > np.pi)):
-                step = float(np.rad2deg(steps[far[0]]))
-                yield recording.finding("error", "jump", rows[1:][far], signal, step=step)
+            steps = np.rad2deg(np.diff(values[rows]))
+            if len(far := np.flatnonzero(np.abs(steps) > 180)):
+                yield recording.finding("error", "jump", rows[1:][far], signal, step=steps[far[0]])
 
 
 def _stated_units(recording: Recording) -> Iterator[LogFinding]:
@@ -134,6 +146,5 @@ def _stated_units(recording: Recording) -> Iterator[LogFinding]:
             "command": unit.name != "%" and gain == 1,
         }
         if wrong[signal.kind]:
-            yield recording.finding(
-                "warning", f"unit of {signal.kind}", (), signal, signal.name, unit=unit.name
-            )
+            kind = f"unit of {signal.kind}"
+            yield recording.finding("warning", kind, (), signal, signal.name, unit=unit.name)

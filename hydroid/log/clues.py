@@ -10,16 +10,16 @@ import numpy as np
 from hydroid.log.log import Floats
 from hydroid.units import Unit, unit_of
 
-Kind = Literal["time", "command", "angle", "other", ""]
+Kind = Literal["time", "command", "angle", "other"]
 
-WORDS: dict[str, Kind] = {
-    "time t timestamp stamp zeit sec seconds temps": "time",
-    "flow pump pressure press p pa pb tank supply current": "other",
-    """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out output spool
-    demand volt voltage stell drive""": "command",
-    "q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll": "angle",
+WORDS: dict[Kind, str] = {
+    "time": "time t timestamp stamp zeit sec seconds temps",
+    "other": "flow pump pressure press p pa pb tank supply current",
+    "command": """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out
+    output spool demand volt voltage stell drive""",
+    "angle": "q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll",
 }
-"""words that tell the kind of a column"""
+"""words that tell the kind of a column; the last one in its name counts"""
 DERIVED = """velocity vel speed qd dq qdot acc acceleration torque force load effort temp temperature error
 fault status count index sample date"""
 """words of what is neither command nor angle, whatever its unit"""
@@ -49,9 +49,6 @@ RANGES = (
     (0, 10, "0 to 10 V"),
     (0, 1, "0 to 1"),
     (0, 100, "0 to 100"),
-    (0, 255, "0 to 255"),
-    (0, 1023, "0 to 1023"),
-    (0, 4095, "0 to 4095"),
     (1000, 2000, "1000 to 2000 µs"),
     (-1, 1, "±1"),
     (-10, 10, "±10 V"),
@@ -120,17 +117,14 @@ def column_unit(name: str, given: str = "") -> Unit | None:
 
 
 def kind_of(name: str, unit: Unit | None) -> Kind:
-    """Return what the unit, or else the words of a name say that a column is; "" where they say nothing."""
+    """Return what the unit, or else the words of a name say that a column is."""
     there = words(name)
     if {*there} & {*DERIVED.split()}:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
-    for word in reversed(there):
-        for known, kind in WORDS.items():
-            if word in known.split():
-                return kind
-    return ""
+    told = (kind for word in reversed(there) for kind, those in WORDS.items() if word in those.split())
+    return next(told, "command" if direction(name)[0] else "other")
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:
@@ -154,8 +148,7 @@ def number_in(name: str) -> int | None:
 def direction(name: str) -> tuple[int, frozenset[str]]:
     """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
     there = frozenset(words(name))
-    signs = {
-        word: sign for pair in OPPOSITE.split() for sign, word in zip((1, -1), pair.split(":"), strict=True)
-    }
-    word = next((word for word in signs if word in there), "")
-    return signs.get(word, 0), there - {word}
+    for positive, negative in (pair.split(":") for pair in OPPOSITE.split()):
+        if word := {positive, negative} & there:
+            return (positive in word) - (negative in word), there - word
+    return 0, there

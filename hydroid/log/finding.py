@@ -28,7 +28,7 @@ class LogFinding(Finding):
         return str(self.error())
 
 
-def found(
+def log_finding(
     level: Level,
     kind: str,
     source: str,
@@ -50,11 +50,9 @@ def together(findings: Iterable[LogFinding]) -> list[LogFinding]:
     """Make one finding, the first with the subjects of all, of those of a kind that have the same hint."""
     first = dict[tuple[str, str], LogFinding]()
     for finding in findings:
-        key = finding.kind, finding.hint
-        subjects = first[key].subjects if key in first else ()
-        first[key] = replace(
-            first.get(key, finding), subjects=tuple(dict.fromkeys(subjects + finding.subjects))
-        )
+        known = first.setdefault((finding.kind, finding.hint), finding)
+        subjects = tuple(dict.fromkeys(known.subjects + finding.subjects))
+        first[finding.kind, finding.hint] = replace(known, subjects=subjects)
     return [*first.values()]
 
 

@@ -1,17 +1,17 @@
 """A table of unknown columns -> a `log` section that maps them, with a reason for each guess.
 
-Names and units are believed first. Where they say nothing the numbers decide: a time increases steadily, a
-command jumps or keeps its value, an angle changes smoothly. The joint of a column is the one whose name or
-number its own name holds, or else the next in order.
+The unit of a column, or else the words of its name, tell what it is. The joint of a column is the one whose
+name or number its own name holds, or else the next in order.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.clues import Kind, column_unit, direction, joint_of, kind_of, likely_range, number_in
+from hydroid.log.clues import column_unit, direction, joint_of, kind_of, likely_range, number_in
 from hydroid.log.log import Floats
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
@@ -36,11 +36,14 @@ class ColumnGuess(NamedTuple):
 
 class _Column(NamedTuple):
     name: str
-    kind: Kind
+    kind: str
     unit: str
     values: Floats
-    why: str
     clock: bool
+
+    @property
+    def why(self) -> str:
+        return "by its unit" if self.unit else "by its name"
 
 
 def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
@@ -56,15 +59,18 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
         LogError: no column looks like a time.
     """
     columns = _columns(table)
-    time = _time(table, columns)
+    times = [column for column in columns if column.kind == "time"]
+    time = max(times, key=lambda column: _rises(column.values), default=None)
+    if time is None:
+        hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
+        raise LogError("has no column that looks like a time", where=table.source, hint=hint)
     step = float(np.nanmedian(np.diff(time.values)))
-    unit = "s" if time.clock else time.unit if time.unit in UNITS else likely_time_unit(step) or "s"
+    unit = "s" if time.clock else time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
     said = "dates or times of day" if time.clock else unit
     reasons = [f"{time.name}: time in {said}, {time.why}, every {step:.3g} s"]
-    others = [column for column in columns if column[0] != time.name]
     angles, commands = (
-        _by_joint([c for c in others if c.kind == kind], joints, reasons) for kind in ("angle", "command")
+        _by_joint([c for c in columns if c.kind == kind], joints, reasons) for kind in ("angle", "command")
     )
     unitless = [np.nanmax(np.abs(column.values)) for column, *_ in angles.values() if column.unit == ""]
     default = "rad" if unitless and max(unitless) <= 6.3 else "deg"
@@ -76,7 +82,7 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
             entry["command"], said = _command(pair)
             reasons.append(f"{said} of {name}, {pair[0].why}")
         for column in angles.get(joint, [])[:1]:
-            angle_unit = {"rad": "rad", "": default}.get(column.unit, "deg")
+            angle_unit = column.unit or default
             entry["angle"] = {"column": column.name, "unit": angle_unit}
             reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
         used |= {column.name for column in (*commands.get(joint, ()), *angles.get(joint, ()))}
@@ -86,52 +92,42 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
 
 
 def _columns(table: Table) -> list[_Column]:
-    """Read every column of numbers, those of the usual length."""
-    names = list(dict.fromkeys(name for name in table.names if name))
-    units = {name: column_unit(name, table.units.get(name, "")) for name in names}
-    kinds: dict[str, Kind] = {name: kind_of(name, units[name]) for name in names}
-    read, clocks = dict[str, Floats](), set[str]()
-    for group in (names, [name for name in names if kinds[name] != "other"], *([name] for name in names)):
-        try:
-            held = [Signal(name, "command" if kinds[name] == "command" else "angle") for name in group]
-            recording = table.read(held)
-        except LogError:
-            continue  # text, or different lengths or clocks
-        read |= dict(zip(group, recording.values.T, strict=True))
-        clocks |= recording.clocks
-        if len(group) > 1:
-            break
-    lengths = [len(values) for values in read.values()]
-    usual = max(set(lengths), key=lengths.count, default=0)
+    """Read all columns whose names or units say that they are times, commands or angles.
+
+    If they cannot be read together, read those that have the most frequent length.
+    """
+    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    kinds = {name: kind for name, unit in units.items() if (kind := kind_of(name, unit)) != "other"}
+
+    def read(names: Sequence[str]) -> list[_Column]:
+        recording = table.read([Signal(n, "command" if kinds[n] == "command" else "angle") for n in names])
+        return [
+            _Column(
+                name,
+                kinds[name],
+                unit.name if (unit := units[name]) else "",
+                values,
+                name in recording.clocks,
+            )
+            for name, values in zip(names, recording.values.T, strict=True)
+        ]
+
     columns = list[_Column]()
-    for name, values in read.items():
-        there = values[np.isfinite(values)]
-        if len(values) == usual and len(there):
-            unit = units[name]
-            why = "by its unit" if unit else "by its name"
-            if kinds[name] == "" and np.ptp(there) > 0:
-                steps = np.abs(np.diff(there))
-                jumps = steps.max() > 0.2 * np.ptp(there) or (steps == 0).mean() > 0.5
-                kinds[name] = "command" if jumps else "angle"
-                why = "by how its numbers change"
-            unit_name = unit.name if unit else ""
-            columns.append(_Column(name, kinds[name], unit_name, values, why, name in clocks))
-    return columns
+    try:
+        columns = read([*kinds]) if kinds else []
+    except LogError:  # text, or different lengths or clocks
+        for name in kinds:
+            with suppress(LogError):
+                columns += read([name])
+    lengths = [len(column.values) for column in columns]
+    usual = max(lengths, key=lengths.count, default=0)
+    return [c for c in columns if len(c.values) == usual and np.isfinite(c.values).any()]
 
 
-def _time(table: Table, columns: Sequence[_Column]) -> _Column:
-    """Return the first column that is named a time and rises steadily, or else is or does one of both."""
-
-    def merit(column: _Column) -> tuple[bool, bool]:
-        steps = np.diff(column.values[np.isfinite(column.values)])
-        rises = len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean()
-        return column.kind == "time", bool(rises)
-
-    best = max(columns, key=merit, default=None)
-    if best is None or not any(merit(best)):
-        hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
-        raise LogError("has no column that looks like a time", where=table.source, hint=hint)
-    return best
+def _rises(values: Floats) -> bool:
+    """Return whether a time rises steadily."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean())
 
 
 def _by_joint(

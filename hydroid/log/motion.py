@@ -3,8 +3,8 @@
 The lag: for each one the joint's velocity is regressed on the command at that lag, the angle and a constant,
 q̇(t) ≈ k u(t − lag) + s q(t) + c. The angle stands for springs and gravity's gradient, which turn a slow
 velocity ahead of its command. All are smoothed by one Gaussian, which shifts nothing. Samples at which a
-joint stands at the end of its travel, pushed further, do not count. The lag of the smallest residual is the
-answer if it lies inside the range of lags and is clearly better than any lag of the opposite sign and than
+joint stands at the end of its travel, pushed further, do not count. The lag of the smallest residual is
+certain if it lies inside the range of lags and is clearly better than any lag of the opposite sign and than
 the lags of a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
 """
 
@@ -20,7 +20,6 @@ LAGS = (-0.5, 1.5)  # lags that clocks and transport delays may have [s]
 PLAIN = 0.1  # longest lag that needs no transport delay [s]
 ACAUSAL = -0.02  # lags below this are more than noise [s]
 QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
-MOVING = 0.1  # part of the largest speed above which a joint moves
 LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
 
@@ -49,11 +48,6 @@ class JointMotion:
         return float(np.where(size > 30, size, 0.0).sum() * self.log.period)
 
     @cached_property
-    def path(self) -> float:
-        """Length of its way back and forth [deg]."""
-        return float(np.rad2deg(np.abs(self._slow[2]).sum() * self.log.period))
-
-    @cached_property
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if it is too short."""
         late = round(0.25 / self.log.period)  # of valve and oil
@@ -76,34 +70,28 @@ class JointMotion:
         return path >= LEAST_PATH and against < 1 - AGAINST
 
     @cached_property
+    def likely_lag(self) -> float:
+        """Of the motion behind its command [s], at least 0: a first guess, however little the log tells."""
+        lags, residual, _ = self._regressed
+        possible = lags >= 0
+        return float(lags[possible][residual[possible].argmin()])
+
+    @cached_property
     def lag(self) -> float | None:
         """Of the motion behind its command [s]; None where the log does not tell."""
-        lag, residual, sign = self._regress()
+        lags, residual, sign = self._regressed
         best = int(residual.argmin())
         # motion ahead of its command takes stronger evidence
-        allowed = 0.5 if lag[best] > ACAUSAL else 0.25
-        plain = np.abs(lag - PLAIN / 2) < (PLAIN + self.log.period) / 2
+        allowed = 0.5 if lags[best] > ACAUSAL else 0.25
+        plain = np.abs(lags - PLAIN / 2) < (PLAIN + self.log.period) / 2
         rivals = residual[(sign != sign[best]) | (plain & ~plain[best])]
-        unclear = bool(rivals.size) and residual[best] >= 0.5 * rivals.min()
-        return None if best in (0, len(lag) - 1) or residual[best] > allowed or unclear else float(lag[best])
+        clear = residual[best] <= allowed and residual[best] < 0.5 * rivals.min(initial=np.inf)
+        return float(lags[best]) if clear and 0 < best < len(lags) - 1 else None
 
     @property
     def shifted(self) -> bool:
         """Whether its lag is none that an actuator has by itself."""
         return self.lag is not None and not ACAUSAL <= self.lag <= PLAIN + self.log.period / 2
-
-    def follows(self, joint: int) -> tuple[float, float]:
-        """Return the largest correlation of its speed with a joint's command, and at which lag that is [s].
-
-        Unlike `lag` this answers always, also in a log of one movement: good enough for a first guess.
-        """
-        command, speed = self.log.command[:, joint - 1], self._quick[2]
-        lags = range(min(round(0.8 / self.log.period), len(speed) // 2))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            pairs = ((command[: len(command) - late], speed[late:]) for late in lags)
-            correlation = np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
-        best = int(np.argmax(correlation))
-        return float(correlation[best]), best * self.log.period
 
     @cached_property
     def dead_band(self) -> float:
@@ -111,8 +99,8 @@ class JointMotion:
 
         Every 5 % more must explain a thousandth of the samples, else few of them decide.
         """
-        late = round(self.follows(self.joint)[1] / self.log.period)
-        size, moves = np.abs(self._logged), np.abs(self._quick[2]) > MOVING * self.speed
+        late = round(self.likely_lag / self.log.period)
+        size, moves = np.abs(self._logged), np.abs(self._quick[2]) > 0.1 * self.speed
         size, moves = size[: len(size) - late], moves[late:]
         cost = [np.mean(moves == (size < 5 * k)) + 0.001 * k for k in range(20)]
         return 5.0 * int(np.argmin(cost))
@@ -125,7 +113,7 @@ class JointMotion:
         in the dead band.
         """
         command, speed = np.abs(self._quick[0]), np.abs(self._quick[2])
-        moving = speed > MOVING * speed.max()
+        moving = speed > 0.1 * speed.max()
         enough = np.median(command[moving]) if moving.any() else np.inf
         return float((self._at_stop & (command > 0.99 * enough)).sum() * self.log.period)
 
@@ -149,11 +137,10 @@ class JointMotion:
         at = np.arange(-reach, reach + 1)
         kernel = np.exp(-0.5 * (at / width) ** 2)
         kernel /= kernel.sum()
-        steps = -at / width**2 * kernel
-        pairs = ((self._logged, kernel), (angle, kernel), (angle, steps))
-        padded = [(np.pad(x, reach, "symmetric"), kernel) for x, kernel in pairs]
-        command, angle, step = (np.convolve(*pair, "valid").astype(np.float64) for pair in padded)
-        return command, angle, step / self.log.period
+        slope = -at / width**2 * kernel / self.log.period
+        pairs = ((self._logged, kernel), (angle, kernel), (angle, slope))
+        command, angle, speed = (np.convolve(np.pad(x, reach, "symmetric"), k, "valid") for x, k in pairs)
+        return command, angle, speed
 
     @cached_property
     def _at_stop(self) -> NDArray[np.bool_]:
@@ -170,31 +157,27 @@ class JointMotion:
                 stopped[max(begin - margin, 0) : end + margin] = True
         return stopped
 
-    def _regress(self) -> tuple[Floats, Floats, Floats]:
-        """Regress the speed on a constant, the angle, and the command shifted by each lag.
+    @cached_property
+    def _regressed(self) -> tuple[Floats, Floats, Floats]:
+        """Lags [s], the share of the speed's variance that each leaves, and the sign of the command's effect.
 
-        Returns the lags [s], the share of the speed's variance that each leaves, and the sign of the
-        command's effect. A log that is too short, or in which nothing changes, leaves all of it.
+        A log that is too short, or in which nothing changes, leaves all of it.
         """
         first, last = (round(lag / self.log.period) for lag in LAGS)
-        lag: Floats = np.arange(first, last + 1, dtype=np.float64) * self.log.period
+        lags: Floats = np.arange(first, last + 1, dtype=np.float64) * self.log.period
         (command, angle, speed), used = self._quick, slice(last, len(self._logged) + first)
-        counts = ~self._at_stop[used]
-        if (
-            counts.sum() < last
-            or np.ptp(self._logged) == 0
-            or not np.ptp(self.log.angle[:, self.joint - 1]) > 0
-        ):
-            return lag, np.ones(len(lag)), np.zeros(len(lag))
+        counts = (~self._at_stop[used]).astype(float)
+        if counts.sum() < last or not np.ptp(self._logged) * np.ptp(self.log.angle[:, self.joint - 1]) > 0:
+            return lags, np.ones(len(lags)), np.zeros(len(lags))
         basis = np.linalg.qr(counts[:, None] * np.stack([np.ones(len(counts)), angle[used]], axis=1))[0]
         wanted = counts * speed[used]
         wanted = wanted - basis @ (basis.T @ wanted)
-        power = np.correlate(command**2, counts.astype(float), "valid")
+        power = np.correlate(command**2, counts, "valid")
         own = power - sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
         product, total = np.correlate(command, wanted, "valid"), wanted @ wanted
         enough = (own > 1e-9 * power) & (total > 0)
         explained: Floats = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
-        return lag, (1 - explained)[::-1], np.sign(product)[::-1]
+        return lags, (1 - explained)[::-1], np.sign(product)[::-1]
 
 
 @lru_cache(maxsize=64)

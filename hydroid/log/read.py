@@ -13,7 +13,7 @@ from hydroid.log.bag import open_bag
 from hydroid.log.checks import check_recording
 from hydroid.log.columns import map_signals, match_signals
 from hydroid.log.csv import open_csv, read_start
-from hydroid.log.finding import LogFinding, found
+from hydroid.log.finding import LogFinding, log_finding
 from hydroid.log.log import Floats, Log
 from hydroid.log.repair import fill, is_on_grid, resample, sample_period, unwrap
 from hydroid.log.survey import contradictions
@@ -23,13 +23,12 @@ from hydroid.settings.log import LogSettings
 DEFAULT = LogSettings()
 
 
-def open_table(path: Path, settings: LogSettings = DEFAULT, wanted: Sequence[str] = ()) -> Table:
+def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     """Open a log of any format, recognised by its first bytes: CSV, .mat, Parquet, a ROS bag or MCAP.
 
     Args:
         path: the file, or the folder of a ROS 2 bag.
         settings: name of the time column, and period to which the channels of a bag are resampled.
-        wanted: names of columns that the settings ask for; they tell the header of a CSV file.
 
     Raises:
         LogError: it cannot be read, or needs a package that is not installed.
@@ -43,7 +42,7 @@ def open_table(path: Path, settings: LogSettings = DEFAULT, wanted: Sequence[str
     hdf5 = b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520])
     if hdf5 or start.startswith(b"MATLAB 5.0 MAT-file") or path.suffix.lower() == ".mat":
         return open_mat(path, hdf5=hdf5)
-    return open_csv(path, wanted)
+    return open_csv(path)
 
 
 def read_log(path: Path, settings: LogSettings, ranges: Floats, **how: Any) -> tuple[Log, list[LogFinding]]:
@@ -86,32 +85,32 @@ def check_log(
     source, log, findings = str(path), None, list[LogFinding]()
     try:
         signals = map_signals(settings, ranges)
-        table = open_table(path, settings, [signal.name for signal in signals])
-        measured = {signal.joint for signal in signals if signal.kind == "angle"}
-        wrong = {j: "no such joint" for j in settings.joints if j > len(ranges)}
-        wrong |= {
-            j: "no output angle" if j <= len(ranges) else "no output joint" for j in {*outputs} - measured
-        }
-        findings += [found("error", kind, source, [j], joints=str(len(ranges))) for j, kind in wrong.items()]
+        table = open_table(path, settings)
+        joints = str(len(ranges))
+        for joint in sorted({*outputs, *settings.joints}):
+            if joint > len(ranges):
+                findings.append(log_finding("error", "no such joint", source, [joint], joints=joints))
+            elif joint in outputs and ("angle", joint) not in {(s.kind, s.joint) for s in signals}:
+                findings.append(log_finding("error", "no output angle", source, [joint]))
         if not angles_required:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
         signals, faults = match_signals(table, signals, {*outputs, *settings.joints})
         findings += faults
         if signals and signals[0].kind == "time":
-            recording = _in_si(table.read(signals))
-            remarks = (*table.remarks, *recording.remarks)
+            recording, repairs = _in_si(table.read(signals)), list[LogFinding]()
             recording, joined = unwrap(recording)
-            findings += joined + [found("note", "layout", source, what=remark) for remark in remarks]
+            remarks = (*table.remarks, *recording.remarks)
             if repair:
                 recording, repairs = fill(recording, settings.repair_s)
-                findings += repairs
-            findings += check_recording(recording, settings)
+            findings += joined + [log_finding("note", "layout", source, what=what) for what in remarks]
+            findings += repairs + check_recording(recording, settings, repaired=repair)
             if all(finding.level != "error" for finding in findings):
                 log, more = _to_log(recording, settings, len(ranges))
                 findings += more
-                findings += contradictions(log, settings, outputs, {finding.kind for finding in findings})
+                stated = {"unit of command", "unit of angle"} & {finding.kind for finding in findings}
+                findings += contradictions(log, settings, outputs, units_stated=bool(stated))
     except LogError as error:
-        fault = found("error", "unreadable", source, what=error.what, hint=error.hint)
+        fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
@@ -140,7 +139,7 @@ def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[L
     pressure = measured[..., 1:] if "pressure" in kinds else None
     log = Log(recording.table.source, time, command, measured[..., 0], period, pressure)
     findings, step = list[LogFinding](), sample_period(recording.time)
-    if not is_on_grid(recording.time, period):
+    if abs(step - period) > 0.01 * period or not is_on_grid(recording.time, period):
         findings.append(recording.finding("note", "resampled", step=step, period=period))
     if "command" in kinds and not log.driven.any():
         findings.append(recording.finding("warning", "undriven"))

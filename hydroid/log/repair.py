@@ -1,7 +1,8 @@
 """A recording's samples -> one period: repairs that invent no data, then commands held, angles interpolated.
 
-A faster log is thinned by plain interpolation, without a filter before it: the fit compares angles sample by
-sample, and white sensor noise stays what it was, while a filter would colour it and delay the angle.
+A faster log is thinned by plain interpolation of its angles, without a filter before it: the fit compares
+angles sample by sample, and white sensor noise stays what it was, while a filter would colour it and delay
+the angle. Its commands are averaged over each new sample: the arm has felt all of them.
 """
 
 from dataclasses import replace
@@ -37,18 +38,15 @@ def unwrap(recording: Recording) -> tuple[Recording, list[LogFinding]]:
 
 
 def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFinding]]:
-    """Fill gaps: interpolate angles, hold commands, insert dropped samples.
+    """Interpolate angles and hold commands in holes of at most `longest` [s] besides the usual step.
 
-    A gap is at most `longest` [s] besides the usual step between samples. Rows without a time are dropped,
-    and put back if they leave a gap.
+    Rows without a time are dropped. Samples that were never recorded are counted: `resample` bridges them.
     """
     timed = ~np.isnan(recording.time)
     lost = recording.lines[~timed]
     recording = recording.take(np.flatnonzero(timed))
-    period = sample_period(recording.time)
+    time, period, values = recording.time, sample_period(recording.time), recording.values.copy()
     reach = longest * (1 + 1e-9) + period
-    recording, added = _insert(recording, period, reach)
-    values, time = recording.values.copy(), recording.time
     for column, signal in enumerate(recording.signals[1:], 1):
         whole = ~np.isnan(values[:, column])
         there, holes = np.flatnonzero(whole), np.flatnonzero(~whole)
@@ -56,39 +54,21 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFindi
         inside = (after > 0) & (after < len(there))
         holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
         near = time[after] - time[before] <= reach
-        if len(holes):
-            known = values[there, column]
-            between = np.interp(time[holes], time[there], known)
-            filled = values[before, column] if signal.kind == "command" else between
-            values[holes[near], column] = filled[near]
-    filled = np.isnan(recording.values) & ~np.isnan(values) & ~added[:, None]
-    mended = recording.lines[filled.any(axis=1) | added]
-    recording, lines = replace(recording, values=values), [*mended[:1], *lost[:1]]
-    if not lines:
+        holes, before = holes[near], before[near]
+        if signal.kind == "command":
+            values[holes, column] = values[before, column]
+        elif len(holes):
+            values[holes, column] = np.interp(time[holes], time[there], values[there, column])
+    filled = np.isnan(recording.values) & ~np.isnan(values)
+    steps = np.diff(time, append=time[-1:])
+    short = (steps > GAP * period) & (steps <= reach)
+    mended = [*recording.lines[filled.any(axis=1) | short], *lost]
+    recording = replace(recording, values=values)
+    if not mended:
         return recording, []
-    counts = {"missing cell": filled.sum(), "dropped sample": added.sum(), "row": len(lost)}
-    cells, samples, rows = (f"{n} {noun}{'' if n == 1 else 's'}" for noun, n in counts.items())
-    lost_rows = f", {rows} without a time left out" if len(lost) else ""
-    first = replace(recording, lines=np.array([min(lines)]))
-    return recording, [first.finding("warning", "repair", [0], cells=cells, samples=samples, lost=lost_rows)]
-
-
-def _insert(recording: Recording, period: float, reach: float) -> tuple[Recording, np.ndarray]:
-    """Put rows of NaN where samples are missing; also returns which rows are new, shape (R,)."""
-    steps = np.diff(recording.time)
-    gaps = (steps > GAP * period) & (steps <= reach)
-    copies = np.ones(len(recording.time), dtype=np.int64)
-    copies[:-1][gaps] = np.rint(np.minimum(steps[gaps] / period, 1e9)).astype(np.int64)
-    if copies.sum() > 2 * len(copies):  # mostly gaps: no repair
-        copies[:] = 1
-    origin = np.repeat(np.arange(len(copies)), copies)
-    nth = np.arange(len(origin)) - np.repeat(np.cumsum(copies) - copies, copies)
-    added = nth > 0
-    longer = recording.take(origin)
-    longer.values[added] = np.nan
-    longer.values[:, 0] = recording.time[origin] + nth * np.append(steps, 0.0)[origin] / copies[origin]
-    longer.ragged[added] = False
-    return longer, added
+    numbers = {"cells": filled.sum(), "samples": np.rint(steps[short] / period - 1).sum(), "lost": len(lost)}
+    first = replace(recording, lines=np.array([min(mended)]))
+    return recording, [first.finding("warning", "repair", [0], **numbers)]
 
 
 def resample(
@@ -102,25 +82,35 @@ def resample(
     Returns:
         Grid [s] from 0, shape (T,); command and angle, shapes (T, J) and (T, M).
     """
-    time, grid = time - time[0], _grid(time, period)
+    time = time - time[0]
+    grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
     if is_on_grid(time, period):
-        time = grid
-    else:
-        angle = np.stack([np.interp(grid, time, column) for column in angle.T], axis=1)
+        time = period * np.rint(time / period)  # whose values then pass unchanged
+    angle = np.stack([np.interp(grid, time, column) for column in angle.T], axis=1)
     return grid, hold(time, command, grid - delay, period), angle
 
 
 def is_on_grid(time: Floats, period: float) -> bool:
-    """Return whether the samples already stand on the grid, so that their values pass unchanged."""
-    grid = _grid(time, period)
-    return len(time) == len(grid) and bool((np.abs(time - time[0] - grid) <= 0.01 * period).all())
+    """Return whether all samples stand on multiples of the period after the first."""
+    steps = (time - time[0]) / period
+    return bool((np.abs(steps - np.rint(steps)) <= 0.01).all())
 
 
 def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:
-    """Return the last command at or before each time in `at` [s]; 0 before the first, shape (len(at), J)."""
+    """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
+
+    It is the last one at or before that time, or where several fit into a period their mean over it.
+    """
+    if period > 1.2 * sample_period(time):  # jitter alone does not make a log a faster one
+        steps = np.diff(time, prepend=time[0])[:, None]
+        areas = np.cumsum(steps * np.roll(command, 1, axis=0), axis=0)
+
+        def area(end: Floats) -> Floats:
+            """Return the integral of the command until some times [% s]."""
+            index = np.searchsorted(time, end, side="right") - 1
+            since = (end - time[index])[:, None]
+            return np.where(index[:, None] >= 0, areas[index] + since * command[index], 0.0)
+
+        return (area(at + period) - area(at)) / period
     index = np.searchsorted(time, at + 1e-6 * period, side="right") - 1  # but for rounding
     return np.where(index[:, None] >= 0, command[index], 0.0)
-
-
-def _grid(time: Floats, period: float) -> Floats:
-    return period * np.arange(int((time[-1] - time[0]) / period + 0.01) + 1, dtype=np.float64)

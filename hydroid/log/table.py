@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 
 from hydroid.errors import LogError
 from hydroid.findings import Level
-from hydroid.log.finding import LogFinding, found
+from hydroid.log.finding import LogFinding, log_finding
 from hydroid.log.log import Floats
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa].
+    """One column in use: value = gain · cell + offset in [s], [%], [rad] or [Pa], from `low` to `high`.
 
     `name` is that in the header, `joint` a number from 1, or 0 for the time. `part` is 0, or 1 for the column
-    of a command's negative direction and of the pressure in chamber B.
+    of a command's negative direction and of the pressure in chamber B. Values that are `slack` outside are
+    used with a warning.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Signal:
     offset: float = 0.0
     low: float = -np.inf
     high: float = np.inf
+    slack: float = 0.0
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.joint}" if self.joint else self.kind
@@ -76,7 +78,7 @@ class Recording:
 
     Attributes:
         table: the file.
-        signals: of its columns.
+        signals: of its columns; the first is the time.
         values: shape (R, C), NaN where the file holds no number.
         lines: line or row of the file [1-based] of each row, shape (R,).
         ragged: rows that have more or fewer cells than the table has columns, shape (R,).
@@ -94,7 +96,7 @@ class Recording:
 
     @property
     def time(self) -> Floats:
-        """Time [s], shape (R,), of a recording whose first signal it is."""
+        """Time [s], shape (R,)."""
         return self.values[:, 0]
 
     def take(self, rows: NDArray[np.int64]) -> "Recording":
@@ -116,34 +118,10 @@ class Recording:
         """
         more, word = "", "line" if self.table.header else "row"
         if len(rows) > 1:
-            plural = "s" if len(rows) > 2 else ""
-            more = f" (and {len(rows) - 1} more row{plural}, to {word} {self.lines[rows[-1]]})"
+            more = f" (and {len(rows) - 1} more, to {word} {self.lines[rows[-1]]})"
         place = word, int(self.lines[rows[0]]) if len(rows) else None, signal.name if signal else ""
         subjects = [subject or signal] if signal else []
-        return found(level, kind, self.table.source, subjects, place, rows=more, **numbers)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ArrayTable(Table):
-    """Columns that are in memory, shape (R,) each; text has the dtype object."""
-
-    columns: Mapping[str, NDArray[Any]]
-    clocks: frozenset[str] = frozenset()
-
-    def read(self, signals: Sequence[Signal]) -> Recording:
-        """Read columns, which must be numbers of one length."""
-        first, *_ = names = [signal.name for signal in signals]
-        rows = len(self.columns[first])
-        for name in names:
-            values, where = self.columns[name], f"{self.source}, column {name}"
-            if values.dtype.kind not in "fiub":
-                example = str(values[0])[:30] if len(values) else ""
-                raise LogError(f"holds text, such as {example!r}", where=where, hint="store it as numbers")
-            if len(values) != rows:
-                what = f"holds {len(values)} values, but column {first} holds {rows}"
-                raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
-        values = np.stack([self.columns[name].astype(np.float64) for name in names], axis=1)
-        return in_rows(self, signals, values, clocks=self.clocks.intersection(names))
+        return log_finding(level, kind, self.table.source, subjects, place, rows=more, **numbers)
 
 
 def in_rows(table: Table, signals: Sequence[Signal], values: Floats, **more: Any) -> Recording:

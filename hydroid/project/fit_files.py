@@ -95,7 +95,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
             JOINT.format(
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
                 damping=short(0.1 * size.damping),
-                delay=min(max(motion.follows(joint)[1] - RESPONSE, 0.0), 0.9) if motion else 0.0,
+                delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 dead=short(DEAD * min(max(motion.dead_band, 5.0), 70.0) if motion else 5.0),
                 friction="N" if linear else "N·m",
                 **words,

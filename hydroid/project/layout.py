@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import LogError, SettingsError
-from hydroid.log import JointMotion, Log, Table, check_log, driven_joints, guess_columns, motion_of
+from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -86,14 +86,8 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
 
 def _remarks(motion: JointMotion, names: Sequence[str]) -> list[str]:
     """Return what a user should know of a driven joint."""
-    name, follows = names[motion.joint - 1], {j: motion.follows(j)[0] for j in driven_joints(motion.log)}
-    own, other = follows[motion.joint], max(follows, key=lambda joint: follows[joint])
-    if follows[other] > own + 0.3:
-        return [
-            f"{name} follows the command of {names[other - 1]} (correlation {follows[other]:.2f}) more than "
-            f"its own ({own:.2f}): check which columns belong together"
-        ]
-    lines, (path, against) = list[str](), motion.directed
+    name, lines = names[motion.joint - 1], list[str]()
+    path, against = motion.directed
     if motion.turned:
         share = f"for {against:.0%} of {path:.3g} deg of travel"
         lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")

@@ -26,7 +26,6 @@ DIALECTS: dict[str, Callable[[], bytes]] = {
     "decimal comma, tab": lambda: text("\t", ",").encode(),
     "byte order mark": lambda: text().encode("utf-8-sig"),
     "utf-16": lambda: text("\t", ",").encode("utf-16"),
-    "utf-16 without its mark": lambda: text("\t", ",").encode("utf-16-be"),
     "latin-1": lambda: with_degree_sign(text()).encode("latin-1"),
     "utf-8 degree": lambda: with_degree_sign(text()).encode(),
     "windows": lambda: text(end="\r\n").encode(),
@@ -116,29 +115,25 @@ def blank_first(table: list[list[str]], labels: list[str]) -> list[list[str]]:
 LAYOUTS: dict[str, tuple[Callable[[], list[list[str]]], str]] = {
     "preamble": (
         lambda: rows(["Operator: A. Lab"], ["Rate", "100"], []),
-        "the names are in line 4; lines 1 to 2 above are left out",
+        "the names are in line 4; what stands above is left out",
     ),
     "preamble of a sheet": (
         lambda: rows(["Rate", "100", "", "", ""], ["Gains", "1", "2", "", ""]),
-        "the names are in line 3; lines 1 to 2 above are left out",
+        "the names are in line 3; what stands above is left out",
     ),
     "units": (lambda: rows(below=[["[s]", "%", "(%)", "deg", "°"]]), "line 2 holds units (s, %, deg, °)"),
-    "types": (lambda: rows(below=[["float"] * 5]), "line 2 below the names is text and left out"),
+    "types": (lambda: rows(below=[["float"] * 5]), "line 2 is text and left out"),
     "groups": (
         lambda: rows(["", "valves", "", "encoders", ""], below=[["s", "%", "%", "deg", "deg"]]),
-        "the names are in line 2; line 1 above is left out",
+        "the names are in line 2; what stands above is left out",
     ),
     "labels in a blank first column": (
         lambda: blank_first(rows(["a", "b", "c", "d", "e"], below=[["s", "%", "%", "deg", "deg"]]), [
             "descr", "values", "unit",
         ]),
-        "the names are in line 2; line 1 above is left out",
+        "the names are in line 2; what stands above is left out",
     ),
     "blank first column": (lambda: blank_first(ROWS, []), ""),
-    "names in a comment": (
-        lambda: [["# a rig"], ["# " + HEAD[0], *HEAD[1:]], *DATA],
-        "the names are in line 2, a comment",
-    ),
 }  # fmt: skip
 
 

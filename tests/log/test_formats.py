@@ -39,23 +39,6 @@ def settings(time: str, command: str, angle: str) -> LogSettings:
 
 MATRIX = settings("t", "u[{joint}]", "q[{joint}]")
 T, U, Q = VALUES[:, 0], VALUES[:, 1:3], VALUES[:, 3:5]
-SIMULINK = {
-    "time": T[:, None],
-    "signals": [{"values": x, "label": label} for x, label in ((U, "u"), (Q, ""))],
-}
-CONTROL_DESK = {
-    "X": {"Name": "time", "Data": T[None], "Unit": "s"},
-    "Y": [
-        {"Name": name, "Data": x[None], "Unit": unit}
-        for name, x, unit in (
-            ("Rig/Valve 1", U[:, 0], "V"),
-            ("Rig/Valve 2", U[:, 1], "V"),
-            ("Rig/Angle 1", Q[:, 0], "deg"),
-            ("Rig/Angle 2", Q[:, 1], "deg"),
-        )
-    ],
-    "Capture": {"Version": "1"},
-}
 STRUCTS = {
     "matrices": ({"t": T[:, None], "u": U, "q": Q}, MATRIX),
     "rows": ({"t": T[None], "u": U.T, "q": Q.T}, MATRIX),
@@ -63,8 +46,6 @@ STRUCTS = {
         {"rec": {"t": T[:, None], "plant": {"u": U, "q": Q}}},
         settings("rec.t", "rec.plant.u[{joint}]", "rec.plant.q[{joint}]"),
     ),
-    "Simulink": ({"log": SIMULINK}, settings("log.time", "log.u[{joint}]", "log.signals[2][{joint}]")),
-    "ControlDesk": ({"rec001": CONTROL_DESK}, settings("time", "Rig/Valve {joint}", "Rig/Angle {joint}")),
 }
 
 

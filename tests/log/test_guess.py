@@ -46,13 +46,6 @@ def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: d
     np.testing.assert_allclose(np.rad2deg(log.angle[:, 1]), SWEEP, atol=1e-9)
 
 
-def test_columns_without_a_telling_name_are_told_by_how_they_change(tmp_path: Path) -> None:
-    found = guess(tmp_path, ["x", "Kanal1", "Kanal2"], T, STEPS, SWEEP)
-    assert found.log["time"]["column"] == "x"
-    mapped = found.log["joints"]
-    assert (mapped[1]["command"]["column"], mapped[2]["angle"]["column"]) == ("Kanal1", "Kanal2")
-
-
 def test_names_without_a_joint_go_by_their_order_and_that_is_said(tmp_path: Path) -> None:
     found = guess(tmp_path, ["t", "up", "down", "pot (deg)"], T, STEPS.clip(0), (-STEPS).clip(0), SWEEP)
     assert found.log["joints"][1]["command"]["column"] == ["up", "down"]

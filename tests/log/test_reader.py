@@ -36,30 +36,31 @@ def values(change):
 
 def clock(rows: list[list[str]]) -> None:
     for k, row in enumerate(rows[1:]):
-        row[0] = f"12:00:00.{k:02d}" if k != 7 else "2024-02-31T12:00:00"
+        row[0] = f"12:00:00.{k:02d}" if k != 7 else "noon"
 
 
 FINE = ((3, "-29.6"), (3, "86.9"), (1, "100"), (2, "1e1"), (2, "٣"))
 """the range is -28.65 to 85.94 deg, and the margin 1 deg"""
 FAULTS = {
-    "below the range": (cell(40, 3, "-29.7"), 41, "q1_deg", "angle of joint 1 is -29.7 deg, allowed are"),
-    "above the range": (cell(40, 3, "87"), 41, "q1_deg", "of q1_deg in log.angle, or the joint's range"),
+    "below the range": (cell(40, 3, "-31"), 41, "q1_deg", "angle of joint 1 is -31 deg, allowed are"),
+    "above the range": (cell(40, 3, "88.3"), 41, "q1_deg", "of q1_deg in log.angle, or the joint's range"),
     "command above": (cell(40, 1, "100.01"), 41, "u1_pct", "allowed are -100 to 100 %"),
     "command below": (cell(40, 1, "-100.01"), 41, "u1_pct", "command of joint 1 is -100.01 %"),
     "digit groups": (cell(40, 2, "1_0"), 41, "u2_pct", "'1_0' is not a number"),
     "text": (cell(40, 2, "#N/A"), 41, "u2_pct", "is not a number"),
     "a cell more": (cell(40, 2, "3,4"), 41, "", "should have 5 cells"),
     "a jump": (cell(40, 4, "1000"), 41, "q2_deg", "jumps by"),
-    "no date": (clock, 9, "time_s", "12:30:05.25"),
+    "no time of day": (clock, 9, "time_s", "12:30:05.25"),
     "no time column": (lambda rows: [row.pop(0) for row in rows], 1, "time_s", "the header lacks 'time_s'"),
     "a name twice": (lambda rows: [row.append(row[3]) for row in rows], 1, "q1_deg", "2 columns of this"),
     "backwards": (values(lambda t: t[::-1]), 3, "time_s", "does not increase"),
     "short": (values(lambda t: t[:20]), None, "", "at least 0.5 s is needed"),
-    "empty": (values(lambda t: t[:0]), None, "", "0 samples"),
+    "empty": (values(lambda t: t[:0]), None, "", "samples: 0"),
     "ks": (values(lambda t: t * [0.001, 1, 1, 1, 1]), None, "", "log.time.unit"),
 }  # fmt: skip
 """change of a file, and line, column and words of its only fault"""
 WARNINGS = {
+    "slightly outside": (cell(40, 3, "88.2"), {"slightly outside": "q1_deg"}),
     "an uneven period": (cell(41, 0, "0.403"), {"jitter": "time_s", "resampled": ""}),
     "nothing driven": (
         values(lambda t: t * [1, 0, 0, 1, 1]), {"undriven": "", "command is constant": "u1_pct"},
@@ -162,7 +163,7 @@ def test_commands_alone_are_enough_where_angles_are_not_required(tmp_path: Path)
 
 def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
     settings = LogSettings.model_validate({"joints": {5: None}})
-    with pytest.raises(LogError, match=r"log\.joints\.5: the arm has joints 1 to 2"):
+    with pytest.raises(LogError, match="no joint 5; the arm has joints 1 to 2"):
         read(edited(tmp_path, lambda rows: None), settings)
 
 
@@ -201,6 +202,23 @@ def test_a_resampled_log_is_said_to_be(tmp_path: Path) -> None:
     log, findings = read(path, LogSettings(period_s=0.02))
     assert len(log.time) == 60
     assert findings == []
+
+
+def test_a_faster_log_gives_the_means_of_its_commands(tmp_path: Path) -> None:
+    """An integrating joint ends where the whole log takes it, wherever the steps fall."""
+    values = cells(400)
+    values[:, 1] = np.where((values[:, 0] > 0.4) & (values[:, 0] < 1.33), 80, 0)
+    path = save(tmp_path / "log.csv", lines(values))
+    for delay in (0.0, 0.03):
+        exact, _ = read(path, LogSettings(delay_s=delay))
+        coarse, _ = read(path, LogSettings(period_s=0.05, delay_s=delay))
+        travel = np.cumsum(exact.command * 0.01, axis=0)
+        np.testing.assert_allclose(
+            np.cumsum(coarse.command * 0.05, axis=0)[:-1], travel[4::5][:79], atol=1e-9
+        )
+        np.testing.assert_array_equal(coarse.command[0, 0], 0)
+    slower, _ = read(save(tmp_path / "slow.csv", lines(values[::5])))
+    np.testing.assert_array_equal(slower.command[::5], values[::5, 1:3])
 
 
 def test_the_delay_setting_moves_the_command_only(tmp_path: Path) -> None:

@@ -40,8 +40,7 @@ def test_repair_restores_length_and_leaves_the_rest_alone(
     cell_count = sum(1 for row, column in set(blanked) if row not in gone)
     said = [finding.what for finding in findings if finding.what.startswith("repaired")]
     if gone or cell_count:
-        samples = f"{cell_count} missing cell{'s' * (cell_count != 1)} filled"
-        assert said[0].startswith(f"repaired: {samples}, {len(gone)} dropped sample")
+        assert said[0].startswith(f"repaired: cells filled: {cell_count}, samples inserted: {len(gone)}")
     else:
         assert said == []
 
@@ -74,4 +73,4 @@ def test_torn_rows_and_rows_without_a_time_are_put_back(tmp_path: Path) -> None:
     assert len(faults(path)) == 2
     log, findings = read(path, repair=True)
     assert len(log.time) == 79
-    assert "3 rows without a time" in findings[0].what
+    assert "rows left out: 3" in findings[0].what

@@ -128,15 +128,15 @@ class LogSettings(Settings):
     joints: dict[JointNumber, JointColumns | None] = Field(default_factory=dict[int, JointColumns | None])
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
-    """sample period to which logs are resampled [s]: angles are interpolated, commands held; those of a faster log
-    are averaged over it"""
+    """sample period to which logs are resampled [s]: angles are interpolated, commands held, or averaged
+    over the period where the log is faster"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
     angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0
-    """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops. Angles
-    that are 2 % of the range outside are used with a warning"""
+    """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops. Up to
+    2 % of the range they are used with a warning"""
 
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
         """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""

@@ -58,8 +58,8 @@ def _time(recording: Recording, settings: LogSettings, repaired: bool) -> Iterat
     remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "set log.time.unit"
     slowest = 10 * settings.period_s  # else held commands would not explain the motion
     if len(time) < 2 or duration < 0.5:
-        numbers = {"duration": duration, "samples": len(time), "remedy": remedy}
-        yield recording.finding("error", "too short", **numbers)
+        count = float(len(time))
+        yield recording.finding("error", "too short", duration=duration, samples=count, remedy=remedy)
         return
     if period > slowest:
         numbers = {"period": period, "slowest": slowest, "remedy": remedy}

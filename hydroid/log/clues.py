@@ -123,8 +123,11 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
-    told = (kind for word in reversed(there) for kind, those in WORDS.items() if word in those.split())
-    return next(told, "command" if direction(name)[0] else "other")
+    for word in reversed(there):
+        for kind, those in WORDS.items():
+            if word in those.split():
+                return kind
+    return "command" if direction(name)[0] else "other"
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:

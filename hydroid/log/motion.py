@@ -139,7 +139,8 @@ class JointMotion:
         kernel /= kernel.sum()
         slope = -at / width**2 * kernel / self.log.period
         pairs = ((self._logged, kernel), (angle, kernel), (angle, slope))
-        command, angle, speed = (np.convolve(np.pad(x, reach, "symmetric"), k, "valid") for x, k in pairs)
+        padded = ((np.pad(x, reach, "symmetric"), k) for x, k in pairs)
+        command, angle, speed = (np.convolve(*pair, "valid").astype(np.float64) for pair in padded)
         return command, angle, speed
 
     @cached_property

@@ -66,9 +66,9 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFindi
     recording = replace(recording, values=values)
     if not mended:
         return recording, []
-    numbers = {"cells": filled.sum(), "samples": np.rint(steps[short] / period - 1).sum(), "lost": len(lost)}
-    first = replace(recording, lines=np.array([min(mended)]))
-    return recording, [first.finding("warning", "repair", [0], **numbers)]
+    added, first = np.rint(steps[short] / period - 1).sum(), replace(recording, lines=np.array([min(mended)]))
+    count = {"cells": float(filled.sum()), "samples": float(added), "lost": float(len(lost))}
+    return recording, [first.finding("warning", "repair", [0], None, None, **count)]
 
 
 def resample(

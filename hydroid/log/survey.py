@@ -82,8 +82,10 @@ def survey(logs: Sequence[Log]) -> list[LogFinding]:
         turned, straight = [m for m in own if m.turned], [m for m in own if m.straight]
         if turned and straight:
             odd = min(turned, straight, key=len)[0].log.source
-            numbers = {"turned": str(len(turned)), "logs": str(len(turned + straight))}
-            findings.append(log_finding("warning", "directions differ", odd, [joint], **numbers))
+            some, every = str(len(turned)), str(len(turned + straight))
+            findings.append(
+                log_finding("warning", "directions differ", odd, [joint], turned=some, logs=every)
+            )
         held = _held_levels([motion.log for motion in own], joint)
         open_ = [f"between {a} and {b}" for a, b in pairwise(held) if b - a >= 20 and a * b > 0]
         open_ += [f"above {high}" for high in held[-1:] if 0 < high < 80]

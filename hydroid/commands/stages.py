@@ -204,4 +204,6 @@ def _fit(options: FitOptions) -> FitRuns:
     from hydroid.run.collection import read_runs
 
     tables = merged_tables(read_runs([str(result.folder) for result in results], Path(out)))
-    return FitRuns([tables["spread"], *written(tables, out)], content, several)
+    best = min(results, key=lambda result: result.fit.best.rms)
+    lines = [f"The best of {runs} runs:", *best.lines, *written(tables, out)]
+    return FitRuns(lines, content, several, details=[tables["spread"]])

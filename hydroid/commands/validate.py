@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from hydroid.log import Log
 
 
+MOST_ROWS = 12
+"""joints of all fits that a terminal shows; of more those of the best fit"""
+
+
 @command
 def validate(
     logs: "LogSources",
@@ -75,8 +79,10 @@ def validate(
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
         "results": [row for one in results for row in one.plain(arm.joint_names)],
     }
-    lines = [verdict_table(fits), *written(page, out)]
-    return Result(lines, content, results, page, details=[page.tables["errors"]])
+    best = next(iter(fits))
+    few = fits if sum(map(len, fits.values())) <= MOST_ROWS else {best: fits[best]}
+    details = [page.tables["verdict"], page.tables["errors"]]
+    return Result([verdict_table(few), *written(page, out)], content, results, page, details=details)
 
 
 def _predicted(

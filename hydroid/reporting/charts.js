@@ -13,8 +13,7 @@
 
   const color = (name) => getComputedStyle(page).getPropertyValue(`--${name}`).trim();
   const numbers = (values) => (values ?? []).map((v) => v ?? NaN);
-  const sizes = { circle: "circle", diamond: "diamond", dash: "dash" };
-
+  
   // [low, high] of all marks that are shown along an axis, with a margin
   function extent(panel, axis, shown) {
     let low = Infinity, high = -Infinity;
@@ -41,8 +40,8 @@
     if (mark.kind === "line") made = [figure.line({ x, y, ...line })];
     else if (mark.kind === "step") made = [figure.step({ x, y, mode: "after", ...line })];
     else if (mark.kind === "points")
-      made = [figure.scatter({ x, y, marker: sizes[mark.look] ?? "circle", size: mark.width, fill_color: paint,
-        fill_alpha: alpha, line_color: mark.look === "dash" ? paint : color("paper"), angle: mark.look === "dash" ? Math.PI / 2 : 0 })];
+      made = [figure.scatter({ x, y, marker: mark.look || "circle", size: mark.width, fill_color: paint,
+        fill_alpha: alpha, line_color: color("paper") })];
     else if (mark.kind === "band")
       made = [figure.varea({ x, y1: y, y2: end, fill_color: paint, fill_alpha: alpha })];
     else if (mark.kind === "area")

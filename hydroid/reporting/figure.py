@@ -32,9 +32,7 @@ SHADES = {
 }
 _LOOKS: dict[str, Any] = {
     "dashed": (0, (5, 3)),
-    "dotted": ":",
     "diamond": "D",
-    "dash": "|",
 }
 _STYLE: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same glyphs on every machine

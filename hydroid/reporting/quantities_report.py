@@ -19,7 +19,7 @@ _MOST = 5
 """quantities of a joint that its card shows, the best known ones"""
 _CAPTION = (
     "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond "
-    "the logs. Ticks: those that they hold."
+    "the logs."
 )
 
 
@@ -56,7 +56,7 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
         whole, marks = [np.ones(len(at), dtype=bool)], list[Mark]()
         if name.endswith("_speed"):  # over commands: its two directions, with the dead band between them
             whole, commands = [at > 0, at < 0], [log.command[:, curve.joint - 1] for log in logs]
-            marks = _logged(np.concatenate(commands), logs[0].period)
+            marks = _logged(np.concatenate(commands))
         for part, color in zip(whole, ("blue", "orange"), strict=False):
             low, high = ends[part].T
             marks += [
@@ -69,12 +69,7 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
     return Chart(tuple(panels), columns=len(panels) // len({curve.joint for curve in curves.values()}))
 
 
-def _logged(commands: Array, period: float) -> list[Mark]:
-    """Shade what lies beyond the logs' commands, and tick those that are held for 0.2 s."""
-    levels, counts = np.unique(commands[commands != 0], return_counts=True)
-    if not levels.size:
-        return []
-    low, high = min(levels[0], 0.0), max(levels[-1], 0.0)
-    beyond = Mark("spans", np.array([-105.0, high]), end=np.array([low, 105.0]), color="pale", alpha=0.4)
-    held = levels[counts * period >= 0.2]
-    return [beyond, Mark("points", held, np.zeros(len(held)), color="grey", width=9, look="dash")]
+def _logged(commands: Array) -> list[Mark]:
+    """Shade what lies beyond the logs' commands."""
+    ends = np.array([-105.0, commands.max(initial=0.0)]), np.array([commands.min(initial=0.0), 105.0])
+    return [Mark("spans", ends[0], end=ends[1], color="pale", alpha=0.4)]

@@ -147,7 +147,7 @@ def test_every_kind_of_mark_can_be_drawn():
         Mark("band", x, x, x + 1, alpha=0.3),
         Mark("spans", x[:1], end=x[1:2]),
         Mark("rule", y=x[:1], look="dashed"),
-        Mark("rule", x[:1], look="dotted"),
+        Mark("rule", x[:1], look="dashed"),
         Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
         Mark("text", x, x, texts=("a", "b", "c")),
     )

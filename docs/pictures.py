@@ -25,15 +25,16 @@ SIZE, RATE, SPAN = (400, 330), 8, (3.4, 9.4)
 """of each arm [px]; pictures in a second; from when to when [s]"""
 COLORS = 64
 SHOTS = {
-    "report": ("hyd", "", (1000, 1010), "light"),
+    "report": ("hyd", "", (1000, 1240), "light"),
     "report_phone": ("hyd", "", (400, 1000), "dark"),
     "report_parameters": ("hyd", "Parameters", (1000, 610), "light"),
     "report_actuator": ("hyd", "The actuator", (1000, 1290), "light"),
     "report_motion": ("nsga2", "The arm in motion", (1000, 600), "light"),
 }
 """run, title of the section (the page's beginning without one), width and height [px], and look"""
-TOP = """[...document.querySelectorAll("section")]
+TOP = """[...document.querySelectorAll("section, details")]
   .find((one) => one.querySelector("h2")?.textContent === "%s").getBoundingClientRect().top + scrollY"""
+FOLD = 'document.querySelectorAll("details").forEach((one) => { one.open = false; })'
 
 
 def moving(demo: Path) -> None:
@@ -66,7 +67,7 @@ async def shots(demo: Path) -> None:
         tab = await connected(profile)
         for name, (run, title, (width, height), look) in SHOTS.items():
             await tab.load(demo / run / "report.html", width, look)
-            top = await tab.value(TOP % title) if title else 0
+            top = await tab.value(TOP % title if title else f"{FOLD}, 0")
             file = HERE / f"{name}.png"
             file.write_bytes(await tab.shot(0, float(top), width, height))
             Image.open(file).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(file, optimize=True)

@@ -1,7 +1,7 @@
 """Pictures of every kind of report, and whether a browser finds fault with any.
 
     python docs/screenshots.py                      # build/screenshots/KIND-WIDTH-LOOK.png, KIND-paper.pdf
-    python docs/screenshots.py --only fit-hyd design
+    python docs/screenshots.py --only fit-hyd validate
     python docs/screenshots.py --axe axe.min.js     # also asks axe-core, a checker of accessibility
 
 The reports come from small fits of the virtual rig's logs, made once in build/screenshots/runs. It needs
@@ -26,21 +26,14 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 ROOT = Path(__file__).parents[1]
 LOG, OTHER = (str(ROOT / f"examples/logs/rig_shoulder_{n}.csv") for n in (1, 2))
-ALL_JOINTS = str(ROOT / "examples/logs/rig_all_joints_1.csv")
-MECH = ("fit-mech", LOG, "--set", "refinement.iterations=12")
 KINDS = {
-    "fit-mech": MECH,
-    "fit-mech-2": (*MECH, "--set", "search.seed=2"),
+    "fit-mech": ("fit-mech", LOG, "--set", "refinement.iterations=12"),
     "fit-hyd": ("fit-hyd", LOG, "--mech", "fit-mech"),
     "validate": ("validate", OTHER, LOG, "--fit", "fit-hyd", "--fit", "fit-mech"),
     "identifiability": ("analyse", LOG, "--fit", "fit-mech", "--profile", "K,D"),
     "sensitivity": ("analyse", LOG, "--fit", "fit-hyd", "--sensitivity"),
     "suggest": ("suggest", "--fit", "fit-mech"),
-    "design": ("design", "--fit", "fit-mech", "--duration", "12"),
-    "collect": ("report", "--merge", "fit-mech", "fit-mech-2"),
-    "collisions": ("view", ALL_JOINTS, "--collisions"),
     "actuator": ("view", "--actuator", "--fit", "fit-hyd"),
-    "compare": ("report", "fit-mech", "fit-mech-2"),
 }
 """the command that makes each report; names of other kinds stand for their folders"""
 WIDTHS = (400, 1400)
@@ -78,7 +71,7 @@ def page(kind: str, runs: Path) -> Path:
         paths = [str(runs / one) if one in used else one for one in given]
         done = [sys.executable, "-m", "hydroid", command, *paths, "--out", str(folder), "--quiet"]
         print(" ".join(done[2:]), flush=True)
-        if subprocess.run(done, cwd=ROOT).returncode > 1:  # 1: collisions has found some
+        if subprocess.run(done, cwd=ROOT).returncode:
             sys.exit(f"{kind} was not made")
     order = sorted(folder.glob("*.html"), key=lambda file: (file.name != "report.html", file.name))
     return order[0]

@@ -151,8 +151,8 @@ def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
         return float(best.cost), best.x
 
     starts = list(_starts(table))
-    _, best = min((fit(start, 15) for start in starts), key=lambda result: result[0])
-    return made(fit(best, 60)[1])
+    _, best = min((fit(start, 10) for start in starts), key=lambda result: result[0])
+    return made(fit(best, 40)[1])
 
 
 def _starts(table: Baseline) -> Iterator[Floats]:

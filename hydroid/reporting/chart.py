@@ -78,7 +78,7 @@ class Panel:
         title: above the panel.
         height: in the page [px].
         x_limits, y_limits: of the axes; None: around all that is drawn.
-        log_x, log_y: whether an axis is logarithmic.
+        log_y: whether the y axis is logarithmic.
         equal: whether a unit is as long on both axes.
     """
 
@@ -89,7 +89,6 @@ class Panel:
     height: int = 220
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
-    log_x: bool = False
     log_y: bool = False
     equal: bool = False
 

@@ -89,13 +89,12 @@
     const figure = Bokeh.Plotting.figure({
       output_backend: "svg", // sharp on paper too
       height: panel.height, sizing_mode: "stretch_width", toolbar_location: null, tools: touch ? "" : "xbox_zoom",
-      x_range, y_range, x_axis_type: panel.log_x ? "log" : "linear", y_axis_type: panel.log_y ? "log" : "linear",
+      x_range, y_range, y_axis_type: panel.log_y ? "log" : "linear",
       x_axis_label: panel.x || null, y_axis_label: panel.y || null,
       min_border_left: 64, min_border_right: 16, min_border_top: 8, min_border_bottom: 8,
     });
     if (width < 480) for (const axis of figure.xaxes) axis.ticker.desired_num_ticks = 4;
-    if (panel.log_x) figure.xaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
-    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5];
+    if (panel.log_y) figure.yaxes[0].ticker.mantissas = [1, 2, 5]; // else less than two decades have one tick or two
     axisLook(figure);
     const made = panel.marks.flatMap((mark) => addMark(figure, mark, shown));
     return { panel, figure, made, x_range, y_range, home: xs };

@@ -102,12 +102,11 @@ def _panel(axes: Axes, panel: Panel) -> None:
         if not mark.off:
             _draw(axes, mark)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
-    for name, log, axis in (("x", panel.log_x, axes.xaxis), ("y", panel.log_y, axes.yaxis)):
-        if log:
-            axes.set(**{f"{name}scale": "log"})
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axis.set_minor_locator(NullLocator())
-            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(float(f"{value:.4g}"))))
+    if panel.log_y:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(float(f"{value:.4g}"))))
     if panel.x_limits:
         axes.set_xlim(*panel.x_limits)
     if panel.y_limits:
@@ -130,14 +129,12 @@ def _draw(axes: Axes, mark: Mark) -> None:
         case "band":
             axes.fill_between(x, y, end, lw=0, **look)
         case "spans":
-            ends = np.column_stack([x, end, np.full(len(x), np.nan)]).ravel()
-            axes.fill_between(ends, 0, 1, transform=axes.get_xaxis_transform(), lw=0, zorder=0, **look)
+            for low, high in zip(x, end, strict=True):
+                axes.axvspan(low, high, lw=0, zorder=0, **look)
         case "rule":
-            at, ends = np.repeat(np.append(y, x), 3), np.tile([0, 1, np.nan], len(x) + len(y))
-            if len(y):
-                axes.plot(ends, at, transform=axes.get_yaxis_transform(), **line)
-            else:
-                axes.plot(at, ends, transform=axes.get_xaxis_transform(), **line)
+            for rule, values in ((axes.axhline, y), (axes.axvline, x)):
+                for value in values:
+                    rule(value, **line)
         case "area":
             parts = np.split(np.array([x, y]), np.flatnonzero(np.isnan(x)), axis=1)
             axes.fill(*(one for part in parts for one in part[:, ~np.isnan(part[0])]), **look)

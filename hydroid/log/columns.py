@@ -36,14 +36,13 @@ def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
 
 
 def match_signals(
-    table: Table, wanted: Sequence[Signal], needed: Collection[int]
-) -> tuple[list[Signal], list[LogFinding]]:
-    """Return the signals whose columns a file has, and what is wrong with its columns.
+    table: Table, wanted: Sequence[Signal], needed: Collection[int], findings: list[LogFinding]
+) -> list[Signal]:
+    """Return the signals whose columns a file has, and add what is wrong with its columns.
 
     Joints that are not `needed` may be absent from a file that has columns of others. A column of a similar
     name speaks against it: it is rather misspelt.
     """
-    findings = list[LogFinding]()
     free = {name.lower(): name for name in sorted({*table.names} - {signal.name for signal in wanted})}
     missing = [signal for signal in wanted if signal.name not in table.names]
     close = {s.name: free[n] for s in missing for n in get_close_matches(s.name.lower(), free, 1, 0.75)}
@@ -73,4 +72,4 @@ def match_signals(
             error("column twice", name, count=count)
         if len(shared := [signal for signal in wanted if signal.name == name]) > 1:
             error("shared column", name, shared)
-    return [signal for signal in wanted if signal.name in table.names], findings
+    return [signal for signal in wanted if signal.name in table.names]

@@ -81,7 +81,7 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
         if pair := commands.get(joint):
             entry["command"], said = _command(pair)
             reasons.append(f"{said} of {name}, {pair[0].why}")
-        for column in angles.get(joint, [])[:1]:
+        for column in angles.get(joint, []):
             angle_unit = column.unit or default
             entry["angle"] = {"column": column.name, "unit": angle_unit}
             reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
@@ -96,21 +96,14 @@ def _columns(table: Table) -> list[_Column]:
 
     If they cannot be read together, read those that have the most frequent length.
     """
-    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
-    kinds = {name: kind for name, unit in units.items() if (kind := kind_of(name, unit)) != "other"}
+    given = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    kinds = {name: kind for name, unit in given.items() if (kind := kind_of(name, unit)) != "other"}
+    units = {name: unit.name if unit else "" for name, unit in given.items()}
 
     def read(names: Sequence[str]) -> list[_Column]:
         recording = table.read([Signal(n, "command" if kinds[n] == "command" else "angle") for n in names])
-        return [
-            _Column(
-                name,
-                kinds[name],
-                unit.name if (unit := units[name]) else "",
-                values,
-                name in recording.clocks,
-            )
-            for name, values in zip(names, recording.values.T, strict=True)
-        ]
+        read = zip(names, recording.values.T, strict=True)
+        return [_Column(n, kinds[n], units[n], values, n in recording.clocks) for n, values in read]
 
     columns = list[_Column]()
     try:
@@ -134,31 +127,24 @@ def _by_joint(
     columns: Sequence[_Column], joints: Sequence[str], reasons: list[str]
 ) -> dict[int, list[_Column]]:
     """Give each column a joint: one column, or two for the directions; tell what is uncertain."""
-    groups, pairs = dict[int, list[_Column]](), list[list[_Column]]()
-    numbers = {column.name: number_in(column.name) for column in columns}
-    from_zero = 0 in numbers.values()
+    groups, named = dict[Any, list[_Column]](), dict[int, list[_Column]]()
     for column in columns:
-        number = numbers[column.name]
-        joint = joint_of(column.name, joints) or (None if number is None else number + from_zero)
-        if joint and joint <= len(joints) and (joint not in groups or _are_pair([*groups[joint], column])):
-            groups.setdefault(joint, []).append(column)
-        mate = next((pair for pair in pairs if _are_pair([*pair, column])), None)
-        pairs.append([column]) if mate is None else mate.append(column)
-    if groups and from_zero:
+        sign, others = direction(column.name)
+        groups.setdefault(others if sign and column.kind == "command" else column.name, []).append(column)
+    groups = {key: sorted(pair, key=lambda c: -direction(c.name)[0])[:2] for key, pair in groups.items()}
+    from_zero = any(number_in(column.name) == 0 for column in columns)
+    for pair in groups.values():
+        number = number_in(pair[0].name)
+        joint = joint_of(pair[0].name, joints) or (None if number is None else number + from_zero)
+        if joint and joint <= len(joints):
+            named.setdefault(joint, pair)
+    if named and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
-    if columns and not groups:  # a column without a joint, beside others with one, is something else
+    if columns and not named:  # a column without a joint, beside others with one, is something else
         names = ", ".join(column.name for column in columns)
         reasons.append(f"the joints of {names} are given by their order: check them")
-        groups = dict(enumerate(pairs[: len(joints)], 1))
-    return {joint: sorted(pair, key=lambda c: -direction(c.name)[0]) for joint, pair in groups.items()}
-
-
-def _are_pair(columns: Sequence[_Column]) -> bool:
-    """Return whether two columns are the directions of one command."""
-    if len(columns) != 2 or any(column.kind != "command" for column in columns):
-        return False
-    (one, mine), (two, other) = (direction(column.name) for column in columns)
-    return one * two == -1 and mine == other
+        named = dict(enumerate([*groups.values()][: len(joints)], 1))
+    return named
 
 
 def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:

@@ -86,29 +86,25 @@ def check_log(
     try:
         signals = map_signals(settings, ranges)
         table = open_table(path, settings)
-        joints = str(len(ranges))
         for joint in sorted({*outputs, *settings.joints}):
             if joint > len(ranges):
+                joints = str(len(ranges))
                 findings.append(log_finding("error", "no such joint", source, [joint], joints=joints))
             elif joint in outputs and ("angle", joint) not in {(s.kind, s.joint) for s in signals}:
                 findings.append(log_finding("error", "no output angle", source, [joint]))
         if not angles_required:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        signals, faults = match_signals(table, signals, {*outputs, *settings.joints})
-        findings += faults
+        signals = match_signals(table, signals, {*outputs, *settings.joints}, findings)
         if signals and signals[0].kind == "time":
-            recording, repairs = _in_si(table.read(signals)), list[LogFinding]()
-            recording, joined = unwrap(recording)
+            recording = unwrap(_in_si(table.read(signals)), findings)
             remarks = (*table.remarks, *recording.remarks)
+            findings += [log_finding("note", "layout", source, what=remark) for remark in remarks]
             if repair:
-                recording, repairs = fill(recording, settings.repair_s)
-            findings += joined + [log_finding("note", "layout", source, what=what) for what in remarks]
-            findings += repairs + check_recording(recording, settings, repaired=repair)
+                recording = fill(recording, settings.repair_s, findings)
+            findings += check_recording(recording, settings, repaired=repair)
             if all(finding.level != "error" for finding in findings):
-                log, more = _to_log(recording, settings, len(ranges))
-                findings += more
-                stated = {"unit of command", "unit of angle"} & {finding.kind for finding in findings}
-                findings += contradictions(log, settings, outputs, units_stated=bool(stated))
+                log = _to_log(recording, settings, len(ranges), findings)
+                findings += contradictions(log, settings, outputs, {finding.kind for finding in findings})
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
@@ -125,22 +121,24 @@ def _in_si(recording: Recording) -> Recording:
     return replace(recording, values=values)
 
 
-def _to_log(recording: Recording, settings: LogSettings, joints: int) -> tuple[Log, list[LogFinding]]:
-    """Bring a recording without faults to its period; also returns what is worth knowing about that."""
-    cells, period = np.full((len(recording.time), joints, 5), np.nan), settings.period_s
-    for signal, column in zip(recording.signals[1:], recording.values.T[1:], strict=True):
-        first = {"command": 0, "angle": 2}.get(signal.kind, 3)
-        cells[:, signal.joint - 1, first + signal.part] = column
-    command = np.nan_to_num(cells[..., :2])
-    command = (0.0 + command[..., 0] - command[..., 1]).clip(-100, 100)
-    measured = cells[..., 2:].reshape(len(cells), -1)
-    time, command, measured = resample(recording.time, command, measured, period, settings.delay_s)
-    measured, kinds = measured.reshape(-1, joints, 3), {signal.kind for signal in recording.signals}
+def _to_log(recording: Recording, settings: LogSettings, joints: int, findings: list[LogFinding]) -> Log:
+    """Bring a recording without faults to its period, and add what is worth knowing about that."""
+    rows, period, kinds = len(recording.time), settings.period_s, {s.kind for s in recording.signals}
+    command, measured = np.zeros((rows, joints)), np.full((rows, joints, 3), np.nan)
+    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
+        if signal.kind == "command":
+            command[:, signal.joint - 1] += -values if signal.part else values
+        else:
+            measured[:, signal.joint - 1, (signal.kind == "pressure") + signal.part] = values
+    grid, command, measured = resample(
+        recording.time, command.clip(-100, 100), measured.reshape(rows, -1), period, settings.delay_s
+    )
+    measured = measured.reshape(-1, joints, 3)
     pressure = measured[..., 1:] if "pressure" in kinds else None
-    log = Log(recording.table.source, time, command, measured[..., 0], period, pressure)
-    findings, step = list[LogFinding](), sample_period(recording.time)
+    log = Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
+    step = sample_period(recording.time)
     if abs(step - period) > 0.01 * period or not is_on_grid(recording.time, period):
         findings.append(recording.finding("note", "resampled", step=step, period=period))
     if "command" in kinds and not log.driven.any():
         findings.append(recording.finding("warning", "undriven"))
-    return log, findings
+    return log

@@ -23,9 +23,9 @@ def sample_period(time: Floats) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
 
 
-def unwrap(recording: Recording) -> tuple[Recording, list[LogFinding]]:
+def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
     """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
-    values, notes, turn = recording.values.copy(), list[LogFinding](), 2 * np.pi
+    values, turn = recording.values.copy(), 2 * np.pi
     for column, signal in enumerate(recording.signals):
         if signal.kind == "angle" and not np.isfinite(signal.high):
             rows = np.flatnonzero(~np.isnan(values[:, column]))
@@ -33,11 +33,11 @@ def unwrap(recording: Recording) -> tuple[Recording, list[LogFinding]]:
             wraps = np.abs(np.abs(steps) - turn) < np.pi / 4  # the motion within one sample
             if wraps.any():
                 values[rows[1:], column] -= turn * np.cumsum(np.sign(steps) * wraps)
-                notes.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
-    return replace(recording, values=values), notes
+                findings.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
+    return replace(recording, values=values)
 
 
-def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFinding]]:
+def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Recording:
     """Interpolate angles and hold commands in holes of at most `longest` [s] besides the usual step.
 
     Rows without a time are dropped. Samples that were never recorded are counted: `resample` bridges them.
@@ -63,12 +63,12 @@ def fill(recording: Recording, longest: float) -> tuple[Recording, list[LogFindi
     steps = np.diff(time, append=time[-1:])
     short = (steps > GAP * period) & (steps <= reach)
     mended = [*recording.lines[filled.any(axis=1) | short], *lost]
-    recording = replace(recording, values=values)
-    if not mended:
-        return recording, []
-    added, first = np.rint(steps[short] / period - 1).sum(), replace(recording, lines=np.array([min(mended)]))
-    count = {"cells": float(filled.sum()), "samples": float(added), "lost": float(len(lost))}
-    return recording, [first.finding("warning", "repair", [0], None, None, **count)]
+    if mended:
+        first = replace(recording, lines=np.array([min(mended)]))
+        added = np.rint(steps[short] / period - 1).sum()
+        count = {"cells": float(filled.sum()), "samples": float(added), "lost": float(len(lost))}
+        findings.append(first.finding("warning", "repair", [0], None, None, **count))
+    return replace(recording, values=values)
 
 
 def resample(

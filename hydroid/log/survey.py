@@ -14,9 +14,9 @@ from hydroid.settings.log import Kind, LogSettings
 
 
 def contradictions(
-    log: Log, settings: LogSettings, outputs: Collection[int], *, units_stated: bool
+    log: Log, settings: LogSettings, outputs: Collection[int], said: Collection[str]
 ) -> list[LogFinding]:
-    """Return what the motion says against the settings, but for units if the file states others."""
+    """Return what the motion says against the settings, but for commands' range if the file `said` a unit."""
     motions, findings = driven_joints(log), list[LogFinding]()
 
     def add(level: Level, kind: str, of: Kind, joints: Sequence[int], **numbers: float | str) -> None:
@@ -35,12 +35,8 @@ def contradictions(
     for joint, motion in motions.items():
         columns, likely = settings.columns("command", joint), likely_range(log.command[:, joint - 1])
         likely = common if small else likely
-        if (
-            columns
-            and likely
-            and (small or (likely.offset and len(columns.column) == 1))
-            and not units_stated
-        ):
+        fits = likely and columns and (small or (likely.offset and len(columns.column) == 1))
+        if likely and columns and fits and "unit of command" not in said:
             numbers = likely.remedy(columns.scale, columns.offset)
             add("warning", "range", "command", [joint], **numbers)
         if motion.turned:

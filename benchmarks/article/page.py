@@ -101,14 +101,12 @@ def whole(text: str) -> str:
 def provenance(about: dict[str, Any], results: Path) -> str:
     """Return with what the runs were made, and how long it took."""
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
-    code = ", ".join(f"{count} by {name}" for name, count in about["code"].items())
     note = results / "note.txt"
     return f"""
 ## How the runs were made
 
 - {about["runs"]} runs; studies share the runs that they have in common.
 - Machine: {about["machine"]}; {versions}.
-- Code of hydroid, as each run recorded it: {code}.
 - Time: {about["seconds"] / 60:,.0f} minutes of one core, each run counted with the median time
   of its cell; two cores take half of it. The clock also counts what else the machine did.
 """ + (f"\n{note.read_text(encoding='utf-8').strip()}\n" if note.is_file() else "")

@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 import platform
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
@@ -63,14 +62,13 @@ def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
     distinct = {task.key(): (task.cell, result) for task, result in pairs}
     seconds = dict[str, list[float]]()
     for cell, result in distinct.values():
-        seconds.setdefault(cell, []).append(result.get("seconds", 0.0))
+        seconds.setdefault(cell, []).append(result.get("measures", {}).get("seconds", 0.0))
     return {
         "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "quick": quick,
         "runs": len(distinct),
         "seconds": round(sum(float(np.median(times)) * len(times) for times in seconds.values())),
-        "code": Counter(str(result.get("code", "not recorded")) for _, result in distinct.values()),
         "facts": {runs.plan.name: facts(runs) for runs in studies},
         "findings": {runs.plan.name: [asdict(v) for v in statements(runs)] for runs in studies},
     }

@@ -8,23 +8,17 @@ import logging
 import multiprocessing
 import os
 import signal
-import subprocess
 import threading
 from collections.abc import Generator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 
-from hydroid.assets import assets
 from hydroid.errors import HydroidError, RunError
 from hydroid.files import write_atomic
 from hydroid.progress import NOTE, Progress
 from hydroid.studies.runs import Result, Task, perform
-
-RUNS = "runs"
-"""folder of the runs' files, which several studies may share"""
 
 _log = logging.getLogger(__name__)
 
@@ -37,10 +31,10 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     Raises:
         RunError: a file cannot be written or is damaged, or a process of the executor died.
     """
-    files = [folder / RUNS / f"{task.key()}.json" for task in tasks]
-    missing = {file: task for file, task in zip(files, tasks, strict=True) if not file.is_file()}
-    results = {file: read_result(file) for file in files if file not in missing}
-    known, total, code = len(results), len(results) + len(missing), code_version()
+    files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
+    results = {file: _read(file) for file in files if file.is_file()}
+    missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
+    known, total = len(results), len(results) + len(missing)
     if known and missing:
         _log.log(NOTE, "%d of %d runs found, goes on", known, total)
     progress("runs", known, total)
@@ -48,8 +42,7 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     try:
         for done, future in enumerate(as_completed(futures), known + 1):
             file = futures.pop(future)
-            result, lasting = _outcome(future, missing[file])
-            results[file] = result | {"code": code}
+            results[file], lasting = _outcome(future, missing[file])
             if lasting:
                 write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
             progress("runs", done, total)
@@ -74,21 +67,15 @@ def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
     return {"failed": words}, lasting
 
 
-def read_result(file: Path) -> Result:
-    """Read a run's file.
-
-    Raises:
-        RunError: it cannot be read, or is damaged.
-    """
+def _read(file: Path) -> Result:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RunError(
-            f"cannot be read ({error})", where=str(file), hint="remove it: the run is repeated"
-        ) from None
-    if not isinstance(content, dict) or not {"theta", "failed"} & set(content):
-        raise RunError("is no result of a run", where=str(file), hint="remove it: the run is repeated")
-    return content
+        if content.keys() & {"theta", "failed"}:
+            return content
+        what = "is no result of a run"
+    except (OSError, ValueError, AttributeError) as error:
+        what = f"cannot be read ({error})"
+    raise RunError(what, where=str(file), hint="remove it: the run is repeated")
 
 
 @contextmanager
@@ -117,16 +104,3 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def code_version() -> str:
-    """Return hydroid's version, with the commit where it runs from a checkout that has one."""
-    own, folder = version("hydroid"), assets()
-    if not (folder / ".git").exists():
-        return own
-    try:
-        command = ["git", "-C", str(folder), "describe", "--always", "--dirty=, changed"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return own
-    return f"{own} ({done.stdout.strip()})"

@@ -27,8 +27,6 @@ from hydroid.settings.fit import FitSettings
 Result = dict[str, Any]
 """what `perform` returns, or {"failed": why}"""
 
-VERSIONS = ("hydroid", "mujoco", "numpy")
-
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -44,7 +42,7 @@ class Task:
         """Return the digest of all that decides the run's result."""
         checks = [(name, deciding(settings), samples_hash(log)) for name, settings, log in self.checks]
         content = {
-            "versions": {name: version(name) for name in VERSIONS},
+            "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy")},
             "settings": deciding(self.settings),
             "model": model_hash(self.settings.arm),
             "logs": [samples_hash(log) for log in self.logs],
@@ -56,8 +54,9 @@ class Task:
 def perform(task: Task) -> Result:
     """Fit, and return what a study needs of the run, as plain values.
 
-    Angles are in degrees. `history` has generation, simulations and best objective; `segment_bests` are the
-    parameters of the best candidate of each segment, as `theta` are those of the estimate.
+    `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
+    objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
+    of the estimate; `checks` are mean absolute errors [deg].
 
     Raises:
         RunError: every candidate diverged.
@@ -74,18 +73,21 @@ def perform(task: Task) -> Result:
     bests = front[segment_best(evaluation.segments)]
     unit = 1.0 if task.settings.objective.relative else 180 / math.pi
     refined = sum(r.evaluations for r in result.refinements.values())
-    return {
-        "theta": problem.parameters.mapping(result.best.theta),
-        "segment_bests": [problem.parameters.mapping(theta) for theta in bests],
+    measures = {
         "objective": unit * result.best.overall,
-        "largest_deg": float(np.abs(angles).max()),
-        "rms_deg": float(np.sqrt(np.mean(angles**2))),
-        "mean_deg": float(np.abs(angles).mean()),
-        "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
+        "largest error": float(np.abs(angles).max()),
+        "mean absolute error": float(np.abs(angles).mean()),
+        "rms error": float(np.sqrt(np.mean(angles**2))),
         "simulations": int(result.history[-1, 2]) + refined,
         "diverged": int(result.history[-1, 3]),
-        "checks": {name: _check_error(s, log, result.best.theta) for name, s, log in task.checks},
         "seconds": round(sum(result.seconds.values()), 3),
+    }
+    return {
+        "measures": measures,
+        "theta": problem.parameters.mapping(result.best.theta),
+        "segment_bests": [problem.parameters.mapping(theta) for theta in bests],
+        "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
+        "checks": {name: _check_error(s, log, result.best.theta) for name, s, log in task.checks},
     }
 
 

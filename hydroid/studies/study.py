@@ -89,17 +89,7 @@ def measured(task: Task, result: Result) -> Row:
     """Return the measures of one run (docs/studies.md)."""
     if "failed" in result:
         return Row(task.cell, task.seed, {}, str(result["failed"]))
-    theta: dict[str, float] = result["theta"]
-    values = {
-        "objective": result["objective"],
-        "largest error": result["largest_deg"],
-        "mean absolute error": result["mean_deg"],
-        "rms error": result["rms_deg"],
-        "simulations": result["simulations"],
-        "diverged": result["diverged"],
-        "seconds": result["seconds"],
-    }
-    values |= {f"value {name}": value for name, value in theta.items()}
+    values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
     values |= {f"check {n}": math.nan if v is None else v for n, v in result["checks"].items()}
     return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
 

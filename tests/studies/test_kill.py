@@ -20,9 +20,9 @@ def content(out: Path) -> dict[str, object]:
     found: dict[str, object] = {}
     for file in sorted((out / "runs").iterdir()):
         found[file.name] = json.loads(file.read_text())
-        found[file.name].pop("seconds")
-    tables = {file.name: file.read_text() for file in (out / "tables").iterdir()}
-    return found | tables
+        found[file.name]["measures"].pop("seconds")
+    table = (out / "tables" / "cells.csv").read_text()  # runs.csv has the seconds too
+    return found | {"cells.csv": table}
 
 
 def children(process: "subprocess.Popen[str]") -> list[int]:

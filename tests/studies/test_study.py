@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ def stored(folder: Path) -> dict[str, dict[str, Any]]:
     """Results by file, without the time that they took."""
     found = {file.name: json.loads(file.read_text()) for file in sorted((folder / "runs").glob("*.json"))}
     for result in found.values():
-        result.pop("seconds", None)
+        result.get("measures", {}).pop("seconds", None)
     return found
 
 
@@ -30,7 +29,6 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
     file = written(tmp_path)
     first, before = run(file, tmp_path), stored(tmp_path)
     assert len(first.rows) == len(before) == 4
-    assert all(result["code"].startswith(version("hydroid")) for result in before.values())
     assert "found" not in caplog.text
     next((tmp_path / "runs").glob("*.json")).unlink()
     performed: list[tuple[str, int]] = []

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hydroid.settings.fit import FitSettings
 
 NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
-LINE_EVERY = 10.0
+LINE_EVERY = 30.0
 """seconds between plain lines"""
 DEGREES = 57.29577951308232
 NAMES = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
@@ -106,8 +106,9 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings", label: str) -> None:
         search = settings.search
-        super().__init__(f"{label} {NAMES.get(search.name, search.name)}".strip())
-        self._step = "start" if search.algorithm == "multistart" else "population"
+        super().__init__(label)
+        what = "start" if search.algorithm == "multistart" else "population"
+        self._step = f"{NAMES.get(search.name, search.name)} {what}"
         self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (DEGREES, " deg")
         self._began, self._before = time.monotonic(), -1.0

@@ -50,6 +50,5 @@ def pareto(objectives: Array, estimates: Mapping[str, Array], objective: Objecti
         marks.append(Mark("line", at, one, color=color, label=name, width=2))
         marks.append(Mark("points", at, one, color=color, width=6))
     limits, log = value_axis(np.concatenate([mark.y for mark in marks]))
-    title, ends = "Error in each segment, one line per candidate", (0.7, len(at) + 0.3)
-    label = norm_label(objective)
-    return Chart((Panel("segment", label, tuple(marks), title, 300, ends, limits, log_y=log),))
+    title, label = "Error in each segment, one line per candidate", norm_label(objective)
+    return Chart((Panel("segment", label, tuple(marks), title, 300, None, limits, log),))

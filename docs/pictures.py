@@ -28,7 +28,7 @@ SHOTS = {
     "report": ("hyd", "", (1000, 1240), "light"),
     "report_phone": ("hyd", "", (400, 1000), "dark"),
     "report_parameters": ("hyd", "Parameters", (1000, 610), "light"),
-    "report_actuator": ("hyd", "The actuator", (1000, 1290), "light"),
+    "report_actuator": ("hyd", "The actuator", (1000, 970), "light"),
     "report_motion": ("nsga2", "The arm in motion", (1000, 600), "light"),
 }
 """run, title of the section (the page's beginning without one), width and height [px], and look"""

@@ -122,7 +122,7 @@ def draw(actuator: JointActuator) -> Chart:
         arm = linkage.moment_arm(np.radians(angle))
 
     def force(p: Any) -> Mapping[str, Array]:
-        currents = {"rated current": p.rated_current, "largest current": p.current_max}
+        currents = {"rated current": p.rated_current, "smallest current": p.current_min}
         forces = {name: coil_force(p.coil * i**2, stroke, p.gap) for name, i in currents.items()}
         return forces | {"spring": p.plunger_stiffness * stroke}
 

@@ -1,7 +1,8 @@
 """The verdict on a fit, joint by joint: what it predicts, beside what anybody would try first.
 
 Errors are rms over the logs that drive the joint. The tolerance is `tolerance_deg` of the settings, or 2 % of
-the joint's travel in the unseen logs. The first of these that is true is the verdict:
+the joint's travel in the unseen logs. A baseline is as good on these unless the fit's error is below 90 % of
+its. The first of these that is true is the verdict:
 
 1. does not fit: on the fitted logs the error is outside the tolerance, and a baseline is as good; where there
    are unseen logs, one must be as good there too;
@@ -27,6 +28,8 @@ from hydroid.settings.fit import FitSettings
 
 SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
+CLEARLY = 0.9
+"""part of a baseline's error on unseen logs that a better fit stays below"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit does not predict"""
 HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
@@ -103,7 +106,7 @@ def _word(
 ) -> str:
     """Return the verdict from errors [deg] on the fitted and on the unseen logs, and the baselines' there."""
     (fitted, unseen), (there, here) = errors, rivals
-    as_good = [] if unseen is None else [name for name, error in here.items() if not unseen < error]
+    as_good = [] if unseen is None else [name for name, e in here.items() if not unseen < CLEARLY * e]
     misfit = fitted is not None and not fitted <= tolerance and not fitted < min(there.values())
     if misfit and (unseen is None or as_good):
         return "does not fit"

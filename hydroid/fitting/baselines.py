@@ -55,7 +55,8 @@ class Baseline:
             dead, exponent, speed = np.array([self.dead_band, self.exponent, self.speed])[:, side]
             beyond = (np.abs(command) - dead) / (100.0 - dead)
             target = speed * np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
-        return _follow(target, side, self.delay, self.lag, log.period, log.start[self.joint - 1], self.limits)
+        late, lag = self.delay / log.period, (self.lag[0] / log.period, self.lag[1] / log.period)
+        return _follow(target * log.period, side, late, lag, log.start[self.joint - 1], self.limits)
 
     def rms(self, logs: Sequence[Log]) -> float:
         """Return the rms error over the samples of all logs [rad]."""
@@ -72,23 +73,20 @@ def _follow(
     side: NDArray[np.int64],
     delay: float,
     lag: tuple[float, float],
-    period: float,
     start: float,
     limits: Floats,
 ) -> Floats:
-    """Angles of a joint whose speed follows `target` after a delay, of parts of a sample too, and a lag."""
-    whole = int(delay / period)
-    part = delay / period - whole
-    left = [np.exp(-period / time) if time > 1e-6 else 0.0 for time in lag]
+    """Angles of a joint whose speed follows `target` [rad/sample] after a delay and a lag [samples]."""
+    whole, part = int(delay), delay - int(delay)
+    left = [np.exp(-1.0 / time) if time > 1e-6 else 0.0 for time in lag]
     angle, speed, angles = start, 0.0, np.empty(len(target))
     for k in range(len(target)):
         angles[k] = angle
         late, later = k - whole, k - whole - 1
-        wanted = ((1 - part) * target[late] if late >= 0 else 0.0) + (
-            part * target[later] if later >= 0 else 0.0
-        )
+        wanted = (1 - part) * target[late] if late >= 0 else 0.0
+        wanted += part * target[later] if later >= 0 else 0.0
         way = side[max(late, 0)]
-        angle += wanted * period + (speed - wanted) * lag[way] * (1 - left[way])
+        angle += wanted + (speed - wanted) * lag[way] * (1 - left[way])
         speed = wanted + (speed - wanted) * left[way]
         if angle < limits[0] or angle > limits[1]:
             angle, speed = min(max(angle, limits[0]), limits[1]), 0.0

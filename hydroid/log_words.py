@@ -87,7 +87,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     ),
     "resampled": (
         "resampled from steps of {step:.6g} s to {period:g} s",
-        "commands held, angles interpolated",
+        "angles interpolated, commands held, or averaged where the log is faster",
     ),
     # its units
     "unit of time": (f"{UNIT}time.unit says otherwise", "set log.time.unit: {unit}"),
@@ -141,5 +141,4 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
         "no command [%] of {gaps}: nothing is known about the valve curve there",
         "add logs with such commands, or keep the parameters of the curve fixed",
     ),
-    "one direction": ("never commanded: {names}", "parameters of that direction stay unknown"),
 }

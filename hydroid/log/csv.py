@@ -41,27 +41,28 @@ class CsvTable(Table):
 
     def read(self, signals: Sequence[Signal]) -> Recording:
         """Read columns, as `Table` says."""
-        names = [signal.name for signal in signals]
-        wanted, width = [self.names.index(name) for name in names], len(self.names)
+        names, width = [signal.name for signal in signals], len(self.names)
         lines, remark = [self.lines[k] for k in self.below], f"read as {self.layout}"
         if self.separator != "," and any("," in line for line in lines):
             lines, remark = [line.replace(",", ".") for line in lines], f"{remark}, with decimal commas"
-        values, ragged = np.full((len(lines), len(wanted)), np.nan), np.zeros(len(lines), bool)
-        for row, line in enumerate(lines):
+        wanted = [self.names.index(name) for name in names]
+        rows, ragged = list[list[str]](), np.zeros(len(lines), bool)
+        for k, line in enumerate(lines):
             cells = split(line, self.separator)
-            if len(cells) < width or any(cells[width:]):
-                ragged[row] = True
-            else:
-                values[row] = [number(cells[c]) for c in wanted]
+            ragged[k] = len(cells) < width or any(cells[width:])
+            rows.append([""] * len(wanted) if ragged[k] else [cells[c] for c in wanted])
         remarks, clocks = [remark] if remark != "read as CSV in UTF-8 separated by commas" else [], set[str]()
+        values = np.full((len(rows), len(names)), np.nan)
         for column, name in enumerate(names):
-            texts = [self.text(k + 1, name) for k in self.below] if np.isnan(values[:1, column]).any() else ()
-            if clock(next(filter(None, texts), "")) is not None:
+            texts = [row[column] for row in rows]
+            if clock(next(filter(None, texts), "")) is None:
+                values[:, column] = [number(text) for text in texts]
+            else:
+                values[:, column] = seconds(texts)
                 clocks.add(name)
-                values[:, column] = np.where(ragged, np.nan, seconds(texts))
                 remarks.append(f"{name} holds times of day, taken as seconds from the first")
-        rows = np.array(self.below, np.int64) + 1
-        return Recording(self, tuple(signals), values, rows, ragged, frozenset(clocks), tuple(remarks))
+        at = np.array(self.below, np.int64) + 1
+        return Recording(self, tuple(signals), values, at, ragged, frozenset(clocks), tuple(remarks))
 
 
 def open_csv(path: Path) -> CsvTable:

@@ -71,10 +71,16 @@ class JointMotion:
 
     @cached_property
     def likely_lag(self) -> float:
-        """Of the motion behind its command [s], at least 0: a first guess, however little the log tells."""
-        lags, residual, _ = self._regressed
-        possible = lags >= 0
-        return float(lags[possible][residual[possible].argmin()])
+        """At which its speed correlates best with its command [s], at least 0.
+
+        Unlike `lag` this answers always, also in a log of one movement: good enough for a first guess.
+        """
+        command, speed = self._logged, self._quick[2]
+        lags = range(min(round(0.8 / self.log.period), len(speed) // 2))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pairs = ((command[: len(command) - late], speed[late:]) for late in lags)
+            correlation = np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
+        return int(np.argmax(correlation)) * self.log.period
 
     @cached_property
     def lag(self) -> float | None:

@@ -71,7 +71,7 @@ def motion_findings(log: Log) -> list[LogFinding]:
 
 def survey(logs: Sequence[Log]) -> list[LogFinding]:
     """Report what all logs together lack or contradict: directions, and commands that none of them has."""
-    findings, gaps, missing = list[LogFinding](), list[str](), list[str]()
+    findings, gaps = list[LogFinding](), list[str]()
     motions = [driven_joints(log) for log in logs]
     for joint in sorted({joint for of_log in motions for joint in of_log}):
         own = [of_log[joint] for of_log in motions if joint in of_log]
@@ -84,17 +84,13 @@ def survey(logs: Sequence[Log]) -> list[LogFinding]:
             )
         held = _held_levels([motion.log for motion in own], joint)
         open_ = [f"between {a} and {b}" for a, b in pairwise(held) if b - a >= 20 and a * b > 0]
-        open_ += [f"above {high}" for high in held[-1:] if 0 < high < 80]
-        open_ += [f"below {low}" for low in held[:1] if -80 < low < 0]
+        open_ += [f"above {max(high, 0)}" for high in held[-1:] if high < 80]
+        open_ += [f"below {min(low, 0)}" for low in held[:1] if low > -80]
         gaps += [f"joint {joint} {', '.join(open_)}"] if open_ else []
-        missing += [f"joint {joint} positive"] if held and held[-1] < 0 else []
-        missing += [f"joint {joint} negative"] if held and held[0] > 0 else []
     source = logs[0].source if len(logs) == 1 else f"{len(logs)} logs"
     if gaps:
         more = f"; and of {len(gaps) - 3} more joints" if len(gaps) > 3 else ""
         findings.append(log_finding("note", "open valve curve", source, gaps="; ".join(gaps[:3]) + more))
-    if missing:
-        findings.append(log_finding("note", "one direction", source, missing))
     return findings
 
 

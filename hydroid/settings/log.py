@@ -11,7 +11,7 @@ log:
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
 from hydroid.settings.load import JointNumber, Settings
 from hydroid.units import UNITS
@@ -138,6 +138,8 @@ class LogSettings(Settings):
     """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops. Up to
     2 % of the range they are used with a warning"""
 
+    _prefix: str = PrivateAttr("")
+
     def columns(self, kind: Kind, joint: int) -> ColumnMap | None:
         """Return the columns of a joint (number, from 1), its number in their names; None: not in the log."""
         common: Columns | None = getattr(self, kind)
@@ -145,24 +147,14 @@ class LogSettings(Settings):
         if own is None or (common is None and not _given(own)):
             return None
         given: dict[str, Any] = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
-        names = tuple(name.replace(JOINT, str(joint)) for name in given["column"])
+        names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given["column"])
         return ColumnMap(names, given["unit"], given["scale"], given["offset"])
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own; the time's is common."""
-
-        def named(columns: Columns | None, default: tuple[str, ...] = ()) -> Columns | None:
-            names = columns and (columns.column or default)
-            return columns and columns.model_copy(
-                update={"column": tuple(f"{side}_{name}" for name in names or ()) or None}
-            )
-
-        common = {kind: named(getattr(self, kind), default.column) for kind, default in DEFAULTS.items()}
-        joints = {
-            joint: own and own.model_copy(update={kind: named(getattr(own, kind)) for kind in DEFAULTS})
-            for joint, own in self.joints.items()
-        }
-        return self.model_copy(update=common | {"joints": joints})
+        copy = self.model_copy()
+        copy._prefix = f"{side}_"
+        return copy
 
     def angles_only(self) -> "LogSettings":
         """Return the columns of a trajectory: whatever commands and pressures it holds are not read."""

@@ -28,26 +28,12 @@ def write_mat73(path: Path, columns: Columns) -> Path:
 
 
 def matlab(group, name: str, value) -> None:
-    """Put an array, a text, a struct (dict) or a struct array (list of dicts) into a v7.3 file."""
-    import h5py
-
+    """Put an array or a struct (dict) into a v7.3 file."""
     if isinstance(value, dict):
         inner = group.create_group(name)
         inner.attrs["MATLAB_class"] = np.bytes_("struct")
         for field, part in value.items():
             matlab(inner, field, part)
-    elif isinstance(value, list):
-        inner, hidden = group.create_group(name), group.file.require_group("#refs#")
-        inner.attrs["MATLAB_class"] = np.bytes_("struct")
-        for field in value[0]:
-            keys = [f"{name}{field}{k}" for k in range(len(value))]
-            for key, part in zip(keys, value, strict=True):
-                matlab(hidden, key, part[field])
-            links = np.array([[hidden[key].ref] for key in keys], dtype=h5py.ref_dtype)
-            inner.create_dataset(field, data=links)
-    elif isinstance(value, str):
-        data = group.create_dataset(name, data=np.array([[ord(c)] for c in value], np.uint16))
-        data.attrs["MATLAB_class"] = np.bytes_("char")
     else:
         data = group.create_dataset(name, data=np.asarray(value).T)
         data.attrs["MATLAB_class"] = np.bytes_("double")

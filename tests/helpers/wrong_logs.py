@@ -192,7 +192,7 @@ WRONG = (
     ),
     Wrong(
         "commands in one direction only",
-        "note: never commanded: joint 2 negative",
+        "note: no command [%] of joint 2 above 50, below 0",
         lambda: [boom([30, 40, 50])],
     ),
     Wrong(

@@ -65,6 +65,16 @@ def test_structs_of_matlab(kind: str, tmp_path: Path) -> None:
         same(log, tmp_path)
 
 
+def test_elements_of_cells_count_from_one(tmp_path: Path) -> None:
+    """As in Simulink's structure with time, of two signals."""
+    from scipy.io import savemat
+
+    savemat(tmp_path / "log.mat", {"log": {"time": T[:, None], "signals": [{"values": U}, {"values": Q}]}})
+    columns = ("log.signals[1].values[{joint}]", "log.signals[2].values[{joint}]")
+    log, _ = read(tmp_path / "log.mat", settings("log.time", *columns))
+    same(log, tmp_path)
+
+
 def test_timestamps_in_parquet(tmp_path: Path) -> None:
     import pyarrow
 

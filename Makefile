@@ -41,7 +41,7 @@ article: setup  ## the article's tables and figures over ten seeds (docs/reprodu
 	$(BIN)/python benchmarks/article/run.py $(ARGS)
 
 B ?= structure
-bench: setup  ## one benchmark: make bench B=interval_coverage ARGS="--logs 20"; docs/measured.md lists them
+bench: setup  ## one benchmark: make bench B=coverage ARGS="--parts own_arm"; docs/measured.md lists them
 	$(BIN)/python benchmarks/$(B).py $(ARGS)
 
 docs: setup  ## the reference of all settings, and the documentation as pages: build/docs/index.html

@@ -1,4 +1,4 @@
-"""What the benchmarks share: options, tables, a clock, simulated logs of known truth, refits, coverage."""
+"""What the benchmarks share: options, tables, a clock, simulated logs of known truth, refits."""
 
 import argparse
 import time
@@ -99,18 +99,6 @@ def refined(
     """Refine an estimate, by default as the settings say; return where it ended, shape (P,), and how."""
     result = refine(problem, start, how or problem.settings.refinement or RefinementSettings())
     return problem.parameters.from_unit(result.point), result
-
-
-class Coverage:
-    """What fits say of values that are known, shape (P,): a row of each array for every fit."""
-
-    def __init__(self, truth: np.ndarray, fits: Iterable[tuple[np.ndarray, ...]]) -> None:
-        """Take values, standard deviations, and intervals, shape (P, 2), of every fit."""
-        self.truth = truth
-        self.values, self.sds, self.intervals = map(np.array, zip(*fits, strict=True))
-        low, high = np.moveaxis(self.intervals, 2, 0)
-        self.hits = (low <= truth) & (truth <= high)
-        self.spread = np.std(self.values, axis=0, ddof=1)
 
 
 def named(names: Sequence[str], chosen: np.ndarray) -> list[str]:

@@ -47,8 +47,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     "prior only": ("The logs add next to nothing to the prior{s} of {few}.", ""),
     "weakly identifiable": ("{few} {is} known to 30 to 100 % only.", ""),
     "effect unknown": ("The simulation diverges when {few} {is} changed: {its} effect is unknown.", ""),
-    "interval rough": ("The interval{s} of {few} {is} rough: {its} width may be off by {percent:.0f} %.", ""),
-    "common scale": ("{few} can be multiplied by one factor, and the motion stays the same.", ""),
     "combination": (
         "{few} cannot be told apart: certain changes of them together give nearly the same motion.",
         "",
@@ -57,15 +55,16 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     "quantities open": ("The logs do not determine these quantities: {few}.", ""),
     # advice: the statement says what to do, the hint what it would bring
     "nothing missing": (
-        "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error much.",
+        "Tested: {count} quantities that the fit holds. Freeing none of them would lower the error on data "
+        "left out.",
         "",
     ),
-    "terms may be missing": (
-        "Find what the model lacks: a quick test points at {few}.",
+    "look for terms": (
+        "Find what the model lacks, and what to measure next.",
         "`suggest` tries the most promising terms and prints the command for the best.",
     ),
     "term missing": (
-        "Free {0}: the rms error is predicted to fall from {rms}° to {freed}°.",
+        "Free {0}: the rms error on parts of the logs left out falls from {error}° to {freed}°.",
         "Keep it if the error on an unseen log falls too.",
     ),
     "more terms missing": (
@@ -74,10 +73,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     ),
     "weigh": ("Weigh {0} to ±{sd:.0f} %.", _BRINGS),
     "state": ("State {0} to ±{sd:.0f} %, from a data sheet or a measurement.", _BRINGS),
-    "measure joint": ("Compare the angle of joint {0} too.", _BRINGS),
-    "measure pressures": ("Log the chamber pressures and compare them.", _BRINGS),
-    "constant commands": ("Add a log of constant commands of {0} % in both directions.", _BRINGS),
-    "payload": ("Repeat the logs with {0} kg in the gripper.", _BRINGS),
     "experiment": ("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
     "fit the hydraulics": ("Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."),
     "predict unseen": ("Predict a log that this fit has not seen.", "Only such a log can test the model."),
@@ -91,11 +86,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
         "Fit again from there, with more iterations or another seed.",
     ),
-    "moved": ("A profile found a better optimum. It was refined, and all results are of it: {values}.", ""),
-    "profile bounded": (
-        "Within the profile of {profile}, {few} reached a bound, which limits its interval.",
-        "",
-    ),
     # a residual
     "residual depends": (
         "{0}: the measured angle is {error:.2g}° {side} than the simulated one where the {1} is {low} to "
@@ -105,10 +95,6 @@ WORDS: dict[str, tuple[str, str]] = LOG_WORDS | {
     "residual correlated": (
         "{0}: the error keeps its sign for {seconds:.2g} s.",
         "No sensor is that slow: the model errs.",
-    ),
-    "residual at stop": (
-        "{0}: the joint is at its stop for {seconds:.2g} s, with an error of {rms:.2g}°.",
-        "",
     ),
     "few logs disagree": (
         "The logs disagree about {few} by more than the noise explains.",

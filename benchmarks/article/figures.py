@@ -103,12 +103,10 @@ def _sensitivity(drawing: Drawing, runs: Runs, figure: Figure) -> None:
 
 def _surface(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     """The error over two parameters, all others at the truth."""
-    made, axes = runs.surface(figure), drawing.add_subplot(projection="3d")
-    error = np.where(np.isfinite(made.error), np.degrees(made.error), np.nan)
-    axes.plot_surface(
-        *np.meshgrid(*made.values, indexing="ij"), error, cmap="viridis_r", rstride=1, cstride=1
-    )
-    labels = [f"{p.name} [{p.unit}]" if p.unit else p.name for p in made.parameters]
+    (parameters, values, error), axes = runs.surface(figure), drawing.add_subplot(projection="3d")
+    error = np.where(np.isfinite(error), np.degrees(error), np.nan)
+    axes.plot_surface(*np.meshgrid(*values, indexing="ij"), error, cmap="viridis_r", rstride=1, cstride=1)
+    labels = [f"{p.name} [{p.unit}]" if p.unit else p.name for p in parameters]
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel="error [deg]")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hydroid.parameters import Array, relative_error
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.posterior.jacobian import jacobian
+from hydroid.posterior.linear import linearised
 from hydroid.problem.problem import Problem
 from hydroid.studies.runs import Result, Task
 from hydroid.studies.study import Row
@@ -52,9 +52,7 @@ class Directions:
 def true_directions(problem: Problem, truth: Mapping[str, float], noise_deg: float) -> Directions:
     """Return what the data determine at the truth, with white noise of that standard deviation."""
     theta, free = problem.parameters.vector(truth, "truth"), problem.parameters.free
-    axes, singular, _ = np.linalg.svd(
-        np.nan_to_num(jacobian(problem, theta).slopes[free]), full_matrices=False
-    )
+    axes, singular, _ = np.linalg.svd(linearised(problem, theta).slopes, full_matrices=False)
     with np.errstate(divide="ignore"):
         rank = int(np.sum(np.radians(noise_deg) / singular <= WEAK_ABOVE))  # the largest comes first
     names = tuple(n for n, f in zip(problem.parameters.names, free, strict=True) if f)

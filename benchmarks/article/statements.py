@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from studies import Figure, Runs
 
 from hydroid.parameters import Array
-from hydroid.posterior.jacobian import jacobian
+from hydroid.posterior.linear import linearised
 
 FOLLOWS = 0.05
 """rms error, as part of the record's range, up to which a response follows the data"""
@@ -21,7 +21,7 @@ def statements(runs: Runs) -> Iterator[Verdict]:
     """Yield the verdict on the statements of each figure that has some."""
     for figure in runs.plan.study.figures:
         for says, groups in figure.orders.items():
-            effects = np.degrees(jacobian(runs.problem, runs.theta).effects).tolist()
+            effects = np.degrees(linearised(runs.problem, runs.theta).sensitivity).tolist()
             by_name = dict(zip(runs.problem.parameters.names, effects, strict=True))
             yield Verdict(says, figure.item, *ranking(by_name, groups))
         if figure.says:
@@ -72,7 +72,7 @@ def judged(runs: Runs, figure: Figure) -> tuple[bool, str]:
             same = all(kinds.count(kind) == number for kind, number in figure.actuators.items())
             return same, f"{len(joints)} joints; {count} actuators"
         case "surface":
-            error = runs.surface(figure).error
+            error = runs.surface(figure)[2]
             count, shape = local_minima(error), " by ".join(map(str, error.shape))
             return count > 1, f"{count} local minim{'um' if count == 1 else 'a'} on a grid of {shape} points"
         case _:  # whether the responses follow the data

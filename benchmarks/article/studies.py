@@ -15,8 +15,7 @@ from hydroid import read_logs
 from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.errors import RunError
 from hydroid.log import Log
-from hydroid.parameters import Array
-from hydroid.posterior.sweep import Surface, surface
+from hydroid.parameters import Array, Parameter
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.progress import no_progress
@@ -175,11 +174,21 @@ class Runs:
         log = self.problem.logs[0]
         return log.time, np.degrees(log.angle[:, self.problem.outputs[0]])
 
-    def surface(self, figure: Figure) -> Surface:
-        """Return the error over the two parameters of a figure, all others at the truth."""
-        first, second = figure.parameters
-        points = QUICK_POINTS if self.plan.quick else POINTS
-        return surface(self.problem, self.theta, (first, second), points, None)
+    def surface(self, figure: Figure) -> tuple[list[Parameter], list[Array], Array]:
+        """Return the two parameters of a figure, their values, shapes (n,), and the error [rad], shape (n, n).
+
+        All other parameters are at the truth. Wide bounds have equal ratios between values.
+        """
+        at = [self.problem.parameters.names.index(name) for name in figure.parameters]
+        chosen = [self.problem.parameters.parameters[i] for i in at]
+        count = QUICK_POINTS if self.plan.quick else POINTS
+        values = [
+            (np.geomspace if p.lower > 0 and p.upper > 20 * p.lower else np.linspace)(p.lower, p.upper, count)
+            for p in chosen
+        ]
+        points = np.tile(self.theta, (count**2, 1))
+        points[:, at] = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, 2)
+        return chosen, values, self.problem.evaluate(points).overall.reshape(count, count)
 
     def of(self, cell: str) -> list[tuple[Row, Result]]:
         """Return the runs of a cell that did not fail."""

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hydroid.advice.commands import RandomExperiments
+from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.information import PRIOR_SD, ExperimentSimulator, Trial, forecast
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import uncertainty
-from hydroid.posterior.jacobian import estimate_box, prior_slopes, white_posterior
+from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.posterior import Posterior
+from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem

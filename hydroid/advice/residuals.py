@@ -1,130 +1,84 @@
-"""What the residual of a fit shows: its mean over angle, velocity and command, its correlation, the stops."""
+"""What the residual of a fit shows: where it depends on angle, velocity or command, and how long it lasts."""
 
+import math
 from dataclasses import dataclass
-from enum import StrEnum
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty
-from hydroid.problem.channels import Channel
+from hydroid.posterior.noise import fit_noise
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
-
-class Regressor(StrEnum):
-    """What a residual is shown against."""
-
-    ANGLE = "angle"
-    VELOCITY = "velocity"
-    COMMAND = "command"
+Regressor = Literal["angle", "velocity", "command"]
+UNITS: dict[Regressor, str] = {"angle": "deg", "velocity": "deg/s", "command": "%"}
 
 
-@dataclass(frozen=True, eq=False)
-class Binned:
-    """The residual in intervals of one regressor, [rad], [rad/s] or [%].
+@dataclass(frozen=True)
+class Dependence:
+    """Where a residual's mean [deg] differs most clearly from zero: from low to high of a regressor."""
 
-    edges: shape (B + 1,). mean, deviation: of the residual in each bin [rad], shape (B,); NaN where it has
-    few samples. error: standard deviation of the mean, for the residual's effective samples, shape (B,).
-    """
-
-    edges: Array
-    mean: Array
-    deviation: Array
-    error: Array
-
-    def clearest(self, rms: float) -> int | None:
-        """Return the bin whose mean differs most clearly from zero; None: none.
-
-        By three standard deviations, and by half the rms residual.
-        """
-        ratio = np.abs(self.mean) / np.maximum(self.error, np.finfo(float).tiny)
-        clear = (ratio >= 3.0) & (np.abs(self.mean) > 0.5 * rms)
-        return int(np.nanargmax(np.where(clear, ratio, -1.0))) if clear.any() else None
+    regressor: Regressor
+    low: float
+    high: float
+    mean: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ResidualCheck:
     """The residual of one angle of one log.
 
     Attributes:
         log: its index.
         joint: its number, from 1.
-        time: [s], shape (T,).
-        residual: measured less simulated angle [rad], shape (T,).
-        binned: over each regressor that varies.
-        autocorrelation: at lags of one sample, from 0, shape (L,).
-        correlation_s: time in which it falls to 1/e [s].
-        at_stop: samples at which the joint stands at its stop, shape (T,).
+        rms: [deg].
+        correlation_s: time in which its autocorrelation falls to 1/e [s].
+        depends: on which regressors it clearly depends, and where.
     """
 
     log: int
     joint: int
-    time: Array
-    residual: Array
-    binned: dict[Regressor, Binned]
-    autocorrelation: Array
+    rms: float
     correlation_s: float
-    at_stop: NDArray[np.bool_]
-
-    @property
-    def rms(self) -> float:
-        """Of the residual [rad]."""
-        return float(np.sqrt(np.mean(self.residual**2)))
-
-    @property
-    def stopped_s(self) -> float:
-        """Time that the joint stands at its stop [s]."""
-        return float(self.at_stop.sum() * np.median(np.diff(self.time)))
+    depends: tuple[Dependence, ...]
 
 
-def residual_checks(problem: Problem, uncertainty: Uncertainty) -> tuple[ResidualCheck, ...]:
+def residual_checks(problem: Problem, known: Uncertainty) -> tuple[ResidualCheck, ...]:
     """Check each compared angle, without simulations."""
-    return tuple(
-        _check(problem, channel, uncertainty.jacobian.residual[channel.rows] / channel.weight)
-        for channel in problem.channels
-        if channel.quantity == "angle"
-    )
+    checks: list[ResidualCheck] = []
+    for channel, noise in zip(problem.channels, known.noise, strict=True):
+        if channel.quantity != "angle":
+            continue
+        log, angle = problem.logs[channel.log], channel.measured
+        residual = np.degrees(known.linear.residual[channel.rows] / channel.weight)
+        window = min(2 * round(0.11 / log.period / 2) + 1, len(angle) - (len(angle) + 1) % 2)  # of 0.11 s
+        speed = savgol_filter(angle, window, min(2, window - 1), deriv=1, delta=log.period)
+        values = np.degrees(angle), np.degrees(speed), log.command[:, channel.joint - 1]
+        pairs = zip(UNITS, values, strict=True)
+        found = [_dependence(what, each, residual) for what, each in pairs if np.ptp(each) > 0]
+        rms, lasts = math.sqrt(np.mean(residual**2)), noise.correlation_time * log.period
+        depends = tuple(one for one in found if one is not None)
+        checks.append(ResidualCheck(channel.log, channel.joint, rms, lasts, depends))
+    return tuple(checks)
 
 
-def _check(problem: Problem, channel: Channel, residual: Array) -> ResidualCheck:
-    log, arm, joint = problem.logs[channel.log], problem.settings.arm, channel.joint - 1
-    angle = channel.measured
-    window = min(2 * round(0.11 / log.period / 2) + 1, len(angle) - (len(angle) + 1) % 2)  # of 0.11 s
-    velocity = np.asarray(savgol_filter(angle, window, min(2, window - 1), deriv=1, delta=log.period), float)
-    lags = min(round(5.0 / log.period), len(residual) - 1)  # up to 5 s
-    correlation = _autocorrelation(residual, lags)
-    below = np.flatnonzero(correlation < 1 / np.e)
-    time = float(below[0] if len(below) else lags) * log.period
-    regressors = zip(Regressor, (angle, velocity, log.command[:, joint]), strict=True)
-    binned = {what: _binned(values, residual, lags) for what, values in regressors if np.ptp(values) > 0}
-    near = float(np.deg2rad(0.5))
-    at_stop = (angle < arm.lower[joint] + near) | (angle > arm.upper[joint] - near)
-    return ResidualCheck(channel.log, channel.joint, log.time, residual, binned, correlation, time, at_stop)
+def _dependence(what: Regressor, values: Array, residual: Array) -> Dependence | None:
+    """The bin, of ten of equal width, whose mean differs most clearly from zero.
 
-
-def _binned(values: Array, residual: Array, lags: int) -> Binned:
-    """The residual in ten bins of equal width; one of fewer than 20 samples is left out."""
+    It does so by three standard deviations and half the rms residual, and has 20 samples or more.
+    """
     edges = np.linspace(values.min(), values.max(), 11)
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, 9)
     count = np.bincount(place, minlength=10)
-    least = np.maximum(count, 1)
-    mean = np.bincount(place, residual, 10) / least
-    rest = residual - mean[place]  # the noise is what the means leave
-    deviation = np.sqrt(np.bincount(place, rest**2, 10) / least)
-    # samples per independent one: the sum of the autocorrelation up to where it first vanishes
-    correlation = _autocorrelation(rest, lags)
-    ends = np.flatnonzero(correlation <= 0)
-    alike = 2 * float(correlation[: ends[0] if len(ends) else None].sum()) - 1
-    error = rest.std() / np.sqrt(np.maximum(count / alike, 1.0))
-    mean[count < 20] = deviation[count < 20] = np.nan
-    return Binned(edges, mean, deviation, error)
-
-
-def _autocorrelation(residual: Array, lags: int) -> Array:
-    """Autocorrelation at lags 0 to `lags`."""
-    own = residual - residual.mean()
-    spectrum = np.abs(np.fft.rfft(own, 2 * len(own))) ** 2
-    covariance = np.fft.irfft(spectrum)[: lags + 1]
-    return covariance / covariance[0] if covariance[0] > 0 else np.eye(1, lags + 1)[0]
+    mean = np.bincount(place, residual, 10) / np.maximum(count, 1)
+    noise = fit_noise(residual - mean[place])  # what the means leave
+    part = noise.effective_sample_size / noise.samples if noise.level > 0 else 1.0
+    error = noise.level / np.sqrt(np.maximum(count * part, 1.0))
+    ratio = np.abs(mean) / np.maximum(error, np.finfo(float).tiny)
+    clear = (count >= 20) & (ratio >= 3.0) & (np.abs(mean) > 0.5 * np.sqrt(np.mean(residual**2)))
+    if not clear.any():
+        return None
+    best = int(np.argmax(np.where(clear, ratio, 0.0)))
+    return Dependence(what, float(edges[best]), float(edges[best + 1]), float(mean[best]))

@@ -24,8 +24,8 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.noise import Noise, channel_noise
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
 
@@ -49,9 +49,8 @@ class Score:
 
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
-        if one_sided:
-            return float(student.sf(self.statistic, self.freedom))
-        return float(2 * student.sf(abs(self.statistic), self.freedom))
+        tail = float(student.sf(self.statistic if one_sided else abs(self.statistic), self.freedom))
+        return tail if one_sided else 2 * tail
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,52 +71,47 @@ class Explained:
     rows: Sequence[slice]
     prior_weight: float
 
-    @staticmethod
-    def by(problem: Problem, uncertainty: Uncertainty) -> "Explained":
-        """Return it for an estimate. Parameters at bounds are held."""
-        at, channels, effects = uncertainty.jacobian, problem.channels, uncertainty.linear.effects
-        scores = at.prior_weight * problem.priors.scores(uncertainty.theta[None])[0]
-        own = np.concatenate([at.residual, scores])
-        residual = np.zeros(effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
-        residual[: own.size] = own
-
-        def noise_of(row: Array) -> list[Noise]:
-            return [channel_noise(c, row[c.rows], problem.settings.objective) for c in channels]
-
-        return Explained(effects, residual, noise_of, [c.rows for c in channels], at.prior_weight)
-
-    def score(self, change: Array, after: Array | None = None) -> Score:
-        """Return the score of a change of the residuals, shape (R,).
-
-        `after`, shape (R,), is the residual of a fit with the change, if one was made; it then is the noise.
-        """
-        row = np.concatenate([change, np.zeros(self.residual.size - change.size)])
+    def score(self, change: Array) -> Score:
+        """Return the score of a change of the residuals, shape (R,)."""
+        row = np.append(change, np.zeros(self.residual.size - change.size))
         row -= self.effects.T @ (self.effects @ row)
-        length = float(row @ row)
-        if not length > 0:
+        square = float(row @ row)
+        if not square > 0:
             return Score(0.0, 0.0, 0.0, 0.0, 1.0)
         gain = -float(row @ self.residual)
-        left = (self.residual + gain / length * row)[: change.size]
-        variance, freedom = self._variance(row, self.noise_of(left if after is None else after))
+        left = (self.residual + gain / square * row)[: change.size]
+        variance, freedom = self._variance(row, self.noise_of(left))
         deviation = float(np.sqrt(variance))
         before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
         saved = 1.0 - float(np.linalg.norm(left)) / before
-        return Score(gain / deviation, gain / length, saved, length / deviation, freedom)
+        return Score(gain / deviation, gain / square, saved, square / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
         variance = self.prior_weight**2 * float(np.sum(row[self.rows[-1].stop :] ** 2))
         spectra: list[Array] = []
         for process, part in zip(noise, self.rows, strict=True):
-            own = row[part]
-            weighed = matmul_toeplitz(process.autocovariance, own)
-            variance += float(own @ weighed)
-            power = np.real(np.conj(np.fft.rfft(own)) * np.fft.rfft(weighed))
-            spectra.append(np.maximum(power, 0.0) / own.size)
+            weighed = matmul_toeplitz(process.autocovariance, row[part])
+            variance += float(row[part] @ weighed)
+            power = np.real(np.conj(np.fft.rfft(row[part])) * np.fft.rfft(weighed))
+            spectra.append(np.maximum(power, 0.0) / weighed.size)
         spectrum = np.concatenate(spectra)
-        terms = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
+        equal = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
         level = 0.5 * sum(process.effective_sample_size for process in noise)
-        return variance, max(max(2 * terms, level) - 1, 1.0)
+        return variance, max(max(2 * equal, level) - 1, 1.0)
+
+
+def explained(problem: Problem, known: Uncertainty) -> Explained:
+    """Return what a fit has explained at an estimate. Parameters at bounds are held."""
+    linear, channels = known.linear, problem.channels
+    scores = linear.prior_weight * problem.priors.scores(known.theta[None])[0]
+    residual = np.zeros(linear.effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
+    residual[: linear.residual.size + scores.size] = np.append(linear.residual, scores)
+
+    def noise_of(row: Array) -> list[Noise]:
+        return [channel_noise(c, row[c.rows], problem.settings.objective) for c in channels]
+
+    return Explained(linear.effects, residual, noise_of, [c.rows for c in channels], linear.prior_weight)
 
 
 def holm(chances: Sequence[float], level: float) -> NDArray[np.bool_]:

@@ -1,8 +1,13 @@
-"""Terms: quantities of the model that a fit holds or has switched off, each as one more parameter."""
+"""Terms: changes of the settings that give a model one more parameter, and a model in which each can change.
+
+A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share of one
+side or joint in a parameter that serves several.
+"""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,112 +16,120 @@ from hydroid.parameters import Array
 from hydroid.posterior.open_start import with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS
+from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
+
+Atom = tuple[str, int | str]
+"""one quantity of one side, and its joint (from 1) or link; 0: the pump"""
 
 
 @dataclass(frozen=True)
 class Term:
-    """One quantity that is not estimated.
+    """One more free parameter.
 
     Attributes:
-        name: of the parameter that it is, or would be.
-        settings: of that parameter, free, with the span of its values as bounds.
-        value: that the model has now; inf of a limit that is switched off.
-        named: whether it is a parameter of the fit, held fixed.
+        name: of it.
+        entries: of the settings' parameters that add it: its own, and that of what it is split from.
+        value: that it has now; inf of a limit that is switched off.
+        atoms: that it sets.
     """
 
     name: str
-    settings: ParameterSettings
+    entries: Mapping[str, ParameterSettings]
     value: float
-    named: bool
+    atoms: tuple[Atom, ...]
 
     @property
     def span(self) -> tuple[float, float]:
         """Smallest and largest value."""
-        assert self.settings.bounds is not None
-        return self.settings.bounds
+        bounds = self.entries[self.name].bounds
+        assert bounds is not None
+        return bounds
 
     @property
-    def kind(self) -> tuple[str, tuple[int, ...] | None, str | None]:
+    def kind(self) -> tuple[str, frozenset[int | str]]:
         """What it is, with both sides of an actuator alike: the same for `delay` and `delay_a` of a joint."""
-        p = self.settings
-        return (p.quantity.removesuffix("_a").removesuffix("_b"), p.joints, p.link)
-
-    @property
-    def lowest_change(self) -> float:
-        """Change that leads to the nearer end of the span, from -1; 0 where the value lies there."""
-        low, high = self.span
-        if math.isinf(self.value):
-            return 0.0
-        one, other = high - self.value, self.value - low
-        return -min(one, other) / max(one, other)
-
-    def at(self, change: float) -> float:
-        """Return the value after a change: 1 is the whole way to the farther end of the span.
-
-        A limit that is switched off changes by its reciprocal.
-        """
-        low, high = self.span
-        if math.isinf(self.value):
-            if change <= 0:
-                return math.inf
-            return low / change
-        end = high if high - self.value >= self.value - low else low
-        return min(max(self.value + change * (end - self.value), low), high)
+        quantity = self.atoms[0][0].removesuffix("_a").removesuffix("_b")
+        return quantity, frozenset(place for _, place in self.atoms)
 
 
-def terms(problem: Problem, *, sides: bool = True) -> tuple[Term, ...]:
-    """List the terms of a problem: its fixed parameters, then what it does not name.
+def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
+    """List the terms of a problem at theta, shape (P,)."""
+    return (*_held(problem.settings), *_split(problem, theta), *_nominal(problem))
 
-    Of a quantity with two sides they are both together and, where `sides`, each.
-    """
-    settings, joints, found = problem.settings, problem.active_joints, list[Term]()
-    spans = {name: span for name, (_, span) in _tested(sides=True).items()}
-    taken: set[tuple[str, int]] = set()
+
+def _held(settings: FitSettings) -> Iterator[Term]:
+    """Yield the fixed parameters."""
     for name, p in settings.parameters.items():
-        places = p.joints or range(1, len(settings.arm.joints) + 1)
-        taken |= {(target, joint) for target in TARGETS[p.quantity] for joint in places}
         if p.fixed is not None:
             # without bounds from a quarter to four times the value
-            span = p.bounds or spans.get(p.quantity) or (p.fixed / 4.0, 4.0 * p.fixed)
-            low, high = min(span[0], p.fixed), max(span[1], p.fixed)
-            if low < high:
-                free = p.model_copy(update={"fixed": None, "bounds": (low, high)})
-                found.append(Term(name, free, p.fixed, named=True))
-    gauged, alone = any(log.pressure is not None for log in problem.logs), len(joints) == 1
-    for quantity, (targets, span) in _tested(sides=sides).items():
-        pump = CHOICES[quantity].of_the_pump
-        if settings.stage == "mech" and quantity not in MECHANICAL:
+            low, high = p.bounds or CHOICES[p.quantity].span or (p.fixed / 4.0, 4.0 * p.fixed)
+            span = min(low, p.fixed), max(high, p.fixed)
+            if span[0] < span[1]:
+                free = p.model_copy(update={"fixed": None, "bounds": span})
+                yield Term(name, {name: free}, p.fixed, _atoms(settings, p))
+
+
+def _split(problem: Problem, theta: Array) -> Iterator[Term]:
+    """Yield the share of side B, or of one joint that moves, in a free parameter that serves several."""
+    settings = problem.settings
+    for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
+        name, p = parameter.name, settings.parameters[parameter.name]
+        if p.fixed is not None:
             continue
-        if (pump and alone) or (quantity == "start_pressure" and gauged):
-            continue  # the pump of one actuator is no more than its flow limit; the logs may say the pressure
-        for joint in (None,) if pump else joints:
-            values = {_nominal(problem, target, joint or 1) for target in targets}
-            if len(values) == 1 and not any((target, joint or 1) in taken for target in targets):
-                name, where = (quantity, None) if joint is None else (f"{quantity}_{joint}", (joint,))
-                name = unused(quantity if alone else name, settings.parameters)
-                free = ParameterSettings(quantity=quantity, joints=where, bounds=span)
-                found.append(Term(name, free, values.pop(), named=False))
-    return tuple(found)
+        sides, joints = TARGETS[p.quantity], sorted({j for _, j in _atoms(settings, p) if isinstance(j, int)})
+        moving = [j for j in joints if j in problem.active_joints]
+        parts: list[tuple[str, dict[str, Any], dict[str, Any]]] = []
+        if len(sides) == 2:
+            parts.append(("b", {"quantity": sides[0]}, {"quantity": sides[1]}))
+        if len(moving) > 1:
+            others = {joint: tuple(j for j in joints if j != joint) for joint in moving}
+            parts += [(str(j), {"joints": rest}, {"joints": (j,)}) for j, rest in others.items()]
+        free = p.model_copy(update={"bounds": (parameter.lower, parameter.upper)})
+        for ending, rest, own in parts:
+            new, entry = f"{name}_{ending}", free.model_copy(update=own)
+            if new not in settings.parameters:
+                entries = {name: free.model_copy(update=rest), new: entry}
+                yield Term(new, entries, value, _atoms(settings, entry))
 
 
-def _tested(*, sides: bool) -> dict[str, tuple[tuple[str, ...], tuple[float, float]]]:
-    """Targets and span of each quantity to test, by name: both sides of an actuator, then each."""
-    spans: dict[str, tuple[tuple[str, ...], tuple[float, float]]] = {}
+def _nominal(problem: Problem) -> Iterator[Term]:
+    """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
+    settings, joints = problem.settings, problem.active_joints
+    taken = {atom for p in settings.parameters.values() for atom in _atoms(settings, p)}
+    gauged, alone = any(log.pressure is not None for log in problem.logs), len(joints) == 1
     for row in ROWS:
-        if row.span:
-            spans[row.name] = (TARGETS[row.name], row.span)
-            spans |= {side: ((side,), row.span) for side in TARGETS[row.name] if side != row.name and sides}
-    return spans
+        pump = row.of_the_pump
+        # the pump of one actuator is no more than its flow limit; the logs may say the pressure
+        known = (pump and alone) or (row.name == "start_pressure" and gauged)
+        if row.span is None or known or (settings.stage == "mech" and row.name not in MECHANICAL):
+            continue
+        for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
+            groups = [(0,)] if pump else [(joint,) for joint in joints]
+            if quantity == row.name and not pump and not alone:
+                groups.append(joints)
+            for group in groups:
+                atoms = tuple((target, joint) for target in TARGETS[quantity] for joint in group)
+                values = {_nominal_value(problem, target, joint or 1) for target, joint in atoms}
+                if len(values) == 1 and taken.isdisjoint(atoms):
+                    name = quantity if alone or pump or len(group) > 1 else f"{quantity}_{group[0]}"
+                    while name in settings.parameters:
+                        name += "_"
+                    entry = ParameterSettings(
+                        quantity=quantity, joints=None if pump else group, bounds=row.span
+                    )
+                    yield Term(name, {name: entry}, values.pop(), atoms)
 
 
-def unused(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken."""
-    return name if name not in taken else unused(f"{name}_", taken)
+def _atoms(settings: FitSettings, p: ParameterSettings) -> tuple[Atom, ...]:
+    """All that a parameter sets."""
+    places: Sequence[int | str] = p.joints or range(1, len(settings.arm.joints) + 1)
+    places = [p.link] if p.link is not None else [0] if CHOICES[p.quantity].of_the_pump else places
+    return tuple((target, place) for target in TARGETS[p.quantity] for place in places)
 
 
-def _nominal(problem: Problem, quantity: str, joint: int) -> float:
+def _nominal_value(problem: Problem, quantity: str, joint: int) -> float:
     """Value of a quantity that no parameter sets; inf of a limit that is switched off."""
     settings = problem.settings
     value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
@@ -126,38 +139,36 @@ def _nominal(problem: Problem, quantity: str, joint: int) -> float:
 
 
 class ExtendedModel:
-    """A problem at an estimate whose terms can be changed too.
+    """A problem at an estimate in which terms can change.
 
     Attributes:
-        terms: the T terms.
-        theta: the estimate, shape (P,).
-        residual: there [rad], shape (R,).
+        residual: at the estimate [rad], shape (R,).
     """
 
-    def __init__(self, problem: Problem, theta: Array, *, sides: bool = True) -> None:
-        self.terms, self.theta = terms(problem, sides=sides), theta
-        added: dict[str, tuple[ParameterSettings, float]] = {}
-        parts: list[list[str]] = []
-        for term in self.terms:
-            p, targets = term.settings, TARGETS[term.settings.quantity]
-            joint = (p.joints or (0,))[0]
-            names = [term.name] if term.named else [f"{target}_of_{joint}" for target in targets]
-            parts.append(names)
-            if not term.named:
-                free = [p.model_copy(update={"quantity": target}) for target in targets]
-                added |= {name: (one, term.value) for name, one in zip(names, free, strict=True)}
-        settings = problem.settings.with_parameters({name: one for name, (one, _) in added.items()})
-        opened = with_open_start(problem, theta).open_starts
-        self._problem = problem.varied(settings).with_open_starts(opened)
-        names = self._problem.parameters.names
-        self._base = np.array([*theta, *(value for _, value in added.values())])
-        self._columns = [[names.index(name) for name in part] for part in parts]
-        self.residual = self.residuals(theta[None])[0]
+    def __init__(self, problem: Problem, theta: Array, terms: Sequence[Term]) -> None:
+        settings, moved = problem.settings, {atom for term in terms for atom in term.atoms}
+        parameters, values, atoms = dict[str, ParameterSettings](), list[float](), dict[Atom, float]()
+        for (name, p), value in zip(settings.parameters.items(), theta.tolist(), strict=True):
+            own = _atoms(settings, p)
+            if moved.isdisjoint(own):
+                parameters[name] = p
+                values.append(value)
+            else:
+                atoms |= dict.fromkeys(own, value)
+        atoms |= {atom: term.value for term in terms for atom in term.atoms if atom not in atoms}
+        for target, place in atoms:
+            where = {"link": place} if target == "mass" else {"joints": (place,) if place else None}
+            entry = ParameterSettings(quantity=target, bounds=(0.1, 0.2), **where)  # pyright: ignore[reportArgumentType]
+            parameters[f"{target}_of_{place}"] = entry
+        self._base = np.array([*values, *atoms.values()])
+        self._columns = {atom: len(values) + i for i, atom in enumerate(atoms)}
+        varied = problem.varied(settings.model_copy(update={"parameters": parameters, "priors": {}}))
+        self._problem = varied.with_open_starts(with_open_start(problem, theta).open_starts)
+        self.residual = self.residuals([])[0]
 
-    def residuals(self, theta: Array, terms: Sequence[int] = (), changes: Sequence[float] = ()) -> Array:
-        """Residuals [rad] at n estimates, (n, P), each with one term changed (`Term.at`): shape (n, R)."""
-        rows = np.tile(self._base, (len(theta), 1))
-        rows[:, : len(self.theta)] = theta
-        for row, i, change in zip(rows, terms, changes, strict=False):
-            row[self._columns[i]] = self.terms[i].at(change)
+    def residuals(self, changes: Sequence[tuple[Term, float]]) -> Array:
+        """Residuals [rad] with one term at another value each, shape (n, R); of none those as they are."""
+        rows = np.tile(self._base, (max(len(changes), 1), 1))
+        for row, (term, value) in zip(rows, changes, strict=False):
+            row[[self._columns[atom] for atom in term.atoms]] = value
         return self._problem.residuals(rows)

@@ -1,7 +1,6 @@
 """`hydroid analyse`: what the logs determine, and what each parameter does to the response."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import load_settings, open_model
@@ -10,7 +9,6 @@ from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.commands.result import Result, rows, written
 from hydroid.estimate import finite
-from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
@@ -65,9 +63,8 @@ def analyse(
 
     with Progress() as progress:
         study = _uncertainty(problem, model.theta, model.source, names(profile), progress)
-        theta = study.uncertainty.theta
-        sweep = sweeps.sweep(problem, theta, progress) if sensitivity else None
-    page = analysis_page(problem, theta, uncertainty_page(study), sweep)
+        sweep = sweeps.sweep(problem, model.theta, progress) if sensitivity else None
+    page = analysis_page(problem, model.theta, uncertainty_page(study), sweep)
     tables = {name: page.tables[name] for name in ("sensitivity",) if name in page.tables}
     known = study.summary.plain()
     for name, parameter in known["estimate"].items():
@@ -84,29 +81,15 @@ def analyse(
 def _uncertainty(
     problem: "Problem", theta: "Array", source: str, profile: Sequence[str], progress: Progress
 ) -> "UncertaintyStudy":
-    """Return what the logs determine at `theta`, or at a better optimum that a profile comes across."""
-    from hydroid.fitting.refinement import refine
-    from hydroid.posterior import covariance, directions
+    """Return what the logs determine at `theta`."""
+    from hydroid.posterior import directions, uncertainty
     from hydroid.posterior import profile as profiling
     from hydroid.reporting.uncertainty_report import UncertaintyStudy
-    from hydroid.settings.search import RefinementSettings
 
-    def at(theta: "Array", source: str) -> UncertaintyStudy:
-        uncertainty = covariance.uncertainty(problem, theta)
-        profiles: list[profiling.Profile] = []
-        for done, name in enumerate(profile):
-            progress("profiles", done, len(profile))
-            profiles.append(profiling.profile(problem, uncertainty, name))
-        identifiability = directions.identifiability(problem, uncertainty)
-        return UncertaintyStudy(problem, source, uncertainty, identifiability, tuple(profiles))
-
-    study = at(theta, source)
-    better = profiling.better_optimum(study.profiles)
-    if better is None:
-        return study
-    refinement = problem.settings.refinement or RefinementSettings()
-    unit = refine(problem, better, refinement).point
-    theta = problem.parameters.from_unit(unit)
-    values = ", ".join(f"{n} {v:.5g}" for n, v in problem.parameters.mapping(theta).items())
-    moved = Finding("moved", "warning", (), {"values": values})
-    return replace(at(theta, f"a better optimum than that of {source}"), moved=(moved,))
+    known = uncertainty.uncertainty(problem, theta)
+    profiles: list[profiling.Profile] = []
+    for done, name in enumerate(profile):
+        progress("profiles", done, len(profile))
+        profiles.append(profiling.profile(problem, known, name))
+    identifiability = directions.identifiability(problem, known)
+    return UncertaintyStudy(problem, source, known, identifiability, tuple(profiles))

@@ -138,7 +138,6 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:
     """Begin the folder's run, or continue it, to its report."""
-    from hydroid.advice.proposals import advice
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.reporting.fit_report import draw
     from hydroid.run.record import fit_result, save_result
@@ -149,12 +148,8 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     fit = run_fit(problem, progress, checkpoints)
     result = _result(problem, fit, folder.path)
     folder.write_estimate(problem.logs[0], fit.best.theta, result.summary)
-    began, advised = time.monotonic(), None
-    last = problem.varied(result.model.settings)
-    if fit.best.usable:
-        run = str(folder.path)
-        advised = advice(last, fit.uncertainty, fit.quantities, run=run, thorough=False)
-    save_result(folder.path, fit_result(fit, result.predictions, result.baselines, advised))
+    began = time.monotonic()
+    save_result(folder.path, fit_result(fit, result.predictions, result.baselines))
     draw(folder.path)
     folder.status("done", seconds=dict(fit.seconds) | {"report": time.monotonic() - began})
     return result

@@ -12,7 +12,7 @@ from hydroid.files import is_file
 from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
-    from hydroid.advice.proposals import Advice
+    from hydroid.advice.suggestions import Advice
     from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
     from hydroid.reporting.table import Table
@@ -30,14 +30,15 @@ def suggest(
 ) -> "Result[Advice]":
     """Find what the model lacks, and what to do next.
 
-    Tests every parameter that is kept fixed or switched off, such as a delay or dry friction: would freeing
-    it lower the error? Shows what the residual depends on. Predicts for several actions, from weighing a link
-    to a new experiment, how much each would reduce the uncertainty.
+    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
+    most promising ones are freed: does that lower the error on parts of the logs left out? Shows what the
+    residual depends on, and predicts for the best actions, from weighing a link to a new experiment, how much
+    each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
         suggested = hydroid.suggest(fit="runs/a").plain()
-        print([(test["name"], test["rms_deg"]) for test in suggested["missing"]])
+        print([(term["name"], term["gain_percent"]) for term in suggested["terms"]])
 
     Raises:
         LogError: a log cannot be used.
@@ -46,15 +47,15 @@ def suggest(
     """
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
-    from hydroid.advice.proposals import advice
-    from hydroid.posterior.covariance import uncertainty
+    from hydroid.advice.suggestions import advice
+    from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.page import log_names
     from hydroid.reporting.suggestion_report import suggestion_page
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
-        advised = advice(problem, uncertainty(problem, model.theta), run=run, progress=progress)
+        advised = advice(problem, uncertainty(problem, model.theta), run, progress)
     page = suggestion_page(problem.settings, advised, log_names(problem.logs), model.name)
     lines: list[Table | str] = [page.tables["missing_terms"]]
     for section in page.sections:

@@ -5,9 +5,9 @@ import numpy as np
 from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import FEW, ByLog
-from hydroid.posterior.covariance import Uncertainty
-from hydroid.posterior.directions import DirectionKind, Identifiability
+from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import Flag, Source
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
 _MOST_DIRECTIONS = 6
@@ -47,7 +47,6 @@ def parameter_findings(
         kind: [] for kind in ("no effect", "not identifiable", "prior only", "weakly identifiable")
     }
     diverging: list[str] = []
-    doubts: dict[str, float] = {}
     for parameter, status in zip(problem.parameters.parameters, known.status, strict=True):
         name, idle = parameter.name, status.flag is Flag.NO_EFFECT
         if status.at_bound and not idle:
@@ -57,8 +56,6 @@ def parameter_findings(
         kinds.get(Source.PRIOR.value if by_prior else status.flag.value, []).append(name)
         if status.diverges and status.flag is not Flag.FIXED:
             diverging.append(name)
-        if status.doubt is not None:
-            doubts[name] = status.doubt
     findings = [
         Finding(kind, "note" if kind == "at zero" else "warning", tuple(names), {"side": side})
         for (kind, side), names in sorted(at.items(), reverse=True)
@@ -67,18 +64,13 @@ def parameter_findings(
     findings += [Finding(kind, "note", tuple(names)) for kind, names in kinds.items() if names]
     if diverging:
         findings.append(Finding("effect unknown", "warning", tuple(diverging)))
-    if doubts:
-        findings.append(
-            Finding("interval rough", "note", tuple(doubts), {"percent": 100 * max(doubts.values())})
-        )
     return (*findings, *(() if directions is None else _combinations(directions)))
 
 
 def _combinations(directions: Identifiability) -> list[Finding]:
     """What the logs leave open of several parameters together; a single one has its flag."""
-    kinds = {DirectionKind.COMMON_SCALE: "common scale", DirectionKind.COMBINATION: "combination"}
-    several = [one for one in directions.unidentifiable if one.kind in kinds]
-    findings = [Finding(kinds[one.kind], "note", tuple(one.parameters)) for one in several[:_MOST_DIRECTIONS]]
+    several = [tuple(one) for one in directions.combinations if len(one) > 1]
+    findings = [Finding("combination", "note", names) for names in several[:_MOST_DIRECTIONS]]
     if more := len(several[_MOST_DIRECTIONS:]):
         findings.append(Finding("more combinations", "note", (), {"count": str(more)}))
     return findings

@@ -12,10 +12,10 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty, uncertainty
 from hydroid.posterior.directions import Identifiability, identifiability
-from hydroid.posterior.jacobian import estimate_box
+from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search import compromise

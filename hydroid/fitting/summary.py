@@ -6,8 +6,8 @@ from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finit
 from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
 from hydroid.posterior.by_log import by_log
-from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
 
@@ -44,7 +44,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 
 def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:
     """Return an estimate with what its logs say about it, whatever led to it."""
-    logs, scale, count = by_log(problem, known), known.jacobian.scale, len(known.theta)
+    logs, scale, count = by_log(problem, known), known.linear.box.scale, len(known.theta)
     relative = np.full(count, np.nan) if logs is None else logs.relative
     by_logs = np.full((count, 2), np.nan) if logs is None else logs.interval
     estimate = {
@@ -59,7 +59,7 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
             source=None if status.source is None else status.source.value,
             data_share=status.share if known.free[i] else None,
             at_bound=status.at_bound,
-            effect_deg=finite(np.degrees(known.jacobian.effects[i])),
+            effect_deg=finite(np.degrees(known.sensitivity[i])),
         )
         for i, (parameter, status) in enumerate(zip(problem.parameters.parameters, known.status, strict=True))
     }

@@ -17,7 +17,7 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.band import Band, prediction_bands
-from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
@@ -102,7 +102,7 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
     """Return what the final estimate of a fit makes of its own logs."""
     known = fit.uncertainty.posterior
-    slopes = np.nan_to_num(fit.uncertainty.jacobian.slopes[known.box.varied])
+    slopes = fit.uncertainty.linear.slopes
     bands: list[dict[int, Band]] = [{} for _ in problem.logs]
     for channel, noise in zip(problem.channels, fit.uncertainty.noise, strict=True):
         if channel.quantity == "angle":

@@ -74,24 +74,36 @@ class Bench:
 class Movement:
     """A step of the command [%] from an angle [rad], held for some samples.
 
-    The speed at its end is the mean over a `window` of samples.
+    Speeds are in the direction of the command; the one at the end is the mean over a tenth of a second.
     """
 
     bench: Bench
     command: float
     start: float
     samples: int
-    window: int
 
-    def speeds(self, candidates: Candidates) -> tuple[Array, Array]:
-        """Return speeds [deg/s] between samples, shape (n, samples), and at the end, shape (n,)."""
+    @property
+    def window(self) -> int:
+        """Samples in the last tenth of a second."""
+        return max(round(0.1 / self.bench.period), 1)
+
+    @property
+    def sign(self) -> float:
+        """Direction in which the command turns the joint."""
+        return -self.bench.sense if self.command < 0 else self.bench.sense
+
+    def speeds(self, candidates: Candidates) -> Array:
+        """Return speeds [deg/s] between samples, shape (n, samples)."""
         angle = self.bench.drive(candidates, self.command, self.start, self.samples)
-        speeds = self._sign * np.degrees(np.diff(angle, axis=1)) / self.bench.period
-        return speeds, speeds[:, -self.window :].mean(axis=1)
+        return self.sign * np.degrees(np.diff(angle, axis=1)) / self.bench.period
+
+    def end(self, speeds: Array) -> Array:
+        """Return the speed at the end of speeds, shape (n, samples): shape (n,)."""
+        return speeds[:, -self.window :].mean(axis=1)
 
     def speed(self, candidates: Candidates) -> Array:
         """Return the speed at the end [deg/s], shape (n,)."""
-        return self.speeds(candidates)[1]
+        return self.end(self.speeds(candidates))
 
     def reaches(self, speeds: Array, level: Array) -> Array:
         """Return when speeds, shape (n, samples), first reach a level, shape (n,) [s]; NaN where never."""
@@ -109,30 +121,23 @@ class Movement:
         It starts as long before as this one lasts, or at the joint's stop and is shorter.
         """
         half, angle, move = self.window // 2, self.bench.angle, self
-        arm, i = self.bench.settings.arm, self.bench.joint - 1
-        margin = float(np.radians(1.0))
-        low, high = float(arm.lower[i]) + margin, float(arm.upper[i]) - margin
+        arm, i, margin = self.bench.settings.arm, self.bench.joint - 1, float(np.radians(1.0))
+        low, high = min(float(arm.lower[i]) + margin, angle), max(float(arm.upper[i]) - margin, angle)
         turned = self.bench.drive(estimate, self.command, move.start, self.samples)[0]
         for _ in range(3):  # each correction leaves a tenth of the error or less
             if not np.isfinite(turned).all():
                 return self
             start = move.start + angle - float(turned[self.samples - half])
-            move = replace(move, start=float(np.clip(start, min(low, angle), max(high, angle))))
+            move = replace(move, start=min(max(start, low), high))
             turned = self.bench.drive(estimate, self.command, move.start, self.samples)[0]
-        passed = self._sign * (turned - angle) >= 0
+        passed = self.sign * (turned - angle) >= 0
         last = int(np.argmax(passed)) + half if passed.any() else self.samples
         return replace(move, samples=min(max(last, self.window + 1), self.samples))
 
-    @property
-    def _sign(self) -> float:
-        """Direction in which the command turns the joint."""
-        return -self.bench.sense if self.command < 0 else self.bench.sense
-
 
 def movement(bench: Bench, command: float) -> Movement:
-    """Return the movement of 1.2 s from the joint's angle, whose last tenth of a second is its end."""
-    samples, window = max(round(1.2 / bench.period), 2), max(round(0.1 / bench.period), 1)
-    return Movement(bench, command, bench.angle, samples, window)
+    """Return the movement of 1.2 s from the joint's angle."""
+    return Movement(bench, command, bench.angle, max(round(1.2 / bench.period), 2))
 
 
 def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:

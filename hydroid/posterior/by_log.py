@@ -3,7 +3,7 @@
 The pooled covariance trusts the model and the noise that the residuals show. Where the model errs, each log
 pulls the estimate its own way, its parameters make up for the error log by log, and neither covariance nor
 noise tell of it. Leaving out one log after the other does (a jackknife; J. G. MacKinnon, M. Ø. Nielsen,
-M. D. Webb, 2023). To first order it needs no further fit. With J = V D U (`linearise`), U_g the columns of
+M. D. Webb, 2023). To first order it needs no further fit. With J = V D U (`Linear`), U_g the columns of
 log g, r_g its residual and A_g = U_g U_g', leaving out log g changes
 
     the parameters by  d_g = V D^-1 (1 - A_g)^-1 U_g r_g,
@@ -27,9 +27,9 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from hydroid.parameters import Array
-from hydroid.posterior.covariance import Uncertainty, ends
 from hydroid.posterior.flags import Source
 from hydroid.posterior.posterior import COVERAGE
+from hydroid.posterior.uncertainty import Uncertainty, ends
 from hydroid.problem.problem import Problem
 
 FEW = 5.0
@@ -62,17 +62,16 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
     logs = sorted({channel.log for channel in problem.channels})
     if len(logs) < 2:
         return None
-    linear, residual = uncertainty.linear, uncertainty.jacobian.residual
+    linear, row = uncertainty.linear, uncertainty.linear.residual.copy()
     columns = [np.concatenate([np.r_[c.rows] for c in problem.channels if c.log == g]) for g in logs]
     effects = [linear.effects[:, own] for own in columns]
-    shares = np.array([u @ linear.effects[:, own].T for u, own in zip(effects, columns, strict=True)])  # A_g
+    shares = np.array([u @ u.T for u in effects])  # A_g
     share, axes = np.linalg.eigh(shares)
     alone = share > 0.99  # only this log has information on the direction
     gain = np.where(alone, 0.0, 1 / (1 - np.minimum(share, 0.99)))
-    inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)  # (1 - A_g)^-1
-    scores = np.array([u @ residual[own] for u, own in zip(effects, columns, strict=True)])
-    steps = np.einsum("gkl,gl->gk", inverses, scores)  # of each effect when log g is left out
-    row = residual.copy()
+    # of each effect when log g is left out: (1 - A_g)^-1 U_g r_g
+    inverses = (axes * gain[:, None]) @ axes.transpose(0, 2, 1)
+    steps = np.array([m @ u @ row[own] for m, u, own in zip(inverses, effects, columns, strict=True)])
     for own, step, u in zip(columns, steps, effects, strict=True):
         row[own] += step @ u
     left_out: dict[int, list[float]] = {}
@@ -82,32 +81,30 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
         if channel.quantity == "angle":
             error = np.sqrt(np.mean((row[channel.rows] / channel.weight) ** 2))
             left_out.setdefault(channel.joint, []).append(float(error))
+    by_joint = {joint: np.array(errors) for joint, errors in left_out.items()}
 
-    free, rows = uncertainty.posterior.box.varied, linear.changes  # of the p parameters that vary
+    rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary
     expected = _expected(rows @ inverses, shares, scatters, linear.prior_scatter)
-    observed = np.sum((steps @ rows.T) ** 2, axis=0)
     mean, square = np.trace(expected, axis1=1, axis2=2), np.sum(expected**2, axis=(1, 2))
     # what the priors say is no less certain where the logs differ
-    noise, stated = (
-        np.einsum("pk,kl,pl->p", rows, m, rows) for m in (scatters.sum(axis=0), linear.prior_scatter)
-    )
-    relative, freedom, ratio = np.full((3, len(free)), np.nan)
+    noise, stated = (np.sum(rows @ m * rows, axis=1) for m in (pooled, linear.prior_scatter))
     with np.errstate(invalid="ignore", divide="ignore"):  # 0 / 0 of a parameter without effect: not known
-        freedom[free], ratio[free] = mean**2 / square, observed / mean
-        widened = np.sqrt((stated + noise * ratio[free]) / (stated + noise))
+        freedom, ratio = mean**2 / square, np.sum((steps @ rows.T) ** 2, axis=0) / mean
+        widened = np.sqrt((stated + noise * ratio) / (stated + noise))
     # a parameter that owes a tenth of its deviation to what one log alone has is unknown by log
     owed = np.linalg.norm(rows @ np.where(alone[:, None], axes, 0.0), axis=2)
-    lost = (owed > 0.1 * np.linalg.norm(rows, axis=1)).any(axis=0)
-    relative[free] = np.where(lost, np.inf, uncertainty.relative[free] * widened)
+    widened[(owed > 0.1 * np.linalg.norm(rows, axis=1)).any(axis=0)] = np.inf
+    freedom, ratio = linear.spread(freedom), linear.spread(ratio)
+    relative = uncertainty.relative * linear.spread(widened)
     out = [s.at_bound is not None or s.source is Source.PRIOR for s in uncertainty.status]
     relative[~np.isfinite(uncertainty.relative) | out] = np.nan
     half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
-    interval = ends(problem.parameters, uncertainty.theta, uncertainty.jacobian.scale, half)
+    interval = ends(problem.parameters, uncertainty.theta, linear.box.scale, half)
     # in 5 % of the fits with a right model any parameter is said to differ
     known = np.isfinite(relative)
     differing = known & (chi2.sf(freedom * ratio, freedom) < 0.05 / max(known.sum(), 1))
     names = tuple(np.array(problem.parameters.names)[differing].tolist())
-    return ByLog(relative, interval, freedom, names, {j: np.array(each) for j, each in left_out.items()})
+    return ByLog(relative, interval, freedom, names, by_joint)
 
 
 def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> Array:
@@ -117,9 +114,8 @@ def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> 
     `changes` are of each parameter per score of log g when it is left out, (G, p, k).
     """
     through = changes @ shares
-    whole = scatters.sum(axis=0) + priors
-    expected = np.einsum("gpk,hpk->pgh", through @ whole, through)
     direct = np.einsum("gpk,hpk->pgh", changes @ scatters, through)
+    expected = np.einsum("gpk,hpk->pgh", through @ (scatters.sum(axis=0) + priors), through)
     expected -= direct + direct.transpose(0, 2, 1)
     logs = range(len(scatters))
     expected[:, logs, logs] += np.einsum("gpk,gpk->pg", changes @ scatters, changes)

@@ -38,7 +38,6 @@ class ParameterStatus:
     Attributes:
         flag: what the logs alone determine.
         at_bound: the bound that it lies at.
-        doubt: relative change of the standard deviation in the last round of derivatives, where it is large.
         diverges: whether its effect is unknown because simulations diverge where it is changed.
         share: part of the information that the logs gave: 1 - posterior / prior variance.
         known: whether logs and priors together determine it.
@@ -46,7 +45,6 @@ class ParameterStatus:
 
     flag: Flag
     at_bound: Side | None = None
-    doubt: float | None = None
     diverges: bool = False
     share: float = 1.0
     known: bool = True

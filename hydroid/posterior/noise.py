@@ -49,21 +49,22 @@ class Noise:
     @cached_property
     def autocovariance(self) -> Array:
         """At lags 0 to T - 1, shape (T,)."""
-        predictors, order = self._predictors(), min(len(self.reflection), self.samples - 1)
-        known = np.zeros(self.samples)
-        known[0] = self.level**2
-        for m, (polynomial, variance) in enumerate(predictors[:order]):
-            known[m + 1] = -self.reflection[m] * variance - polynomial[1:] @ known[m:0:-1]
+        known, order = np.zeros(self.samples), min(len(self.reflection), self.samples - 1)
+        known[0], polynomial, variance = self.level**2, np.ones(1), self.level**2
+        for m, k in enumerate(self.reflection[:order]):
+            known[m + 1] = -k * variance - polynomial[1:] @ known[m:0:-1]
+            polynomial, variance = _next_predictor(polynomial, variance, k)
         if order:  # beyond the order the recursion of the process continues
-            last = predictors[order][0]
-            start = lfiltic([1.0], last, known[order:0:-1])
-            known[order + 1 :], _ = lfilter([1.0], last, np.zeros(self.samples - order - 1), zi=start)
+            start = lfiltic([1.0], polynomial, known[order:0:-1])
+            known[order + 1 :], _ = lfilter([1.0], polynomial, np.zeros(self.samples - order - 1), zi=start)
         return known
 
     @property
     def spectrum(self) -> Array:
         """Power at T + 1 frequencies from 0 to half the sampling rate, shape (T + 1,)."""
-        polynomial, variance = self._predictors()[-1]
+        polynomial, variance = np.ones(1), self.level**2
+        for k in self.reflection:
+            polynomial, variance = _next_predictor(polynomial, variance, k)
         return variance / np.abs(np.fft.rfft(polynomial, 2 * self.samples)) ** 2
 
     @property
@@ -93,13 +94,6 @@ class Noise:
         """Samples until the autocorrelation has fallen below 1/e for the first time; 0 of white noise."""
         below = np.flatnonzero(self.autocovariance < self.level**2 / np.e)
         return float(below[0] - 1) if len(below) else float(self.samples)
-
-    def _predictors(self) -> list[tuple[Array, float]]:
-        """Prediction-error filters of order 0 to p, each with the variance of its prediction error."""
-        predictors = [(np.ones(1), self.level**2)]
-        for k in self.reflection:
-            predictors.append(_next_predictor(*predictors[-1], float(k)))
-        return predictors
 
 
 def prior_weight(channels: Sequence[Channel], residual: Array, objective: ObjectiveSettings) -> float:

@@ -42,14 +42,12 @@ class Known:
         sd: standard deviation, shape (m,): infinite where not determined, NaN where unknown.
         interval: of 95 %, shape (m, 2); infinite where not determined.
         given: quantities that no parameter changes, shape (m,).
-        slopes: derivatives per relative change of the p parameters that vary, shape (p, m).
     """
 
     value: Array
     sd: Array
     interval: Array
     given: NDArray[np.bool_]
-    slopes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +115,10 @@ class Posterior:
     ) -> Known:
         """Return the quantities that a function of the parameters, (n, P) -> (n, m), gives at the estimate.
 
+        The interval of a `positive` quantity is multiplicative. A quantity is not determined where parameters
+        known to 100 % each would determine it as well, or where the standard deviation of a positive one
+        exceeds the value: a first-order interval then means nothing.
+
         Args:
             function: is called with the estimate, and with all points of the differences at once.
             positive: which quantities cannot be negative, shape (m,).
@@ -129,15 +131,6 @@ class Posterior:
         if inside.any():
             own = self if concerned is None else self.of(concerned)
             slopes[inside] = differentiate(function, own.box, own.axes(STEP), value)
-        return self.known(value, slopes, positive)
-
-    def known(self, value: Array, slopes: Array, positive: NDArray[np.bool_] | bool) -> Known:
-        """Return quantities, (m,), with intervals from their derivatives, (p, m).
-
-        The interval of a `positive` quantity, (m,), is multiplicative. A quantity is not determined where
-        parameters known to 100 % each would determine it as well, or where the standard deviation of a
-        positive one exceeds the value: a first-order interval then means nothing.
-        """
         finite = np.isfinite(slopes).all(axis=0)
         sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
         half = self.quantile * sd
@@ -152,7 +145,7 @@ class Posterior:
         interval[lost] = -np.inf, np.inf
         interval[lost & positive] = 0.0, np.inf
         # a relative change by less than a thousandth of a parameter's: the settings give it
-        return Known(value, sd, interval, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0), slopes)
+        return Known(value, sd, interval, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0))
 
     def stored(self, parameters: ParameterSet) -> Covariance:
         """Return what a file keeps of it."""

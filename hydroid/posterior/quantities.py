@@ -2,35 +2,34 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
-from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.speeds import speed_tests
 from hydroid.posterior.statics import Column, Measured, gain_model, gravity, oil
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates
 
 
 @dataclass(frozen=True)
 class Quantities:
-    """What follows from an estimate: single quantities and curves by name, and what they were computed from.
+    """What follows from an estimate: single quantities and curves by name.
 
     Quantities that no free parameter changes are left out: the settings give them, not the logs.
-    slopes: relative changes of the single quantities per relative change of the parameters that vary, (p,).
     """
 
     scalars: dict[str, QuantityEstimate]
     curves: dict[str, CurveEstimate]
-    slopes: dict[str, Array]
 
 
 def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     """Return the quantities of every compared joint at a fit's estimate."""
-    result = Quantities({}, {}, {})
+    result = Quantities({}, {})
     for joint in problem.settings.outputs:
         _add_joint(result, problem, uncertainty, joint)
     return result
@@ -50,32 +49,23 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
     positive = np.array([column.positive for column in columns])
     known = uncertainty.posterior.propagate(values, positive, concerned)
-    value, ends = known.value.tolist(), [(finite(low), finite(high)) for low, high in known.interval]
+    ends = [(finite(low), finite(high)) for low, high in known.interval]
     points: dict[str, list[int]] = {}
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
         points.setdefault(columns[i].name, []).append(i)
     for part, own in points.items():
+        own = sorted(own, key=lambda i: columns[i].at)
+        first, name, value = columns[own[0]], f"joint{joint}_{part}", known.value[own].tolist()
         if known.given[own].all():
             continue
-        first, name = columns[own[0]], f"joint{joint}_{part}"
+        what: dict[str, Any] = {"label": first.label, "joint": joint, "unit": first.unit}
         if first.along:
-            own = sorted(own, key=lambda i: columns[i].at)
-            result.curves[name] = CurveEstimate(
-                label=first.label,
-                joint=joint,
-                unit=first.unit,
-                along=first.along,
-                at=tuple(columns[i].at for i in own),
-                value=tuple(value[i] for i in own),
-                interval=tuple(ends[i] for i in own),
-            )
-            continue
-        (i,), sd = own, finite(known.sd[own[0]])
-        result.scalars[name] = QuantityEstimate(
-            label=first.label, joint=joint, value=value[i], unit=first.unit, sd=sd, interval=ends[i]
-        )
-        if value[i] != 0:
-            result.slopes[name] = known.slopes[:, i] / value[i]
+            what |= {"along": first.along, "at": tuple(columns[i].at for i in own)}
+            interval = tuple(ends[i] for i in own)
+            result.curves[name] = CurveEstimate(**what, value=tuple(value), interval=interval)
+        else:
+            sd = finite(known.sd[own[0]])
+            result.scalars[name] = QuantityEstimate(**what, value=value[0], sd=sd, interval=ends[own[0]])
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], list[tuple[Column, Array]]]:

@@ -1,7 +1,6 @@
 """Quantities of stage 2 that test movements in one direction show: speeds, dead band, dead time."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -31,10 +30,7 @@ def speed_tests(
         ending: of the names.
         word: at the end of the labels.
     """
-    low, high = bench.travel
     steps = {u: movement(bench, sign * u).through_pose(estimate) for u in COMMANDS}
-    places = [replace(bench, angle=low + part * (high - low)) for part in (0.1, 0.3, 0.5, 0.7, 0.9)]
-    poses = [movement(place, sign * 50.0).through_pose(estimate) for place in places]
     rest = movement(bench, 0.0)
     reached = {u: step.speed(estimate)[0] for u, step in steps.items()}
     # the smallest command from 50 % that clearly moves the joint, or the largest
@@ -50,23 +46,19 @@ def speed_tests(
         below, above = (below, middle) if moves else (middle, above)
 
     def measure(candidates: Candidates) -> Measured:
-        def row(name: str, label: str, unit: str, value: Array, *place: object) -> tuple[Column, Array]:
-            return Column(f"{name}_{ending}", f"{label}, {word}", unit, True, *place), value  # pyright: ignore[reportArgumentType]
+        def row(name: str, label: str, unit: str, value: Array) -> tuple[Column, Array]:
+            return Column(f"{name}_{ending}", f"{label}, {word}", unit), value
 
         runs = {u: step.speeds(candidates) for u, step in steps.items()}
-        speed = {u: final for u, (_, final) in runs.items()}
+        speed = {u: steps[u].end(run) for u, run in runs.items()}
         for u, value in speed.items():
             point = Column("speed", "speed", "deg/s", False, "command [%]", sign * u)
             yield point, sign * bench.sense * value
-        for pose in poses:
-            at, value = float(np.degrees(pose.bench.angle)), pose.speed(candidates)
-            yield row("speed_50_over_poses", "speed at 50 % command", "deg/s", value, "angle [deg]", at)
         for u in (50.0, 100.0):
             yield row(f"speed_{u:.0f}", f"speed at {u:.0f} % command", "deg/s", speed[u])
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
         yield row("gain", "gain between command and speed", "deg/s per %", gain)
-        run, final = runs[rise]
-        onset, risen = (steps[rise].reaches(run, part * final) for part in (ONSET, RISEN))
+        onset, risen = (steps[rise].reaches(runs[rise], part * speed[rise]) for part in (ONSET, RISEN))
         yield row("dead_time", f"dead time at {rise:g} % command", "s", onset)
         yield row("time_constant", f"time constant at {rise:g} % command", "s", risen - onset)
         if below > 0.0:

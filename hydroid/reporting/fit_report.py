@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.advice.proposals import action_findings, missing_findings
 from hydroid.errors import SettingsError
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
@@ -18,19 +17,15 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.reporting import page_file
 from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
-from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
+from hydroid.reporting.page import Page, Plot, Section, Tab
 from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.predictions import prediction_sections
 from hydroid.reporting.quantities_report import quantity_section, speed_section
-from hydroid.reporting.suggestion_report import suggestion_sections
 from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.uncertainty_report import direction_section, unknown_section, warnings
 from hydroid.reporting.verdict_table import lead, verdict_section
 from hydroid.run.record import Record, load_record
 from hydroid.settings.fit import FitSettings
-
-_MOST_STEPS = 3
-"""things to do that a page names"""
 
 
 def draw(run: str | Path, without: Collection[str] = (), *, figures: bool = False) -> Path:
@@ -58,13 +53,10 @@ def fit_page(record: Record) -> Page:
     fits = {str(summary.final): judge(settings, result.fitted, result.baselines, unseen)}
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
     predictions = [replace(p, fit=str(summary.final)) for p in record.predictions]
-    logs = log_names([p.log for p in result.fitted])
-    advice = () if result.advice is None else suggestion_sections(settings, result.advice, logs)
     folded = (
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in result.fitted]),
         *_actuators(record),
-        *advice,
         *direction_section(summary),
         _search(record),
         Section("Reproduce", facts=(("command", _command(record)),)),
@@ -96,11 +88,8 @@ def _steps(record: Record) -> tuple[Finding, ...]:
     findings = list[Finding]()
     if record.settings.stage == "mech" or not record.validations:
         findings.append(next_step(record.settings, record.given, record.folder))
-    if record.result.advice is not None:
-        content = record.result.advice.content
-        findings += [f for f in missing_findings(content) if "command" in f.numbers]
-        findings += action_findings(content, record.settings)
-    return tuple(findings[:_MOST_STEPS])
+    command = {"command": f"hydroid suggest {record.given} --fit {shlex.quote(record.folder)}"}
+    return (*findings, Finding("look for terms", "note", (), command))
 
 
 def _actuators(record: Record) -> Iterator[Section]:

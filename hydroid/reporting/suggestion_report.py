@@ -3,17 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hydroid.advice.proposals import Advice, action_findings, missing_findings, residual_findings
+from hydroid.advice.suggestions import Advice, action_findings, missing_findings, residual_findings
 from hydroid.reporting.page import Page, Section
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.fit import FitSettings
-
-_VERDICTS = {
-    "free": "free it",
-    "untried": "others first",
-    "leave": "leave it: no gain",
-    "invisible": "the logs cannot tell it from the free parameters",
-}
 
 MOST_STEPS = 3
 """things to do that a page names first"""
@@ -25,30 +18,20 @@ def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], 
 
     `logs` are their names, and `source` names the estimate.
     """
-    missing = next(missing_findings(advice.content))
-    lead = f"At {source} the rms error is {advice.content['rms_deg']:.2g}°."
-    if missing.kind == "nothing missing":
-        lead, found = f"{lead} {missing}", []
-    else:
-        found = [missing]
-    steps = (*found, *action_findings(advice.content, settings))[:MOST_STEPS]
-    sections = suggestion_sections(settings, advice, logs)
-    sections = (Section("Do next", steps=steps), *sections) if steps else sections
-    return Page("suggestions", "What to change next", lead, sections)
-
-
-def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[str]) -> tuple[Section, ...]:
-    """Return the three sections; `logs` are their names."""
     content, checks, joints = advice.content, advice.residuals, settings.arm.joint_names
+    missing, *more = missing_findings(content)
+    lead = f"At {source} the rms error is {content['rms_deg']:.2g}°."
+    lacking = missing.kind != "nothing missing"
+    lead = lead if lacking else f"{lead} {missing}"
+    steps = (*([missing] if lacking else []), *action_findings(content, settings))[:MOST_STEPS]
     places = [f"{joints[check.joint - 1]} in {logs[check.log]}" for check in checks]
-    lacks = {"missing_terms": missing_table(content)} if content["missing"] else {}
     brings = {"next_actions": action_table(content)} if content["actions"] else {}
-    return (
+    sections = (
+        *([Section("Do next", steps=steps)] if steps else []),
         Section(
             "What the model lacks",
-            "" if lacks else "Every quantity that could be tested is free already.",
-            tuple(str(f) for f in missing_findings(content) if f.kind == "more terms missing"),
-            tables=lacks,
+            points=tuple(str(finding) for finding in more),
+            tables={"missing_terms": missing_table(content)},
         ),
         Section(
             "What the residual shows",
@@ -60,27 +43,34 @@ def suggestion_sections(settings: FitSettings, advice: Advice, logs: Sequence[st
             tables=brings,
         ),
     )
+    return Page("suggestions", "What to change next", lead, sections)
 
 
 def missing_table(content: Content) -> Table:
-    """Return one row per tested quantity."""
+    """Return one row per quantity that the model may lack, after the model without any of them."""
 
-    def row(test: Content) -> dict[str, Cell]:
-        seen = test["verdict"] != "invisible"
-        tried = seen and test["freed"] != test["held"]
+    def row(term: Content) -> dict[str, Cell]:
         return {
-            "quantity": test["name"],
-            "unit": test["unit"],
-            "held at": "no limit" if test["held"] is None else test["held"],
-            "freed": test["freed"] if tried else None,
-            "rms [deg]": test["rms_deg"] if tried else None,
-            "score": test["score"] if seen else None,
-            "verdict": _VERDICTS[test["verdict"]],
+            "quantity": term["name"],
+            "unit": term["unit"],
+            "held at": "no limit" if term["held"] is None else term["held"],
+            "score": term["score"],
+            "promised [%]": term["gain_percent"],
+            "freed": term.get("freed"),
+            "rms [deg]": term.get("rms_deg"),
+            "rms left out [deg]": term.get("left_out_deg"),
+            "verdict": "free it" if "command" in term else "leave it" if "freed" in term else "others first",
         }
 
-    rms = f"rms without any of them: {content['rms_deg']:.4g} deg."
-    note = f"{rms} score: the effect in the residual, in standard deviations."
-    return Table.of("Quantities that the fit holds", map(row, content["missing"]), note, ("unit", "score"))
+    none: dict[str, Cell] = dict.fromkeys(("unit", "held at", "score", "promised [%]", "freed"))
+    errors = {"rms [deg]": content["rms_deg"], "rms left out [deg]": content["left_out_deg"]}
+    rows = [{"quantity": "none of them", **none, **errors, "verdict": ""}, *map(row, content["terms"])]
+    note = (
+        f"Of {content['tested']} quantities that the fit holds. score: the effect in the residual, in "
+        "standard deviations. promised: part of the rms error that freeing it saves. left out: the error on "
+        "parts of the logs, each predicted by a fit without it."
+    )
+    return Table.of("Quantities that the fit holds", rows, note, ("unit", "score"))
 
 
 def action_table(content: Content) -> Table:
@@ -91,9 +81,6 @@ def action_table(content: Content) -> Table:
         "improves most": "parameter",
         "from ± [%]": "before_percent",
         "to ± [%]": "after_percent",
-        "quantity": "quantity",
-        "quantity from ± [%]": "quantity_before_percent",
-        "quantity to ± [%]": "quantity_after_percent",
     }
     rows = ({name: action[key] for name, key in columns.items()} for action in content["actions"])
     return Table.of("Predicted effect of each action on standard deviations", rows)

@@ -1,6 +1,5 @@
 """What logs determine at some parameters: the page of an analysis, and sections of a fit's."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,10 +8,10 @@ import numpy as np
 from hydroid.estimate import Covariance, FitSummary
 from hydroid.findings import Finding
 from hydroid.fitting.summary import account
-from hydroid.posterior.covariance import Uncertainty
 from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.profile import Profile
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.reporting.page import Page, Section
 from hydroid.reporting.parameters_report import parameter_section
@@ -29,7 +28,6 @@ class UncertaintyStudy:
         uncertainty: intervals there.
         identifiability: directions there.
         profiles: profile likelihoods, as far as they were asked for.
-        moved: the better optimum that all this is about, if a profile found one.
     """
 
     problem: Problem
@@ -37,27 +35,19 @@ class UncertaintyStudy:
     uncertainty: Uncertainty
     identifiability: Identifiability
     profiles: tuple[Profile, ...] = ()
-    moved: tuple[Finding, ...] = ()
 
     @cached_property
     def summary(self) -> FitSummary:
         """The parameters with their intervals, and the findings about them."""
         known = account(self.problem, self.uncertainty, self.identifiability)
-        found = (*self.moved, *_profile_findings(self.profiles), *known.findings)
+        better = tuple(profile.name for profile in self.profiles if profile.better_optimum)
+        found = (*([Finding("better optimum", "warning", better)] if better else []), *known.findings)
         return known.model_copy(update={"findings": found})
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Of the profiled parameters."""
         return {profile.name: profile.interval for profile in self.profiles}
-
-
-def _profile_findings(profiles: Sequence[Profile]) -> Iterator[Finding]:
-    if better := tuple(profile.name for profile in profiles if profile.better_optimum):
-        yield Finding("better optimum", "warning", better)
-    for one in profiles:
-        if one.bounded:
-            yield Finding("profile bounded", "note", one.bounded, {"profile": one.name})
 
 
 def uncertainty_page(study: UncertaintyStudy) -> Page:

@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from hydroid.advice.proposals import Advice
 from hydroid.errors import RunError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
@@ -57,7 +56,6 @@ class FitResult:
         segments: objectives of each estimate by segment, shape (S,).
         refinements: what each took.
         baselines: fitted to the same logs, by joint and name.
-        advice: None where the final estimate diverged.
     """
 
     fitted: tuple[Prediction, ...]
@@ -66,7 +64,6 @@ class FitResult:
     segments: Mapping[str, Array]
     refinements: tuple[Effort, ...]
     baselines: Baselines
-    advice: Advice | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +107,7 @@ class Record:
         return (*self.validations.values(), *self.result.fitted)
 
 
-def fit_result(
-    fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines, advice: Advice | None
-) -> FitResult:
+def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitResult:
     """Return what a run stores beside its summary."""
     theta, evaluation = fit.front
     return FitResult(
@@ -122,7 +117,6 @@ def fit_result(
         {name: estimate.segments for name, estimate in fit.estimates.items()},
         tuple(Effort(n, r.iterations, r.evaluations, r.ending.value) for n, r in fit.refinements.items()),
         baselines,
-        advice,
     )
 
 

@@ -135,7 +135,7 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     """
     room = at.room
     deviation = np.linalg.norm(np.linalg.inv(root), axis=1)
-    edge = room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
+    edge = held_by_bound(room, deviation)
     inner, at_edge = np.flatnonzero(~edge), np.flatnonzero(edge)
     directions = np.eye(len(root))[[*inner, *at_edge]]
     if len(inner):
@@ -144,6 +144,11 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
         follow = axes.T @ ((left.T @ root[:, at_edge]) / values[:, None])
         directions[len(inner) :, inner] = -follow.T
     return _fitted(directions, step / np.linalg.norm(root @ directions.T, axis=0), room)
+
+
+def held_by_bound(room: Array, deviation: Array) -> NDArray[np.bool_]:
+    """Whether coordinates are held by a bound, (p,), from the room to both, (2, p), and their deviations."""
+    return room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
 
 
 def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -16,7 +16,7 @@ What differs from a textbook:
 - Beside each step from a new Jacobian a second one is tried, corrected for the curvature of the residual
   along the first (geodesic acceleration, M. K. Transtrum and J. P. Sethna, 2012). It follows the curved
   valleys of problems whose parameters compensate each other.
-- A parameter without effect stays where it is: its column of J is zero, or rounding noise, see `derivatives`.
+- A parameter without effect stays where it is: its column of J is zero, or rounding noise (`derivatives`).
 - A candidate whose simulation fails is a step that does not help.
 """
 
@@ -26,9 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.search.axes import Function
-from hydroid.search.derivatives import derivatives
 from hydroid.search.descent import DAMPING, Descent, Ending, costs, no_jacobian, start
-from hydroid.search.linear_model import LinearModel
+from hydroid.search.linear_model import LinearModel, derivatives
 from hydroid.settings.search import RefinementSettings
 
 Float = NDArray[np.float64]
@@ -65,9 +64,15 @@ def step(now: Descent, residuals: Function, settings: RefinementSettings) -> Des
     """Return the descent after taking a Jacobian, or after trying a step. One that has ended stays."""
     if now.ended:
         return now
-    count = _Counter(residuals)
-    after = (_advance if len(now.jacobian) else _differentiate)(now, count, settings)
-    return replace(after, evaluations=now.evaluations + count.evaluations)
+    simulated = 0
+
+    def counted(points: Float) -> Float:
+        nonlocal simulated
+        simulated += len(points)
+        return residuals(points)
+
+    after = (_advance if len(now.jacobian) else _differentiate)(now, counted, settings)
+    return replace(after, evaluations=now.evaluations + simulated)
 
 
 def _differentiate(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
@@ -76,14 +81,14 @@ def _differentiate(now: Descent, residuals: Function, settings: RefinementSettin
     if not np.isfinite(columns).all():
         return replace(now, ending=Ending.JACOBIAN_FAILED)
     after = replace(now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations))
-    model = _model(after)
+    model = LinearModel(after.point, after.residual, after.jacobian)
     promises = model.gain(model.step(UNDAMPED)) > settings.gain_tolerance * now.cost
     return after if promises else replace(after, ending=Ending.GAIN)
 
 
-def _advance(now: Descent, residuals: "_Counter", settings: RefinementSettings) -> Descent:
+def _advance(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
     """Try a step, or two; take the better one if it helps."""
-    model = _model(now)
+    model = LinearModel(now.point, now.residual, now.jacobian)
     steps = [model.step(now.damping)]
     promised = model.gain(steps[0])
     if now.fresh and np.linalg.norm(steps[0]) > SHORTEST:
@@ -98,9 +103,13 @@ def _advance(now: Descent, residuals: "_Counter", settings: RefinementSettings) 
         return _damped(now, model, settings)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
-    if not after.ended and _update_pays(now, after, ratio, residuals.evaluations):
-        return replace(after, jacobian=_updated(now, after))
-    return after
+    if after.ended or not _update_pays(now, after, ratio):
+        return after
+    # Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step
+    move = after.point - now.point
+    scaled = np.sum(now.jacobian**2, axis=0) * move
+    unexplained = after.residual - now.residual - now.jacobian @ move
+    return replace(after, jacobian=now.jacobian + np.outer(unexplained / (scaled @ move), scaled))
 
 
 def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: RefinementSettings) -> Descent:
@@ -129,21 +138,13 @@ def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: Refin
     )
 
 
-def _update_pays(now: Descent, after: Descent, ratio: float, simulated: int) -> bool:
-    """Whether to update the Jacobian of a step that took so many simulations, not to take a new one."""
+def _update_pays(now: Descent, after: Descent, ratio: float) -> bool:
+    """Whether to update the Jacobian after a step, which took one simulation, not to take a new one."""
     if now.fresh:
         return ratio > TRUSTED
     cost, evaluations = now.cycle
-    spent = now.evaluations + simulated - evaluations
-    return bool(np.log(now.cost / after.cost) / simulated >= np.log(cost / after.cost) / spent)
-
-
-def _updated(now: Descent, after: Descent) -> Float:
-    """Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step."""
-    move = after.point - now.point
-    scaled = np.sum(now.jacobian**2, axis=0) * move
-    unexplained = after.residual - now.residual - now.jacobian @ move
-    return now.jacobian + np.outer(unexplained / (scaled @ move), scaled)
+    spent = now.evaluations + 1 - evaluations
+    return bool(np.log(now.cost / after.cost) >= np.log(cost / after.cost) / spent)
 
 
 def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> Descent:
@@ -171,18 +172,3 @@ def _corrected(model: LinearModel, s: Float, damping: float, residuals: Function
         return []
     corrected = model.step(damping, model.residual + 0.5 * curvature)
     return [corrected] if model.length(corrected - s) < CURVED * model.length(s) else []
-
-
-def _model(now: Descent) -> LinearModel:
-    return LinearModel(now.point, now.residual, now.jacobian)
-
-
-class _Counter:
-    """Function whose candidates are counted."""
-
-    def __init__(self, residuals: Function) -> None:
-        self._residuals, self.evaluations = residuals, 0
-
-    def __call__(self, points: Float) -> Float:
-        self.evaluations += len(points)
-        return self._residuals(points)

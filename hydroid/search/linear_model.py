@@ -1,11 +1,19 @@
-"""The linear model of a residual, and its minimum inside the unit box."""
+"""The linear model of a residual in the unit box: its derivatives, and its minimum."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from hydroid.search.axes import Function
+
 Float = NDArray[np.float64]
 
+WIDTH = 2.0**-26
+"""of the differences: the root of the rounding unit"""
+WIDER = 2.0**10
+"""how much wider the step is that tells a weak effect from rounding noise"""
+SUSPECT = 1e-3
+"""a column this much shorter than the longest one may be noise, and is taken twice"""
 TOLERANCE = 1e-12
 """of the box-constrained minimum: slope, in units of a column and the residual, that is only rounding"""
 
@@ -60,3 +68,30 @@ class LinearModel:
     def length(self, s: Float) -> float:
         """Length of a step, scaled."""
         return float(np.linalg.norm(self._scale * s))
+
+
+def derivatives(residuals: Function, point: Float, row: Float) -> Float:
+    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,): shape (p, R).
+
+    They are 0 without effect. All differences are one batch. Those that fail are taken to the other side in
+    a second batch; where that fails too, they are not finite.
+    """
+
+    def quotients(which: NDArray[np.intp], width: float) -> Float:
+        steps = np.where(point + abs(width) <= 1.0, width, -width)[which]
+        points = np.tile(point, (len(which), 1))
+        points[np.arange(len(which)), which] += steps
+        with np.errstate(invalid="ignore", over="ignore"):
+            return (residuals(np.clip(points, 0.0, 1.0)) - row) / steps[:, None]
+
+    columns = quotients(np.arange(point.size), WIDTH)
+    failed = np.flatnonzero(~np.isfinite(columns).all(axis=1))
+    if len(failed):
+        columns[failed] = quotients(failed, -WIDTH)
+    length = np.linalg.norm(columns, axis=1)
+    suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
+    if len(suspect):
+        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
+        wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
+        columns[suspect[wider < 0.1 * length[suspect]]] = 0.0
+    return columns

@@ -5,12 +5,12 @@ import pytest
 from conftest import TRUTH
 
 from hydroid import load_settings
-from hydroid.advice.commands import violation
 from hydroid.advice.design import Design, design
+from hydroid.advice.experiment import violation
 from hydroid.advice.information import forecast, measured, sensor_noise
 from hydroid.arm.model import load_machine
 from hydroid.errors import SettingsError
-from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.design_report import design_table

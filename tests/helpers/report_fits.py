@@ -12,11 +12,11 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
-from hydroid.posterior.covariance import Uncertainty, uncertainty_from
 from hydroid.posterior.directions import identifiability
-from hydroid.posterior.jacobian import Jacobian, estimate_box
+from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import channel_noise
 from hydroid.posterior.quantities import Quantities
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
 from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
@@ -156,7 +156,7 @@ def make_quantities(problem: Problem) -> Quantities:
             interval=((None, None), (-13.0, -11.0), (11.0, 13.0), (None, None)),
             **one,
         )
-    return Quantities(scalars, curves, {})
+    return Quantities(scalars, curves)
 
 
 def make_record(
@@ -166,7 +166,7 @@ def make_record(
     logs = {log.source: "f" * 64 for log in problem.logs}
     identity = {"hydroid": "0", "mujoco": "4", "logs": logs}
     predictions, baselines = fitted(problem, fit), baselines_of(problem.settings, problem.logs)
-    result = fit_result(fit, predictions, baselines, None)
+    result = fit_result(fit, predictions, baselines)
     return Record(folder, identity, problem.settings, summarise(problem, fit), result, unseen or {})
 
 
@@ -187,15 +187,15 @@ def make_uncertainty(
     size = np.array(effects) if effects else np.linspace(1e-3, 2e-3, len(theta))
     waves = np.linalg.qr(rng.normal(size=(len(problem.measured), len(theta))))[0].T
     slopes = 100 * size[:, None] * waves * np.sqrt(len(problem.measured))
-    slopes[~problem.parameters.free] = np.nan
+    free = problem.parameters.free
     residual = rng.normal(0, np.deg2rad(0.1), len(problem.measured))
-    at = Jacobian(
+    at = Linear(
+        estimate_box(problem.parameters, theta),
         residual,
-        slopes,
-        np.zeros((len(theta), 0)),
-        estimate_box(problem.parameters, theta).scale,
-        np.zeros(len(theta)),
+        np.nan_to_num(slopes[free]),
+        np.zeros((free.sum(), 0)),
         prior_weight=float(np.deg2rad(0.1)),
+        diverging=np.isnan(slopes[free]).any(axis=1),
     )
     noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
-    return uncertainty_from(problem, theta, at, noise)
+    return uncertainty_from(problem, at, noise)

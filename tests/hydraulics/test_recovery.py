@@ -10,7 +10,7 @@ import pytest
 from recovery import duties, settings_of
 
 from hydroid.log import Log
-from hydroid.posterior.covariance import Uncertainty, uncertainty
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from hydroid.fitting.findings import log_findings
 from hydroid.posterior.by_log import by_log
-from hydroid.posterior.covariance import uncertainty
+from hydroid.posterior.uncertainty import uncertainty
 
 LEVEL = 0.5 * DEG
 

@@ -10,7 +10,7 @@ from hydroid import load_settings
 from hydroid.log import Log
 from hydroid.posterior.open_start import sensor_noise, start_deviations, with_open_start
 from hydroid.prediction import simulate_log
-from hydroid.problem.free_start import StartSlopes, start_slopes
+from hydroid.problem.free_start import StartSlopes
 from hydroid.problem.problem import Problem
 
 NOISE = np.radians(0.1)
@@ -69,10 +69,3 @@ def test_an_open_start_whitens_the_residuals_for_a_random_start():
     StartSlopes(0, slice(5, 35), (2, 3), slopes).opened(weights)(closed)
     values, axes = np.linalg.eigh(np.eye(40) + effect.T @ effect)
     np.testing.assert_allclose(closed, rows @ (axes / np.sqrt(values)) @ axes.T, atol=1e-12)
-
-
-def test_joints_that_follow_the_log_have_no_start_of_their_own():
-    settings = load_settings("article-mech", {"free_start": True, "simulation.other_joints": "measured"})
-    problem = Problem(settings, [noisy_log()])
-    (slopes,) = start_slopes(problem, problem.parameters.start)
-    assert slopes.joints == (2,)

@@ -74,13 +74,6 @@ def test_a_quantity_that_no_free_parameter_changes_is_given():
     np.testing.assert_allclose(concerned.interval[1], found.interval[1])
 
 
-def test_a_quantity_that_does_not_exist_leaves_the_others_alone():
-    found = known().propagate(lambda theta: np.stack([theta[:, 0], np.full(len(theta), np.nan)], 1), True)
-    assert np.isfinite(found.interval[0]).all()
-    assert np.isnan(found.value[1])
-    assert not np.isfinite(found.interval[1]).any()
-
-
 @pytest.mark.parametrize(("lower", "upper"), [(1.0, 10.0), (0.1, 1.0)])
 def test_a_derivative_at_a_bound_looks_inwards(lower: float, upper: float):
     inside = known(lower=lower, upper=upper)

@@ -1,6 +1,5 @@
-"""Sensitivities and error surfaces, held to laws."""
+"""Sensitivities, held to laws."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +7,8 @@ import pytest
 from conftest import TRUTH
 
 from hydroid import load_settings
-from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.posterior.sweep import Sweep, surface, sweep
+from hydroid.posterior.sweep import Sweep, sweep
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting.analysis_report import analysis_page
@@ -67,28 +65,3 @@ def test_sensitivity_of_free_parameters_is_written_in_the_readers_units(study_lo
     (tab,) = page.sections[0].tabs
     (panel,) = tab.plots[0].draw().panels
     assert [mark.label.partition(" ")[0] for mark in panel.marks] == sorted(rms, key=lambda name: -rms[name])
-
-
-def test_the_surface_of_noise_free_data_is_lowest_at_the_truth(problem: Problem):
-    result = surface(problem, THETA, ("K", "D"), 5, 0.2)
-    assert result.lowest == pytest.approx((0.2, 231.8, 0.0), abs=1e-9)
-    assert result.estimate_error == pytest.approx(0.0, abs=1e-9)
-    # each point is the objective there, whatever batch it was in
-    theta = THETA.copy()
-    theta[0], theta[1] = result.values[0][0], result.values[1][3]
-    assert result.error[0, 3] == problem.evaluate(theta[None]).overall[0]
-    error = result.error.copy()
-    error[0, 0] = np.inf  # infeasible points are not the lowest
-    assert np.isfinite(replace(result, error=error).lowest[2])
-
-
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [(("K", "X"), "no parameter 'X'"), (("K", "K"), "stands there twice"), (("K", "M2"), "M2 has no range")],
-)
-def test_a_surface_that_cannot_be_drawn_is_refused(study_log: Log, names: tuple[str, str], message: str):
-    problem = make_problem(
-        study_log, **{"parameters.M2": {"quantity": "mass", "link": "link2", "fixed": 5.1}}
-    )
-    with pytest.raises(SettingsError, match=message):
-        surface(problem, THETA, names, 3, None)

@@ -1,12 +1,11 @@
 """What suggestions propose: findings that change something, and commands that can be pasted."""
 
 import pytest
-import yaml
 from report_fits import make_problem
 
 from hydroid import load_settings
-from hydroid.advice.missing import TermTest, Verdict
-from hydroid.advice.proposals import action_findings, freeing_command, setting_line
+from hydroid.advice.growth import Candidate
+from hydroid.advice.suggestions import action_findings, freeing_command, proposed
 from hydroid.advice.terms import Term
 from hydroid.settings.load import parse_override
 
@@ -16,7 +15,6 @@ from hydroid.settings.load import parse_override
 )
 def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str):
     action = {"action": "state", "of": "D", "parameter": "C", "before_percent": 15.0, "after_percent": after}
-    action |= {"quantity": None, "quantity_before_percent": None, "quantity_after_percent": None}
     found = action_findings({"actions": [action]}, make_problem().settings)
     assert " ".join(finding.hint for finding in found) == expected
 
@@ -24,11 +22,12 @@ def test_an_action_that_changes_nothing_is_not_shown(after: float, expected: str
 def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1():
     held = load_settings("fit-hyd").parameters["M3"]
     free = held.model_copy(update={"fixed": None, "bounds": (5.0, 80.0)})
-    test = TermTest(Term("M3", free, 21.17, named=True), Verdict.FREE, 9.0, 0.0, 0.001, 25.0)
-    assert setting_line(test).endswith("start: 21.17}")
-    command = freeing_command(make_problem(("a b.csv",)), test, "runs/my fit")
+    term = Term("M3", {"M3": free}, 21.17, (("mass", "link3"),))
+    entries = proposed(Candidate(term, 25.0, 9.0, 0.0, 0.1), 25.0)
+    assert entries["M3"]["start"] == 21.17
+    command = freeing_command(make_problem(("a b.csv",)), entries, "runs/my fit")
     assert "'a b.csv' --config 'runs/my fit/config.yaml' --start 'runs/my fit' --set 'param" in command
     assert command.endswith(" --out 'runs/my fit-M3'")
     key, value = parse_override(command.split("--set '")[1].split("'")[0])
-    assert (key, value) == ("parameters.M3", yaml.safe_load(setting_line(test))["M3"])
+    assert (key, value) == ("parameters.M3", entries["M3"])
     assert load_settings("fit-hyd", {key: value}).parameters["M3"].states_start

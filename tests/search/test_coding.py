@@ -51,10 +51,3 @@ def test_a_bit_flip_changes_one_bit_of_every_element():
     counts = flips.sum(axis=0)
     expected = len(flips) / 16
     assert ((counts - expected) ** 2 / expected).sum() < 15 + 5 * np.sqrt(30)
-
-
-def test_an_integer_is_redrawn_over_its_whole_range():
-    drawn = IntegerCoding(1).altered(np.zeros((20_000, 1), dtype=np.uint16), np.random.default_rng(0))
-    assert drawn.dtype == np.uint16
-    assert drawn.min() < 20
-    assert drawn.max() > 65_515

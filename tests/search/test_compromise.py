@@ -22,13 +22,6 @@ def test_utopia_is_the_nearest_in_terms_of_the_ranges():
     assert utopia(POINTS, OBJECTIVES).tolist() == POINTS[1].tolist()
 
 
-@given(seed=st.integers(0, 2**32), scale=st.lists(st.floats(0.01, 100), min_size=3, max_size=3))
-def test_utopia_does_not_depend_on_the_units(seed, scale):
-    rng = np.random.default_rng(seed)
-    points, objectives = rng.random((12, 2)), rng.random((12, 3))
-    assert (utopia(points, objectives) == utopia(points, objectives * scale)).all()
-
-
 def test_utopia_leaves_out_an_objective_without_range():
     flat = np.hstack((OBJECTIVES, np.full((4, 1), 7.0)))
     assert utopia(POINTS, flat).tolist() == utopia(POINTS, OBJECTIVES).tolist()

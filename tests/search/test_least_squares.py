@@ -96,27 +96,6 @@ def test_a_parameter_without_effect_changes_nothing_for_the_others():
     assert joined.evaluations - alone.evaluations <= joined.iterations + 1  # one more a Jacobian
 
 
-@pytest.mark.parametrize("rank", [1, 2, 3])
-def test_a_rank_deficient_problem_is_fitted_as_well_as_it_can_be(rank):
-    singular = np.array([1.0, 0.3, 0.1, 0.03])
-    singular[rank:] = 0
-    residuals, _ = linear(singular, np.full(4, 0.45))
-    result = least_squares(np.array([0.2, 0.6, 0.5, 0.3]), residuals, SETTINGS)
-    assert result.cost < 1e-18 * result.cost_before
-    assert result.converged
-
-
-def test_with_noise_it_ends_at_the_least_squares_solution_without_trying_forever():
-    offset = np.random.default_rng(1).normal(0, 1e-2, 400)
-    truth = np.array([0.4, 0.5, 0.6])
-    residuals, matrix = linear([5.0, 1.0, 0.2], truth, offset=offset)
-    result = least_squares(np.full(3, 0.2), residuals, SETTINGS)
-    exact = truth - np.linalg.lstsq(matrix, offset, rcond=None)[0]
-    np.testing.assert_allclose(result.point, exact, atol=1e-7)
-    assert result.converged
-    assert result.evaluations < 60
-
-
 @settings(deadline=None, max_examples=40)  # the first refinement of a process is slow
 @given(seed=st.integers(0, 2**32), failing=st.floats(0, 1))
 def test_never_worse_than_the_start_and_always_inside(seed, failing):
@@ -152,14 +131,6 @@ def fails_where(condition, residuals):
         return rows
 
     return failing
-
-
-def test_a_failing_forward_step_is_taken_backwards():
-    truth = np.array([0.2, 0.3])
-    residuals, _ = linear([1.0, 0.4], truth)
-    start = np.array([0.45, 0.3])
-    result = least_squares(start, fails_where(lambda x: x[:, 0] > 0.45, residuals), SETTINGS)
-    np.testing.assert_allclose(result.point, truth, atol=1e-9)
 
 
 def test_a_state_that_was_stored_goes_on_to_the_same_bits():

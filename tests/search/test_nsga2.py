@@ -41,19 +41,6 @@ def test_reaches_what_pymoo_reaches_with_the_same_budget(name, size, reference):
     assert np.median(ours) > 0.93 * np.median(theirs)  # theirs crosses real numbers, ours strings of bits
 
 
-def test_survivors_are_never_dominated_by_the_dropped():
-    search = Nsga2(GeneticSettings(population=12), 3)
-    rng = np.random.default_rng(0)
-    parents = advance(search, two_goals, None, rng, 0)
-    offspring = evaluate(search, search.ask(parents, rng), two_goals)
-    everyone = parents.join(offspring).objectives
-    kept = search.tell(parents, offspring).objectives
-    dropped = [row for row in everyone.tolist() if row not in kept.tolist()]
-    assert dropped
-    for row in np.array(dropped):
-        assert not ((row <= kept).all(axis=1) & (row < kept).any(axis=1)).any()
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_there(bad):
     search = Nsga2(GeneticSettings(population=20), 2)

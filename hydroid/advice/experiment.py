@@ -1,9 +1,8 @@
-"""Experiments: a start pose and pseudo-random commands, drawn, changed at random, kept within the limits.
+"""Experiments: a start pose and pseudo-random commands, drawn and changed at random, kept within the limits.
 
 A command is a sequence of levels, each held for a random time, as in the article's figure 17.
 """
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -19,14 +18,12 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
-Ints = NDArray[np.int64]
-
 
 @dataclass(frozen=True, eq=False)
 class Input:
     """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
 
-    start: Ints
+    start: NDArray[np.int64]
     level: Array
 
 
@@ -46,23 +43,22 @@ class Experiment:
             held = np.diff(np.append(signal.start, samples))
             command[signal.start[0] :, joint] = np.repeat(signal.level, held)
             if slew is not None:
-                command[:, joint] = limited(command[:, joint], signal.start, slew * period)
+                command[:, joint] = limited(command[:, joint], slew * period)
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
-    def with_input(self, joint: int, signal: Input) -> "Experiment":
-        """Return the experiment with another input of one joint."""
-        return replace(self, inputs={**self.inputs, joint: signal})
+    def with_level(self, joint: int, place: slice | int, level: Array | float) -> "Experiment":
+        """Return the experiment with other levels of one joint, rounded to 0.1 %."""
+        levels = self.inputs[joint].level.copy()
+        levels[place] = np.round(level, 1)
+        return replace(self, inputs={**self.inputs, joint: replace(self.inputs[joint], level=levels)})
 
 
-def limited(command: Array, start: Ints, step: float) -> Array:
-    """Return a command [%], shape (T,), that is constant between `start`s, with at most `step` per sample."""
-    slow, value = command.copy(), 0.0
-    for first, end in zip(start, np.append(start[1:], len(command)), strict=True):
-        way = command[first] - value
-        ramp = np.minimum(step * np.arange(1, end - first + 1), abs(way))
-        slow[first:end] = value + np.sign(way) * ramp
-        value = slow[end - 1]
+def limited(command: Array, step: float) -> Array:
+    """Return a command [%], shape (T,), that follows another with at most `step` per sample."""
+    slow, value = np.empty_like(command), 0.0
+    for i, wanted in enumerate(command.tolist()):
+        slow[i] = value = min(max(wanted, value - step), value + step)
     return slow
 
 
@@ -79,14 +75,14 @@ class RandomExperiments:
     """
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:
-        limits, arm = settings.design, settings.arm
+        limits, arm, period = settings.design, settings.arm, settings.log.period_s
         self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
         self._joints, self._poses = _driven_joints(settings), _start_poses(settings)
-        ranges = np.radians([joint.range for joint in arm.joints])
-        inward = np.minimum(np.radians(limits.margin_deg), 0.5 * np.ptp(ranges, axis=1))
-        self._lower, self._upper = ranges[:, 0] + inward, ranges[:, 1] - inward
-        self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / settings.log.period_s)
-        self._dwell = tuple(max(1, round(t / settings.log.period_s)) for t in limits.dwell_s)
+        lower, upper = np.radians([joint.range for joint in arm.joints]).T
+        inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
+        self._lower, self._upper = lower + inward, upper - inward
+        self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / period)
+        self._dwell = tuple(max(1, round(t / period)) for t in limits.dwell_s)
 
     def draw(self) -> Experiment:
         """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
@@ -95,54 +91,34 @@ class RandomExperiments:
         return Experiment(self._pose(), {int(j): self._input() for j in driven})
 
     def change(self, experiment: Experiment) -> Experiment:
-        """Change an experiment in one to three places."""
-        for _ in range(int(self._rng.integers(1, 4))):
-            kind = self._rng.random()
+        """Change an experiment in one to three places: its pose, a joint's input, or some levels of it."""
+        rng = self._rng
+        for _ in range(int(rng.integers(1, 4))):
+            kind, joint = rng.random(), int(rng.choice(self._joints))
             if kind < 0.1:
                 experiment = replace(experiment, pose=self._moved(experiment.pose))
+            elif kind < 0.25 or joint not in experiment.inputs:
+                experiment = replace(experiment, inputs={**experiment.inputs, joint: self._input()})
             else:
-                joint = int(self._rng.choice(self._joints))
-                old = experiment.inputs.get(joint)
-                new = self._input() if old is None or kind < 0.15 else self._changed(old)
-                experiment = experiment.with_input(joint, new)
+                level = experiment.inputs[joint].level
+                first = int(rng.integers(len(level)))
+                place = slice(first, first + 1 + int(rng.integers(4)))
+                near = np.clip(level[place] + rng.normal(0.0, 0.25 * self._limit), -self._limit, self._limit)
+                far = self._levels(len(near))
+                experiment = experiment.with_level(joint, place, near if kind < 0.5 else far)
         return experiment
 
     def _input(self) -> Input:
+        shortest, longest = self._dwell
         starts = [self._rest]
-        while (begin := starts[-1] + int(self._rng.integers(self._dwell[0], self._dwell[1] + 1))) < (
-            self._samples - self._dwell[0]
-        ):
+        while (
+            begin := starts[-1] + int(self._rng.integers(shortest, longest + 1))
+        ) < self._samples - shortest:
             starts.append(begin)
         return Input(np.array(starts), self._levels(len(starts)))
 
     def _levels(self, count: int) -> Array:
         return np.round(self._rng.uniform(-self._limit, self._limit, count), 1)
-
-    def _changed(self, old: Input) -> Input:
-        """Redraw or move one level, move one switching time, or redraw up to four levels in a row."""
-        rng, count, limit = self._rng, len(old.level), self._limit
-        at, kind = int(rng.integers(count)), int(rng.integers(4))
-        level = old.level.copy()
-        if kind == 0:
-            level[at] = self._levels(1)[0]
-        elif kind == 1:
-            level[at] = np.clip(level[at] + rng.normal(0.0, 0.25 * limit), -limit, limit).round(1)
-        elif kind == 2 and at > 0:
-            return replace(old, start=self._shifted(old.start, at))
-        else:
-            end = min(count, at + 1 + int(rng.integers(4)))
-            level[at:end] = self._levels(end - at)
-        return replace(old, level=level)
-
-    def _shifted(self, start: Ints, at: int) -> Ints:
-        """Switching times with one moved between its neighbours, each level held for an allowed time."""
-        shortest, longest = self._dwell
-        before, after = int(start[at - 1]), int(np.append(start, self._samples)[at + 1])
-        low, high = max(before + shortest, after - longest), min(after - shortest, before + longest)
-        moved = start.copy()
-        if low <= high:
-            moved[at] = self._rng.integers(low, high + 1)
-        return moved
 
     def _pose(self) -> Array:
         if self._any_pose and (not len(self._poses) or self._rng.random() < 0.75):
@@ -206,21 +182,15 @@ def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> 
     return Violation(sample, joint, not out[sample, joint])
 
 
-def repaired(experiment: Experiment, first: Violation, changes: Counter[tuple[int, int]]) -> Experiment:
-    """Change the level before a violation, or an earlier one where all factors of it have been tried."""
+def repaired(experiment: Experiment, first: Violation) -> Experiment:
+    """Reduce the last level before a violation; turn it round where it leads out of a range."""
     signal = experiment.inputs.get(first.joint)
     if signal is not None:
-        # tried in turn on a level that makes a joint too fast, or leads out of its range
-        factors = (0.7, 0.5, 0.35, 0.2, 0.0) if first.fast else (-1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
-        last = int(np.searchsorted(signal.start, first.sample - 1, side="right")) - 1
-        for segment in range(last, -1, -1):
-            tries = changes[first.joint, segment]
-            if signal.level[segment] != 0.0 and tries < len(factors):
-                # factors are of the level as drawn: undo the one before
-                factor = factors[tries] / (factors[tries - 1] if tries else 1.0)
-                changes[first.joint, segment] += 1
-                level = signal.level.copy()
-                level[segment] = round(factor * level[segment], 1)
-                return experiment.with_input(first.joint, replace(signal, level=level))
-    inputs = {j: replace(one, level=np.round(0.7 * one.level, 1)) for j, one in experiment.inputs.items()}
-    return replace(experiment, inputs=inputs)
+        left = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
+        if len(left):
+            level = (0.7 if first.fast else -0.7) * signal.level[left[-1]]
+            # below 10 % an earlier level is to blame
+            return experiment.with_level(first.joint, int(left[-1]), level if abs(level) > 10.0 else 0.0)
+    for joint, one in experiment.inputs.items():
+        experiment = experiment.with_level(joint, slice(None), 0.7 * one.level)
+    return experiment

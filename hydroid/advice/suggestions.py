@@ -1,0 +1,148 @@
+"""What `hydroid suggest` says: as JSON has it, as findings, and the command that frees a term."""
+
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from hydroid.advice.actions import STATED_SD, next_actions
+from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, score_terms
+from hydroid.advice.residuals import UNITS, ResidualCheck, residual_checks
+from hydroid.estimate import finite
+from hydroid.findings import Finding
+from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.problem.problem import Problem
+from hydroid.progress import Progress, no_progress
+from hydroid.quantity_table import MECHANICAL
+from hydroid.settings.fit import FitSettings
+
+MOST_TRIED = 4
+"""terms that are really freed, the most promising first"""
+
+Content = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """Suggestions as JSON has them (docs/json.md), and the eight residuals with the largest errors."""
+
+    content: Content
+    residuals: tuple[ResidualCheck, ...]
+
+
+def advice(
+    problem: Problem, known: Uncertainty, run: str = "RUN", progress: Progress = no_progress
+) -> Advice:
+    """Return the suggestions about an estimate with its uncertainty; `run` is its folder in commands."""
+    tests, weight = score_terms(problem, known, progress), known.linear.prior_weight
+    best, checks = promising(tests), residual_checks(problem, known)
+    without = refitted(problem, known.theta, weight)
+    rows: list[dict[str, Any]] = []
+    for i, one in enumerate(best):
+        row = {
+            "name": one.term.name,
+            "unit": one.term.entries[one.term.name].unit,
+            "held": finite(one.term.value),
+            "score": one.score,
+            "chance": one.chance,
+            "gain_percent": 100 * one.gain,
+        }
+        if i < MOST_TRIED:
+            progress(f"freeing {one.term.name}", i, min(MOST_TRIED, len(best)))
+            more = one.problem(problem)
+            freed = refitted(more, one.theta(problem, known.theta), weight)
+            value = more.parameters.mapping(freed.theta)[one.term.name]
+            row |= {"freed": value, "rms_deg": finite(math.degrees(freed.rms))}
+            row |= {"left_out_deg": finite(math.degrees(freed.left_out))}
+            if freed.left_out < (1 - MIN_GAIN) * without.left_out:
+                entries = proposed(one, value)
+                row |= {"parameters": entries, "command": freeing_command(problem, entries, run)}
+        rows.append(row)
+    rows.sort(key=lambda row: ("command" not in row, row.get("left_out_deg") or math.inf))
+    content = {
+        "rms_deg": math.degrees(without.rms),
+        "left_out_deg": math.degrees(without.left_out),
+        "tested": len(tests),
+        "terms": rows,
+        "residuals": [
+            {
+                "log": check.log,
+                "joint": check.joint,
+                "rms_deg": check.rms,
+                "correlation_s": check.correlation_s,
+                "depends_on": [one.regressor for one in check.depends],
+            }
+            for check in checks
+        ],
+        "actions": next_actions(problem, known),
+    }
+    return Advice(content, tuple(sorted(checks, key=lambda check: -check.rms)[:8]))
+
+
+def proposed(one: Candidate, value: float) -> dict[str, dict[str, Any]]:
+    """Return the entries of `parameters` that free a term, by name.
+
+    Its bounds are a fifth and five times the value that was found, with the present value inside. Stage 2
+    asks for a start of every mechanical parameter that no run of stage 1 gives.
+    """
+    (low, high), term = one.term.span, one.term
+    held = value if math.isinf(term.value) else term.value
+    least = max(min(value / 5.0, held) if low else low, low)
+    bounds = [float(f"{end:.2g}") for end in (least, min(max(5.0 * value, held), high))]
+    entries = {n: p.model_dump(mode="json", exclude_defaults=True) for n, p in term.entries.items()}
+    entries[term.name]["bounds"] = bounds
+    if term.entries[term.name].quantity in MECHANICAL:
+        entries[term.name]["start"] = min(max(held, bounds[0]), bounds[1])
+    return entries
+
+
+def freeing_command(problem: Problem, entries: Mapping[str, Any], run: str) -> str:
+    """Return the command that fits the same logs again from a run's estimate, with a term freed."""
+    given = " ".join(shlex.quote(log.source) for log in problem.logs)
+    changes = ""
+    for name, entry in entries.items():
+        line = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=math.inf).strip()
+        changes += f"--set {shlex.quote(f'parameters.{name}={line}')} "
+    config, own, out = (shlex.quote(path) for path in (f"{run}/config.yaml", run, f"{run}-{[*entries][-1]}"))
+    stage = problem.settings.stage
+    return f"hydroid fit-{stage} {given} --config {config} --start {own} {changes}--out {out}"
+
+
+def missing_findings(content: Content) -> Iterator[Finding]:
+    """Yield what the model lacks: the term to free, with its command."""
+    free = [row for row in content["terms"] if "command" in row]
+    numbers = {"error": content["left_out_deg"], "count": str(content["tested"])}
+    if not free:
+        yield Finding("nothing missing", "note", (), numbers)
+        return
+    freed = {"freed": free[0]["left_out_deg"], "command": free[0]["command"]}
+    yield Finding("term missing", "warning", (free[0]["name"],), numbers | freed)
+    if others := tuple(row["name"] for row in free[1:]):
+        yield Finding("more terms missing", "note", others)
+
+
+def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding]:
+    """Yield what each action would bring, the best first; one that changes nothing visible is left out."""
+    for action in content["actions"]:
+        kind, of = action["action"], str(action["of"])
+        before, after = (f"{action[f'{when}_percent']:.2g}" for when in ("before", "after"))
+        if before != after:
+            sd = 100 * STATED_SD.get(kind, 0.0)
+            numbers = {"what": action["parameter"], "before": before, "after": after, "sd": sd}
+            link = settings.parameters[of].link if kind == "weigh" else None
+            yield Finding(kind, "note", (link or of,), numbers)
+
+
+def residual_findings(checks: Sequence[ResidualCheck], places: Sequence[str]) -> Iterator[Finding]:
+    """Yield what each residual shows; `places` names joint and log of each."""
+    for check, place in zip(checks, places, strict=True):
+        for one in check.depends:
+            low, high = (f"{end:.3g}".replace("-", "−") for end in (one.low, one.high))
+            numbers = {"error": abs(one.mean), "side": "larger" if one.mean > 0 else "smaller"}
+            numbers |= {"unit": UNITS[one.regressor], "low": low, "high": high}
+            yield Finding("residual depends", "note", (place, one.regressor), numbers)
+        if check.correlation_s > 0.1:  # no sensor of an angle is that slow
+            yield Finding("residual correlated", "note", (place,), {"seconds": check.correlation_s})

@@ -175,7 +175,7 @@ class Runs:
         return log.time, np.degrees(log.angle[:, self.problem.outputs[0]])
 
     def surface(self, figure: Figure) -> tuple[list[Parameter], list[Array], Array]:
-        """Return the two parameters of a figure, their values, shapes (n,), and the error [rad], shape (n, n).
+        """Return the two parameters of a figure, their values, (n,), and the error [rad], (n, n).
 
         All other parameters are at the truth. Wide bounds have equal ratios between values.
         """

@@ -19,32 +19,26 @@ THRESHOLD = float(chi2.ppf(COVERAGE, 1))
 """deviance beyond which a value lies outside the interval"""
 STEPS = 6
 """points on each side before the steps grow: they reach three standard deviations, or the bound"""
-Points = list[tuple[float, Array]]
-"""deviances, and all parameters there, shape (P,)"""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Profile:
-    """Deviance of a parameter held at several values, the others fitted again.
+    """What a profile of a parameter shows.
 
     Attributes:
         name: of the parameter.
-        values: it was held at, increasing, the estimate among them, shape (n,); they end beyond the interval.
-        deviance: rise of the cost in units of the noise, (n,): about ((value - estimate) / sd)² near it.
         interval: where the deviance is below THRESHOLD; infinite on a side where it never exceeds it.
-        lowest: all parameters at the point of the lowest deviance, shape (P,).
+        lowest: least deviance of all points; clearly below 0 the estimate is no optimum.
     """
 
     name: str
-    values: Array
-    deviance: Array
     interval: tuple[float, float]
-    lowest: Array
+    lowest: float
 
     @property
     def better_optimum(self) -> bool:
-        """Whether a point fits better than the estimate, which then is no optimum, by more than rounding."""
-        return bool(self.deviance.min() < -0.1)
+        """Whether a point fits better than the estimate, by more than rounding."""
+        return self.lowest < -0.1
 
 
 def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
@@ -70,39 +64,27 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     units = linear.spread(uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1))
     unit = units[i] if linear.box.varied[i] else np.nanmax(units)
 
-    def point(start: Array, value: float) -> tuple[float, Array]:
-        best, square = _fit_others(parameters, residuals, start, i, value)
-        return (square - cost) / unit, best
-
     deviation = float(uncertainty.standard_deviation[i])
     reach = np.inf if np.isnan(deviation) else 3.0 * deviation  # NaN: it lies at a bound
-    below, above = (
-        _side(point, theta, i, float(ends[i]), reach) for ends in (parameters.lower, parameters.upper)
-    )
-    points = [*reversed(below), (0.0, theta), *above]
-    deviance, rows = np.array([d for d, _ in points]), np.array([t for _, t in points])
-    centre, values = len(below), rows[:, i]
-    left = _crossing(values[centre::-1], deviance[centre::-1], -np.inf)
-    interval = left, _crossing(values[centre:], deviance[centre:], np.inf)
-    return Profile(name, values, deviance, interval, rows[int(np.argmin(deviance))])
-
-
-def _side(
-    point: Callable[[Array, float], tuple[float, Array]], theta: Array, i: int, bound: float, reach: float
-) -> Points:
-    """Deviances and refitted parameters at values ever further from the estimate.
-
-    The walk ends beyond THRESHOLD or at the bound, or after twelve points.
-    """
-    points, value = list[tuple[float, Array]](), float(theta[i])
-    length = (float(np.clip(bound, value - reach, value + reach)) - value) / STEPS
-    while value != bound and len(points) < 2 * STEPS and not (points and points[-1][0] > THRESHOLD):
-        length *= 1.5 if len(points) >= STEPS else 1.0
-        value += length
-        if abs(bound - value) < 1e-6 * abs(length) or (value - bound) * length > 0:
-            value = bound
-        points.append(point(points[-1][1] if points else theta, value))
-    return points
+    ends, lowest = list[float](), 0.0
+    for bound, end in ((float(parameters.lower[i]), -np.inf), (float(parameters.upper[i]), np.inf)):
+        # from the estimate outwards, until beyond THRESHOLD or at the bound, or after twelve points
+        near, start, value, crossing = 0.0, theta, float(theta[i]), end
+        length = (float(np.clip(bound, value - reach, value + reach)) - value) / STEPS
+        for number in range(2 * STEPS if length else 0):
+            before, length = value, length * (1.5 if number >= STEPS else 1.0)
+            value = bound if (bound - value - length) / length < 1e-6 else value + length
+            start, square = _fit_others(parameters, residuals, start, i, value)
+            deviance = (square - cost) / unit
+            lowest = min(lowest, deviance)
+            if deviance > THRESHOLD:  # the root is about linear
+                roots = np.sqrt(np.maximum([near, deviance], 0.0))
+                crossing = np.interp(np.sqrt(THRESHOLD), roots, [before, value])
+            if deviance > THRESHOLD or value == bound:
+                break
+            near = deviance
+        ends.append(float(crossing))
+    return Profile(name, (ends[0], ends[1]), lowest)
 
 
 def _fit_others(
@@ -117,13 +99,3 @@ def _fit_others(
         ended = least_squares(unit, lambda points: residuals(others.from_unit(points)), how)
         return others.from_unit(ended.point[None])[0], 2 * ended.cost
     return theta, float(np.sum(residuals(theta[None])[0] ** 2))
-
-
-def _crossing(values: Array, deviance: Array, unlimited: float) -> float:
-    """Where the deviance rises above THRESHOLD, its root interpolated; `unlimited` where it does not."""
-    above = np.flatnonzero(deviance > THRESHOLD)
-    if not len(above):
-        return unlimited
-    b = int(above[0])
-    root = np.sqrt(np.maximum(deviance[b - 1 : b + 1], 0.0))
-    return float(np.interp(np.sqrt(THRESHOLD), root, values[b - 1 : b + 1]))

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.files import file_name
-from hydroid.parameters import Array
-from hydroid.posterior.sweep import Sweep
+from hydroid.posterior.linear import Linear
 from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
@@ -23,40 +22,35 @@ _QUANTITIES = {
 _HELD = "All other parameters are held at the estimate."
 
 
-def analysis_page(
-    problem: Problem,
-    theta: Array,
-    determined: Page | None = None,
-    sweep: Sweep | None = None,
-) -> Page:
+def analysis_page(problem: Problem, determined: Page | None = None, effects: Linear | None = None) -> Page:
     """Return the page of an analysis: of what was asked for.
 
     Args:
         problem: the logs and the model.
-        theta: the estimate, shape (P,).
         determined: the page of what the logs determine.
-        sweep: effects of the parameters on the outputs; adds the table `sensitivity`, and a CSV per channel.
+        effects: of all free parameters on the outputs; adds the table `sensitivity`, and a CSV per channel.
     """
     lead = "What each parameter does to the outputs, the others held at the estimate."
     page = determined or Page("analysis", "Analysis of the estimate", lead, ())
     sections, data = page.sections, {**page.data}
-    if sweep is not None:
-        sections += (_sensitivity_section(problem, theta, sweep, data),)
+    if effects is not None:
+        sections += (_sensitivity_section(problem, effects, data),)
     return replace(page, name="analysis", sections=sections, data=data)
 
 
-def _sensitivity_section(problem: Problem, theta: Array, sweep: Sweep, data: dict[str, str]) -> Section:
+def _sensitivity_section(problem: Problem, effects: Linear, data: dict[str, str]) -> Section:
     """Return the effect of each parameter on each channel; its numbers are added to `data` as CSV."""
     logs, taken, names = log_names(problem.logs), set[str](), problem.settings.arm.joint_names
-    free = [problem.parameters.parameters[i].name for i in sweep.free]
-    residual = problem.residuals(theta[None])[0]
+    free, theta = np.array(problem.parameters.names)[effects.box.varied].tolist(), effects.box.at
+    residual, percent = problem.residuals(theta[None])[0], -0.01 * effects.slopes
+    percent[effects.diverging] = np.nan
     rows, tabs = list[tuple[Cell, ...]](), list[Tab]()
-    for channel, change in zip(problem.channels, sweep.slopes, strict=True):
+    for channel in problem.channels:
         symbol, unit, factor = _QUANTITIES[channel.quantity]
         log, short, time = logs[channel.log], f"{symbol}{channel.joint}", problem.logs[channel.log].time
         output, slopes = (
             factor * (channel.measured - residual[channel.rows] / channel.weight),
-            factor * change,
+            factor / channel.weight * percent[:, channel.rows],
         )
         rms = np.sqrt(np.mean(slopes**2, axis=1))
         largest = np.argsort(-np.nan_to_num(rms), kind="stable")[: len(SERIES)]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hydroid.advice.score import Explained, Score, explained, holm
 from hydroid.advice.terms import ExtendedModel, Term, terms
 from hydroid.parameters import Array
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.open_start import least_squares_rows
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
@@ -118,11 +118,11 @@ def refitted(problem: Problem, theta: Array, prior_weight: float) -> Refit:
     The parts are the logs, in three groups at most, or the halves of one log. `prior_weight` is that of a
     prior's score beside the residuals [rad].
     """
-    parameters, opened, size = problem.parameters, with_open_start(problem, theta), problem.measured.size
+    parameters, size = problem.parameters, problem.measured.size
+    rows = least_squares_rows(problem, theta, prior_weight)
 
     def residuals(points: Array) -> Array:
-        values = parameters.from_unit(points)
-        return np.hstack([opened.residuals(values), prior_weight * problem.priors.scores(values)])
+        return rows(parameters.from_unit(points))
 
     whole = least_squares(parameters.to_unit(theta), residuals, SHORT)
     if not np.isfinite(whole.cost):

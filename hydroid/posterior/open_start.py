@@ -17,6 +17,7 @@ from hydroid.parameters import Array
 from hydroid.posterior.noise import channel_noise, prior_weight
 from hydroid.problem.free_start import start_slopes
 from hydroid.problem.problem import Problem
+from hydroid.search.axes import Function
 
 
 def with_open_start(problem: Problem, theta: Array) -> Problem:
@@ -28,6 +29,19 @@ def with_open_start(problem: Problem, theta: Array) -> Problem:
     if not problem.leaves_start_open:
         return problem
     return _opened(problem, tuple(theta.tolist()))
+
+
+def least_squares_rows(problem: Problem, at: Array, prior_weight: float) -> Function:
+    """Return what least squares minimises: candidates, (n, P), to residuals and weighed scores, (n, R + M).
+
+    The start angles are open as at an estimate, shape (P,).
+    """
+    opened = with_open_start(problem, at)
+
+    def rows(theta: Array) -> Array:
+        return np.hstack([opened.residuals(theta), prior_weight * problem.priors.scores(theta)])
+
+    return rows
 
 
 @lru_cache(maxsize=1)  # a refinement asks for the same once more

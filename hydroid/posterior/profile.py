@@ -1,6 +1,5 @@
 """Intervals without the linear approximation: profile likelihood."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,10 +7,11 @@ from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.open_start import least_squares_rows
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
+from hydroid.search.axes import Function
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
@@ -54,11 +54,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     free = [p.name for p in parameters.parameters if p.fixed is None]
     if name not in free:
         raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {', '.join(free)}")
-    i, opened = parameters.names.index(name), with_open_start(problem, theta)
-
-    def residuals(theta: Array) -> Array:
-        return np.hstack([opened.residuals(theta), linear.prior_weight * problem.priors.scores(theta)])
-
+    i, residuals = parameters.names.index(name), least_squares_rows(problem, theta, linear.prior_weight)
     cost = float(np.sum(residuals(theta[None])[0] ** 2))
     # what a deviance of 1 is: the parameter's variance over (J J')^-1; held at a bound, the others' largest
     units = linear.spread(uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1))
@@ -88,7 +84,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
 
 def _fit_others(
-    parameters: ParameterSet, residuals: Callable[[Array], Array], start: Array, i: int, value: float
+    parameters: ParameterSet, residuals: Function, start: Array, i: int, value: float
 ) -> tuple[Array, float]:
     """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
     held = [replace(p, fixed=value) if j == i else p for j, p in enumerate(parameters.parameters)]

@@ -74,18 +74,6 @@ def test_a_quantity_that_no_free_parameter_changes_is_given():
     np.testing.assert_allclose(concerned.interval[1], found.interval[1])
 
 
-@pytest.mark.parametrize(("lower", "upper"), [(1.0, 10.0), (0.1, 1.0)])
-def test_a_derivative_at_a_bound_looks_inwards(lower: float, upper: float):
-    inside = known(lower=lower, upper=upper)
-
-    def refuses(theta: np.ndarray) -> np.ndarray:
-        assert np.all((theta >= lower * THETA) & (theta <= upper * THETA))
-        return theta[:, :1] ** 2
-
-    found = inside.propagate(refuses, positive=True)
-    np.testing.assert_allclose(found.sd, 2 * THETA[0] ** 2 * np.sqrt(COVARIANCE[0, 0]), rtol=1e-3)
-
-
 def test_a_measurement_adds_its_information_and_some_of_the_parameters_keep_their_covariance():
     before, row = known(), np.array([[3.0, -1.0, 2.0]])
     expected = np.linalg.inv(np.linalg.inv(before.covariance) + row.T @ row)

@@ -85,17 +85,6 @@ def test_an_effect_that_is_only_rounding_is_none():
     np.testing.assert_allclose(result.point[:2], truth[:2], atol=1e-10)
 
 
-def test_a_parameter_without_effect_changes_nothing_for_the_others():
-    truth = np.array([0.3, 0.6, 0.4, 0.7, 0.5, 0.2])
-    residuals, _ = linear(10.0 ** -np.arange(0, 6), truth)
-    start = np.linspace(0.3, 0.6, 6)
-    alone = least_squares(start, residuals, SETTINGS)
-    joined = least_squares(np.insert(start, 2, 0.77), lambda x: residuals(np.delete(x, 2, axis=1)), SETTINGS)
-    assert joined.point[2] == 0.77
-    np.testing.assert_allclose(np.delete(joined.point, 2), alone.point, atol=1e-9)
-    assert joined.evaluations - alone.evaluations <= joined.iterations + 1  # one more a Jacobian
-
-
 @settings(deadline=None, max_examples=40)  # the first refinement of a process is slow
 @given(seed=st.integers(0, 2**32), failing=st.floats(0, 1))
 def test_never_worse_than_the_start_and_always_inside(seed, failing):

@@ -9,7 +9,6 @@ from search_runs import advance, evaluate, same
 from hydroid.search.algorithm import Population
 from hydroid.search.ga import SimpleGa
 from hydroid.search.nsga2 import Nsga2, crowded_order, tournament
-from hydroid.search.pareto import crowding, ranks
 from hydroid.settings.search import GeneticSettings
 
 
@@ -55,16 +54,6 @@ def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_th
     # one of two contestants is feasible in all but the pairs of two infeasible ones
     wins = np.concatenate([tournament(objectives, 20, rng) for _ in range(200)])
     assert (wins % 2 == 0).mean() == pytest.approx(0.25 * 9 / 9.5, abs=0.03)
-
-
-def test_roomier_candidates_win_among_equals():
-    angle = np.concatenate((np.linspace(0, 0.2, 10), [0.8, np.pi / 2]))
-    front = np.stack((np.cos(angle), np.sin(angle)), axis=1)
-    order = crowded_order(front).tolist()
-    assert set(order[:2]) == {0, 11}
-    assert order[2] == 10
-    room = crowding(front, ranks(front))
-    assert (room[order][:-1] >= room[order][1:]).all()
 
 
 @pytest.mark.parametrize("coding", ["binary", "integer"])

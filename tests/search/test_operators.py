@@ -46,18 +46,6 @@ def test_the_likely_are_equally_likely_where_fitness_cannot_tell(objective, equa
 
 
 @given(
-    objective=st.lists(
-        st.one_of(st.floats(0, 1e300), st.sampled_from([INF, NAN, -INF])), min_size=1, max_size=12
-    ),
-    seed=st.integers(0, 2**32),
-)
-def test_no_infeasible_parent_while_a_feasible_one_exists(objective, seed):
-    values = np.array(objective)
-    drawn = roulette(values, 20, np.random.default_rng(seed))
-    assert np.isfinite(values[drawn]).all() or not np.isfinite(values).any()
-
-
-@given(
     pairs=st.integers(1, 6), length=st.integers(1, 40), points=st.integers(1, 50), seed=st.integers(0, 999)
 )
 def test_n_point_crossover_makes_n_cuts(pairs, length, points, seed):

@@ -105,7 +105,8 @@ def _surface(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     """The error over two parameters, all others at the truth."""
     (parameters, values, error), axes = runs.surface(figure), drawing.add_subplot(projection="3d")
     error = np.where(np.isfinite(error), np.degrees(error), np.nan)
-    axes.plot_surface(*np.meshgrid(*values, indexing="ij"), error, cmap="viridis_r", rstride=1, cstride=1)
+    first, second = np.meshgrid(*values, indexing="ij")
+    axes.plot_surface(first, second, error, cmap="viridis_r", rstride=1, cstride=1)
     labels = [f"{p.name} [{p.unit}]" if p.unit else p.name for p in parameters]
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel="error [deg]")
 

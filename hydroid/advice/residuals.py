@@ -54,7 +54,7 @@ def residual_checks(problem: Problem, known: Uncertainty) -> tuple[ResidualCheck
         log, angle = problem.logs[channel.log], channel.measured
         residual = np.degrees(known.linear.residual[channel.rows] / channel.weight)
         window = min(2 * round(0.11 / log.period / 2) + 1, len(angle) - (len(angle) + 1) % 2)  # of 0.11 s
-        speed = savgol_filter(angle, window, min(2, window - 1), deriv=1, delta=log.period)
+        speed = np.asarray(savgol_filter(angle, window, min(2, window - 1), deriv=1, delta=log.period), float)
         values = np.degrees(angle), np.degrees(speed), log.command[:, channel.joint - 1]
         pairs = zip(UNITS, values, strict=True)
         found = [_dependence(what, each, residual) for what, each in pairs if np.ptp(each) > 0]

@@ -106,14 +106,14 @@ def _nominal(problem: Problem) -> Iterator[Term]:
         if row.span is None or known or (settings.stage == "mech" and row.name not in MECHANICAL):
             continue
         for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
-            groups = [(0,)] if pump else [(joint,) for joint in joints]
+            groups: list[tuple[int, ...]] = [(0,)] if pump else [(joint,) for joint in joints]
             if quantity == row.name and not pump and not alone:
                 groups.append(joints)
             for group in groups:
                 atoms = tuple((target, joint) for target in TARGETS[quantity] for joint in group)
                 values = {_nominal_value(problem, target, joint or 1) for target, joint in atoms}
                 if len(values) == 1 and taken.isdisjoint(atoms):
-                    name = quantity if alone or pump or len(group) > 1 else f"{quantity}_{group[0]}"
+                    name = quantity if alone or pump or len(group) > 1 else f"{quantity}_{min(group)}"
                     while name in settings.parameters:
                         name += "_"
                     entry = ParameterSettings(

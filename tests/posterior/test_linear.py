@@ -61,4 +61,6 @@ def test_sensitivity_of_free_parameters_is_written_in_the_readers_units(study_lo
     assert rms["K"] == pytest.approx(np.sqrt(np.mean(data["K_deg_per_pct"] ** 2)))
     (tab,) = page.sections[0].tabs
     (panel,) = tab.plots[0].draw().panels
-    assert [mark.label.partition(" ")[0] for mark in panel.marks] == sorted(rms, key=lambda name: -rms[name])
+    assert [mark.label.partition(" ")[0] for mark in panel.marks] == sorted(
+        rms, key=lambda name: rms[name], reverse=True
+    )

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from screenshots import browser, connected
 
-from hydroid import load_identified, load_settings, read_logs
+from hydroid import load_identified, load_settings, read_logs, view
 from hydroid.viewer.film import Stage
 from hydroid.viewer.motion import simulated_motion
 
@@ -25,13 +25,13 @@ SIZE, RATE, SPAN = (400, 330), 8, (3.4, 9.4)
 """of each arm [px]; pictures in a second; from when to when [s]"""
 COLORS = 64
 SHOTS = {
-    "report": ("hyd", "", (1000, 1240), "light"),
-    "report_phone": ("hyd", "", (400, 1000), "dark"),
-    "report_parameters": ("hyd", "Parameters", (1000, 610), "light"),
-    "report_actuator": ("hyd", "The actuator", (1000, 970), "light"),
-    "report_motion": ("nsga2", "The arm in motion", (1000, 600), "light"),
+    "report": ("hyd/report.html", "", (1000, 1240), "light"),
+    "report_phone": ("hyd/report.html", "", (400, 1000), "dark"),
+    "report_parameters": ("hyd/report.html", "Parameters", (1000, 610), "light"),
+    "report_actuator": ("actuator/actuator.html", "From the command to the torque", (1000, 970), "light"),
+    "report_motion": ("nsga2/report.html", "The arm in motion", (1000, 600), "light"),
 }
-"""run, title of the section (the page's beginning without one), width and height [px], and look"""
+"""page, title of the section (the page's beginning without one), width and height [px], and look"""
 TOP = """[...document.querySelectorAll("section, details")]
   .find((one) => one.querySelector("h2")?.textContent === "%s").getBoundingClientRect().top + scrollY"""
 FOLD = 'document.querySelectorAll("details").forEach((one) => { one.open = false; })'
@@ -63,10 +63,11 @@ def moving(demo: Path) -> None:
 
 async def shots(demo: Path) -> None:
     """Take pictures of parts of reports."""
+    view(demo / "hyd", actuator=2, out=demo / "actuator")
     with browser() as profile:
         tab = await connected(profile)
-        for name, (run, title, (width, height), look) in SHOTS.items():
-            await tab.load(demo / run / "report.html", width, look)
+        for name, (page, title, (width, height), look) in SHOTS.items():
+            await tab.load(demo / page, width, look)
             top = await tab.value(TOP % title if title else f"{FOLD}, 0")
             file = HERE / f"{name}.png"
             file.write_bytes(await tab.shot(0, float(top), width, height))

@@ -59,12 +59,11 @@ def analyse(
     problem = problem_of(model, logs, repair=repair)
     from hydroid.posterior.linear import linearised
     from hydroid.reporting.analysis_report import analysis_page
-    from hydroid.reporting.uncertainty_report import uncertainty_page
 
     with Progress() as progress:
         study = _uncertainty(problem, model.theta, model.source, names(profile), progress)
         effects = linearised(problem, model.theta) if sensitivity else None
-    page = analysis_page(problem, uncertainty_page(study), effects)
+    page = analysis_page(study, effects)
     tables = {name: page.tables[name] for name in ("sensitivity",) if name in page.tables}
     known = study.summary.plain()
     for name, parameter in known["estimate"].items():

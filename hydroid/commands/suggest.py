@@ -50,16 +50,13 @@ def suggest(
     from hydroid.advice.suggestions import advice
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.page import log_names
-    from hydroid.reporting.suggestion_report import suggestion_page
+    from hydroid.reporting.suggestion_report import suggestion_tables, suggestions
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
         advised = advice(problem, uncertainty(problem, model.theta), run, progress)
-    page = suggestion_page(problem.settings, advised, log_names(problem.logs), model.name)
-    lines: list[Table | str] = [page.tables["missing_terms"]]
-    for section in page.sections:
-        points = [f"- {point}" for point in section.points]
-        if section.text or points:
-            lines += [section.title, *([section.text] if section.text else []), *points]
-    return Result([*lines, *written(page, out)], advised.content, advised, page)
+    tables = suggestion_tables(advised.content)
+    said = suggestions(problem.settings, advised, log_names(problem.logs))
+    lines: list[Table | str] = [*tables.values(), *(f"- {text}" for text in said)]
+    return Result([*lines, *written(tables, out)], advised.content, advised)

@@ -1,16 +1,29 @@
 """What a reader must know before using an estimate, the most important first."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from hydroid.findings import Finding
+from hydroid.findings import Finding, Level
 from hydroid.fitting.fit import Fit
+from hydroid.parameters import Parameter
 from hydroid.posterior.by_log import FEW, ByLog
 from hydroid.posterior.directions import Identifiability
-from hydroid.posterior.flags import Flag, Source
+from hydroid.posterior.flags import Flag, ParameterStatus, Source
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
 _MOST_DIRECTIONS = 6
+_LEVELS: dict[str, Level] = {
+    "at bound": "warning",
+    "effect unknown": "warning",
+    "at zero": "note",
+    "no effect": "note",
+    "not identifiable": "note",
+    "prior only": "note",
+    "weakly identifiable": "note",
+}
+"""of what is found about single parameters"""
 
 
 def fit_findings(fit: Fit) -> tuple[Finding, ...]:
@@ -42,35 +55,30 @@ def parameter_findings(
     problem: Problem, known: Uncertainty, logs: ByLog | None, directions: Identifiability | None
 ) -> tuple[Finding, ...]:
     """Return what is to be said about what the logs determine; a bound of 0 cannot be widened."""
-    at: dict[tuple[str, str], list[str]] = {}
-    kinds: dict[str, list[str]] = {
-        kind: [] for kind in ("no effect", "not identifiable", "prior only", "weakly identifiable")
-    }
-    diverging: list[str] = []
+    kinds: dict[tuple[str, str], list[str]] = {}
     for parameter, status in zip(problem.parameters.parameters, known.status, strict=True):
-        name, idle = parameter.name, status.flag is Flag.NO_EFFECT
-        if status.at_bound and not idle:
-            zero = status.at_bound == "lower" and parameter.lower == 0
-            at.setdefault(("at zero" if zero else "at bound", status.at_bound), []).append(name)
-        by_prior = status.source is Source.PRIOR and not idle
-        kinds.get(Source.PRIOR.value if by_prior else status.flag.value, []).append(name)
-        if status.diverges and status.flag is not Flag.FIXED:
-            diverging.append(name)
+        for kind in _kinds(parameter, status):
+            kinds.setdefault(kind, []).append(parameter.name)
     findings = [
-        Finding(kind, "note" if kind == "at zero" else "warning", tuple(names), {"side": side})
-        for (kind, side), names in sorted(at.items(), reverse=True)
+        Finding(kind, level, tuple(names), {"side": side} if side else {})
+        for kind, level in _LEVELS.items()
+        for (own, side), names in kinds.items()
+        if own == kind
     ]
     findings += log_findings(logs)
-    findings += [Finding(kind, "note", tuple(names)) for kind, names in kinds.items() if names]
-    if diverging:
-        findings.append(Finding("effect unknown", "warning", tuple(diverging)))
-    return (*findings, *(() if directions is None else _combinations(directions)))
-
-
-def _combinations(directions: Identifiability) -> list[Finding]:
-    """What the logs leave open of several parameters together; a single one has its flag."""
-    several = [tuple(one) for one in directions.combinations if len(one) > 1]
-    findings = [Finding("combination", "note", names) for names in several[:_MOST_DIRECTIONS]]
+    several = [tuple(one) for one in directions.combinations if len(one) > 1] if directions else []
+    findings += [Finding("combination", "note", names) for names in several[:_MOST_DIRECTIONS]]
     if more := len(several[_MOST_DIRECTIONS:]):
         findings.append(Finding("more combinations", "note", (), {"count": str(more)}))
-    return findings
+    return tuple(sorted(findings, key=lambda finding: finding.level == "note"))
+
+
+def _kinds(parameter: Parameter, status: ParameterStatus) -> Iterator[tuple[str, str]]:
+    """Yield the kinds of findings about one parameter, with the side of a bound."""
+    idle = status.flag is Flag.NO_EFFECT
+    if status.at_bound and not idle:
+        zero = status.at_bound == "lower" and parameter.lower == 0
+        yield "at zero" if zero else "at bound", status.at_bound
+    yield (Source.PRIOR if status.source is Source.PRIOR and not idle else status.flag).value, ""
+    if status.diverges and status.flag is not Flag.FIXED:
+        yield "effect unknown", ""

@@ -5,6 +5,7 @@ import numpy as np
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
 from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
+from hydroid.parameters import Array
 from hydroid.posterior.by_log import by_log
 from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.uncertainty import Uncertainty
@@ -53,10 +54,10 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
             unit=parameter.unit,
             sd=finite(known.standard_deviation[i]),
             sd_by_log=finite(relative[i] * scale[i]),
-            interval=(finite(known.interval[i, 0]), finite(known.interval[i, 1])),
-            interval_by_log=(finite(by_logs[i, 0]), finite(by_logs[i, 1])),
+            interval=_ends(known.interval[i]),
+            interval_by_log=_ends(by_logs[i]),
             flag=status.flag.value,
-            source=None if status.source is None else status.source.value,
+            source=status.source and status.source.value,
             data_share=status.share if known.free[i] else None,
             at_bound=status.at_bound,
             effect_deg=finite(np.degrees(known.sensitivity[i])),
@@ -78,3 +79,8 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
             for joint, errors in ({} if logs is None else logs.left_out).items()
         },
     )
+
+
+def _ends(interval: Array) -> tuple[float | None, float | None]:
+    low, high = interval.tolist()
+    return finite(low), finite(high)

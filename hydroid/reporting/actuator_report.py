@@ -97,16 +97,12 @@ def joint_actuator(model: IdentifiedModel, joint: int) -> JointActuator:
 
 def actuator_page(actuator: JointActuator) -> Page:
     """Return the page of one actuator; its figure is `actuator`."""
-    section = Section("From the command to the torque", plots=(actuator_plot(actuator, "actuator"),))
-    return Page("actuator", f"Actuator of the joint {actuator.joint.name}", _LEAD, (section,))
-
-
-def actuator_plot(actuator: JointActuator, name: str) -> Plot:
-    """Return the figure of all curves of an actuator."""
     caption = (
-        "Numbers in brackets are the article's equations. Dots: the two points of the force at rated current."
+        "Numbers in brackets are the article's equations. Dots: the points of the force at rated current."
     )
-    return Plot(name, caption + _BANDS * (actuator.posterior is not None), partial(draw, actuator))
+    plot = Plot("actuator", caption + _BANDS * (actuator.posterior is not None), partial(draw, actuator))
+    section = Section("From the command to the torque", plots=(plot,))
+    return Page("actuator", f"Actuator of the joint {actuator.joint.name}", _LEAD, (section,))
 
 
 def draw(actuator: JointActuator) -> Chart:

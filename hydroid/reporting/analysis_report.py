@@ -7,11 +7,19 @@ from pathlib import Path
 import numpy as np
 
 from hydroid.files import file_name
+from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.linear import Linear
 from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite
 from hydroid.reporting.page import Page, Plot, Section, Tab, log_names
+from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.table import Cell, Table, numbers_csv
+from hydroid.reporting.uncertainty_report import (
+    UncertaintyStudy,
+    direction_section,
+    unknown_section,
+    warnings,
+)
 from hydroid.words import number
 
 _QUANTITIES = {
@@ -22,23 +30,25 @@ _QUANTITIES = {
 _HELD = "All other parameters are held at the estimate."
 
 
-def analysis_page(problem: Problem, determined: Page | None = None, effects: Linear | None = None) -> Page:
-    """Return the page of an analysis: of what was asked for.
+def analysis_page(study: UncertaintyStudy, effects: Linear | None = None) -> Page:
+    """Return the page of an analysis; its tables are `parameters`, `directions` and `sensitivity`.
 
-    Args:
-        problem: the logs and the model.
-        determined: the page of what the logs determine.
-        effects: of all free parameters on the outputs; adds the table `sensitivity`, and a CSV per channel.
+    `effects` are those of all free parameters on the outputs; they add a CSV per channel.
     """
-    lead = "What each parameter does to the outputs, the others held at the estimate."
-    page = determined or Page("analysis", "Analysis of the estimate", lead, ())
-    sections, data = page.sections, {**page.data}
-    if effects is not None:
-        sections += (_sensitivity_section(problem, effects, data),)
-    return replace(page, name="analysis", sections=sections, data=data)
+    problem, summary, data = study.problem, study.summary, dict[str, str]()
+    rank, count = study.identifiability.rank, len(study.identifiability.names)
+    lead = f"The logs determine {rank} combinations of {count} parameters to {100 * WEAK_ABOVE:.0f} %."
+    sections = (
+        parameter_section(problem.settings, summary, study.intervals),
+        unknown_section(summary),
+        *direction_section(summary),
+        *(() if effects is None else [sensitivity_section(problem, effects, data)]),
+    )
+    title = f"What the logs determine at {study.source}"
+    return Page("analysis", title, lead, sections, warnings(summary), data=data)
 
 
-def _sensitivity_section(problem: Problem, effects: Linear, data: dict[str, str]) -> Section:
+def sensitivity_section(problem: Problem, effects: Linear, data: dict[str, str]) -> Section:
     """Return the effect of each parameter on each channel; its numbers are added to `data` as CSV."""
     logs, taken, names = log_names(problem.logs), set[str](), problem.settings.arm.joint_names
     free, theta = np.array(problem.parameters.names)[effects.box.varied].tolist(), effects.box.at

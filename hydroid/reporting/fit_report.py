@@ -1,23 +1,19 @@
 """The page of a fit, from what its run stores: the verdict, the prediction, what is known, what to do."""
 
 import shlex
-from collections.abc import Collection, Iterator
-from contextlib import suppress
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from hydroid.errors import SettingsError
 from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
-from hydroid.identified_model import IdentifiedModel
 from hydroid.reporting import page_file
-from hydroid.reporting.actuator_report import actuator_plot, joint_actuator
 from hydroid.reporting.objectives import learning, pareto
-from hydroid.reporting.page import Page, Plot, Section, Tab
+from hydroid.reporting.page import Page, Plot, Section
 from hydroid.reporting.parameters_report import parameter_section
 from hydroid.reporting.predictions import prediction_sections
 from hydroid.reporting.quantities_report import quantity_section, speed_section
@@ -56,7 +52,6 @@ def fit_page(record: Record) -> Page:
     folded = (
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in result.fitted]),
-        *_actuators(record),
         *direction_section(summary),
         _search(record),
         Section("Reproduce", facts=(("command", _command(record)),)),
@@ -90,23 +85,6 @@ def _steps(record: Record) -> tuple[Finding, ...]:
         findings.append(next_step(record.settings, record.given, record.folder))
     command = {"command": f"hydroid suggest {record.given} --fit {shlex.quote(record.folder)}"}
     return (*findings, Finding("look for terms", "note", (), command))
-
-
-def _actuators(record: Record) -> Iterator[Section]:
-    """Yield the curves of each compared joint's actuator, with their bands."""
-    settings, summary = record.settings, record.summary
-    if settings.stage != "hyd":
-        return
-    theta = settings.parameter_set().vector(summary.values, record.folder)
-    model, tabs = IdentifiedModel(settings, theta, record.folder, summary), list[Tab]()
-    for joint in settings.outputs:
-        with suppress(SettingsError):  # no force-stroke curve runs through its two points: it diverged
-            actuator = joint_actuator(model, joint)
-            tabs.append(
-                Tab(actuator.joint.name, (actuator_plot(actuator, f"actuator_{actuator.joint.name}"),))
-            )
-    if tabs:
-        yield Section("The actuator", tabs=tuple(tabs))
 
 
 def _search(record: Record) -> Section:

@@ -4,46 +4,24 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hydroid.advice.suggestions import Advice, action_findings, missing_findings, residual_findings
-from hydroid.reporting.page import Page, Section
 from hydroid.reporting.table import Cell, Table
 from hydroid.settings.fit import FitSettings
 
-MOST_STEPS = 3
-"""things to do that a page names first"""
 Content = Mapping[str, Any]
 
 
-def suggestion_page(settings: FitSettings, advice: Advice, logs: Sequence[str], source: str) -> Page:
-    """Return the page of all suggestions; its tables are `missing_terms` and `next_actions`.
-
-    `logs` are their names, and `source` names the estimate.
-    """
+def suggestions(settings: FitSettings, advice: Advice, logs: Sequence[str]) -> list[str]:
+    """Return what is to be said, the first things to do first; `logs` are their names."""
     content, checks, joints = advice.content, advice.residuals, settings.arm.joint_names
-    missing, *more = missing_findings(content)
-    lead = f"At {source} the rms error is {content['rms_deg']:.2g}°."
-    lacking = missing.kind != "nothing missing"
-    lead = lead if lacking else f"{lead} {missing}"
-    steps = (*([missing] if lacking else []), *action_findings(content, settings))[:MOST_STEPS]
     places = [f"{joints[check.joint - 1]} in {logs[check.log]}" for check in checks]
+    findings = *missing_findings(content), *action_findings(content, settings)
+    return list(map(str, (*findings, *residual_findings(checks, places))))
+
+
+def suggestion_tables(content: Content) -> dict[str, Table]:
+    """Return the tables `missing_terms` and, if an action would help, `next_actions`."""
     brings = {"next_actions": action_table(content)} if content["actions"] else {}
-    sections = (
-        *([Section("Do next", steps=steps)] if steps else []),
-        Section(
-            "What the model lacks",
-            points=tuple(str(finding) for finding in more),
-            tables={"missing_terms": missing_table(content)},
-        ),
-        Section(
-            "What the residual shows",
-            points=tuple(str(finding) for finding in residual_findings(checks, places)),
-        ),
-        Section(
-            "What each action would bring",
-            "" if brings else "No action of those tested would help much.",
-            tables=brings,
-        ),
-    )
-    return Page("suggestions", "What to change next", lead, sections)
+    return {"missing_terms": missing_table(content)} | brings
 
 
 def missing_table(content: Content) -> Table:

@@ -1,4 +1,4 @@
-"""What logs determine at some parameters: the page of an analysis, and sections of a fit's."""
+"""What logs determine at some parameters: what is to be said about it, and sections of pages."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,12 +9,10 @@ from hydroid.estimate import Covariance, FitSummary
 from hydroid.findings import Finding
 from hydroid.fitting.summary import account
 from hydroid.posterior.directions import Identifiability
-from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.profile import Profile
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
-from hydroid.reporting.page import Page, Section
-from hydroid.reporting.parameters_report import parameter_section
+from hydroid.reporting.page import Section
 from hydroid.reporting.table import Table
 
 
@@ -50,37 +48,20 @@ class UncertaintyStudy:
         return {profile.name: profile.interval for profile in self.profiles}
 
 
-def uncertainty_page(study: UncertaintyStudy) -> Page:
-    """Return the page of a study; its tables are `parameters` and `directions`."""
-    problem, summary = study.problem, study.summary
-    rank, count = study.identifiability.rank, len(study.identifiability.names)
-    lead = f"The logs determine {rank} combinations of {count} parameters to {100 * WEAK_ABOVE:.0f} %."
-    sections = (
-        parameter_section(problem.settings, summary, study.intervals),
-        unknown_section(summary),
-        *direction_section(summary),
-    )
-    return Page("analysis", f"What the logs determine at {study.source}", lead, sections, warnings(summary))
-
-
-_MOST_WARNINGS = 3
-"""that stand at the top of a page and in a terminal; the others stand below"""
+_MOST = 3
+"""warnings that stand at the top of a page and in a terminal; the others stand below"""
 
 
 def warnings(summary: FitSummary) -> tuple[str, ...]:
     """Return what must be read before any use of the estimate, at most three things."""
-    return tuple(map(str, _warnings(summary)[:_MOST_WARNINGS]))
+    return tuple(str(finding) for finding in summary.findings if finding.level != "note")[:_MOST]
 
 
 def unknown_section(summary: FitSummary) -> Section:
     """Return the section of all other findings."""
-    others = _warnings(summary)[_MOST_WARNINGS:], [f for f in summary.findings if f.level == "note"]
-    points = tuple(str(finding) for some in others for finding in some)
+    first, everything = warnings(summary), map(str, summary.findings)
+    points = tuple(text for text in everything if text not in first)
     return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
-
-
-def _warnings(summary: FitSummary) -> list[Finding]:
-    return [finding for finding in summary.findings if finding.level != "note"]
 
 
 def direction_section(summary: FitSummary) -> tuple[Section, ...]:

@@ -11,7 +11,8 @@ from hydroid.log import Log
 from hydroid.posterior.linear import Linear, linearised
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.reporting.analysis_report import analysis_page
+from hydroid.reporting.analysis_report import sensitivity_section
+from hydroid.reporting.page import Page
 from hydroid.reporting.page_file import write_page
 
 THETA = np.array(list(TRUTH.values()))
@@ -52,14 +53,15 @@ def test_sensitivity_of_free_parameters_is_written_in_the_readers_units(study_lo
     problem = make_problem(study_log, **held)
     result = linearised(problem, THETA)
     assert len(result.slopes) == 2
-    page = analysis_page(problem, effects=result)
-    write_page(page, tmp_path)
+    files: dict[str, str] = {}
+    section = sensitivity_section(problem, result, files)
+    write_page(Page("p", "t", "l", (section,), data=files), tmp_path)
     data = np.genfromtxt(tmp_path / "sensitivity_steps_q2.csv", delimiter=",", names=True)
     assert data["K_deg_per_pct"] == pytest.approx(np.degrees(-0.01 * result.slopes[0]))
     assert data["q2_deg"] == pytest.approx(np.degrees(problem.channels[0].measured))
-    rms = {row["parameter"]: row["rms per 1 %"] for row in page.tables["sensitivity"].records()}
+    rms = {row["parameter"]: row["rms per 1 %"] for row in section.more["sensitivity"].records()}
     assert rms["K"] == pytest.approx(np.sqrt(np.mean(data["K_deg_per_pct"] ** 2)))
-    (tab,) = page.sections[0].tabs
+    (tab,) = section.tabs
     (panel,) = tab.plots[0].draw().panels
     assert [mark.label.partition(" ")[0] for mark in panel.marks] == sorted(
         rms, key=lambda name: rms[name], reverse=True

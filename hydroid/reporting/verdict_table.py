@@ -61,17 +61,13 @@ def verdict_section(fits: Verdicts) -> Section:
 
 
 def ordered(fits: Verdicts) -> Verdicts:
-    """Return the fits, the smallest errors first: in parts of the tolerance, averaged over the joints."""
+    """Return the fits, the smallest errors first: in parts of the tolerances of the joints."""
 
-    def size(name: str) -> float:
-        errors = (v.fitted_deg if v.unseen_deg is None else v.unseen_deg for v in fits[name])
-        sizes = [
-            np.inf if error is None else error / one.tolerance_deg
-            for error, one in zip(errors, fits[name], strict=True)
-        ]
-        return float(np.mean(sizes))
+    def size(one: JointVerdict) -> float:
+        error = one.fitted_deg if one.unseen_deg is None else one.unseen_deg
+        return np.inf if error is None else error / one.tolerance_deg
 
-    return {name: fits[name] for name in sorted(fits, key=size)}
+    return {name: fits[name] for name in sorted(fits, key=lambda name: sum(map(size, fits[name])))}
 
 
 def lead(fits: Verdicts) -> str:

@@ -32,8 +32,7 @@ KINDS = {
     "validate": ("validate", OTHER, LOG, "--fit", "fit-hyd", "--fit", "fit-mech"),
     "identifiability": ("analyse", LOG, "--fit", "fit-mech", "--profile", "K,D"),
     "sensitivity": ("analyse", LOG, "--fit", "fit-hyd", "--sensitivity"),
-    "suggest": ("suggest", "--fit", "fit-mech"),
-    "actuator": ("view", "--actuator", "--fit", "fit-hyd"),
+    "actuator": ("view", "--actuator", "2", "--fit", "fit-hyd"),
 }
 """the command that makes each report; names of other kinds stand for their folders"""
 WIDTHS = (400, 1400)

@@ -73,7 +73,7 @@ def ordered(fits: Verdicts) -> Verdicts:
 def lead(fits: Verdicts) -> str:
     """Say of the first of the fits which joints it predicts, and what is wrong with the others."""
     name, verdicts = next(iter(fits.items()))
-    of = f"{short_name(name)}: " if len(fits) > 1 else ""
+    of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
     by_word: dict[str, list[str]] = {}
     for one in verdicts:
         by_word.setdefault(one.verdict, []).append(one.name)

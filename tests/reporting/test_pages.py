@@ -141,7 +141,7 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     fits = ordered({p.fit: judge(settings, [], {}, [p]) for p in predictions})
     assert list(fits) == ["good", "bad"]
     page = validation_page(predictions, fits, settings.arm)
-    assert page.lead == "good: shoulder: predicts."
+    assert page.lead == "good is best. shoulder: predicts."
     (tab,) = next(section for section in page.sections if section.title == "Errors by log").tabs
     labels = {mark.label for panel in tab.plots[0].draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}

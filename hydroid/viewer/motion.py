@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,21 +14,29 @@ from hydroid.parameters import Array
 from hydroid.prediction import predict_log
 
 
-@dataclass(frozen=True, eq=False)
-class JointSignals:
-    """What is drawn of one joint, T samples.
-
-    Attributes:
-        name: of the joint, and of its arm where there are two.
-        command: [%], shape (T,).
-        angle: `measured`, where it moved, and `simulated` [deg], shape (T,).
-        pressure: of chambers A and B [bar], shape (T, 2), as far as it was measured and simulated.
-    """
+class JointSignals(NamedTuple):
+    """What is drawn of one joint: its name, its number from 0, and the logs that hold it."""
 
     name: str
-    command: Array
-    angle: Mapping[str, Array]
-    pressure: Mapping[str, Array]
+    joint: int
+    measured: Log
+    simulated: Log
+
+    @property
+    def angles(self) -> dict[str, Array]:
+        """Its measured angle, where that moved, and the simulated one [deg], shape (T,)."""
+        logs = {"measured": self.measured, "simulated": self.simulated}
+        angles = {kind: np.degrees(log.angle[:, self.joint]) for kind, log in logs.items()}
+        return {kind: angle for kind, angle in angles.items() if kind == "simulated" or _moves(angle)}
+
+    @property
+    def pressures(self) -> dict[str, Array]:
+        """Pressures of chambers A and B [bar], shape (T, 2), as far as they were measured and simulated."""
+        logs = {"measured": self.measured.pressure, "simulated": self.simulated.pressure}
+        bars = {
+            kind: 1e-5 * pressure[:, self.joint] for kind, pressure in logs.items() if pressure is not None
+        }
+        return {kind: bar for kind, bar in bars.items() if not np.isnan(bar).all()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +64,7 @@ class Motion:
     @property
     def error(self) -> float:
         """The rms difference of measured and simulated angles, as drawn [deg]; NaN: none was measured."""
-        angles = (signals.angle for signals in self.signals)
+        angles = (signals.angles for signals in self.signals)
         errors = [angle["measured"] - angle["simulated"] for angle in angles if "measured" in angle]
         return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
@@ -78,7 +87,7 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
         predicted[side] = predict_log(model, log, all_pressures=True)
         for joint in np.flatnonzero(log.driven).tolist():
             name = arm.joint_names[joint] if side == ALONE else f"{side} {arm.joint_names[joint]}"
-            signals.append(_signals(name, joint, {"measured": log, "simulated": predicted[side]}))
+            signals.append(JointSignals(name, joint, log, predicted[side]))
     if mirrored:
         predicted = dict.fromkeys(logs, predicted["both"])
     rest, simulated = arm.pose(model.settings.start_pose), {s: log.angle for s, log in predicted.items()}
@@ -90,15 +99,3 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
 def _moves(angle: Array) -> bool:
     """Whether angles, shape (T, ...), are of a motion; a log of commands stands in its start pose."""
     return bool(np.nan_to_num(np.ptp(angle, axis=0)).any())
-
-
-def _signals(name: str, joint: int, both: Mapping[str, Log]) -> JointSignals:
-    angles = {kind: np.degrees(log.angle[:, joint]) for kind, log in both.items()}
-    if not _moves(angles["measured"]):
-        del angles["measured"]
-    pressures = {
-        kind: 1e-5 * log.pressure[:, joint]
-        for kind, log in both.items()
-        if log.pressure is not None and not np.isnan(log.pressure[:, joint]).all()
-    }
-    return JointSignals(name, both["measured"].command[:, joint], angles, pressures)

@@ -14,11 +14,6 @@ from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.figure import figure, style
 from hydroid.viewer.motion import JointSignals, Motion
 
-MOST_JOINTS = 7
-"""joints that are drawn; the others move in the picture only"""
-FEW = 2
-"""joints up to which the panels stand below each other, with more of them side by side"""
-
 
 class SignalPanel:
     """Signals of a motion on a white panel.
@@ -31,10 +26,10 @@ class SignalPanel:
 
     def __init__(self, motion: Motion, size: tuple[int, int], scale: float = 1.0) -> None:
         self._error, self._scale = motion.error, scale
-        shown = motion.signals[:MOST_JOINTS]
-        kinds = 3 if any(joint.pressure for joint in shown) else 2
+        shown = motion.signals[:7]  # the others move in the picture only
+        kinds = 3 if any(joint.pressures for joint in shown) else 2
         panels = [panel for joint in shown for panel in _joint(joint, motion.time)[:kinds]]
-        chart = Chart(tuple(panels), 1 if len(shown) <= FEW else kinds, linked=True)
+        chart = Chart(tuple(panels), 1 if len(shown) <= 2 else kinds, linked=True)
         with style():
             drawing = figure(chart, "\n")
             drawing.set_size_inches(size[0] / (100 * scale), size[1] / (100 * scale))
@@ -63,17 +58,16 @@ class SignalPanel:
 
 def _joint(joint: JointSignals, time: Array) -> list[Panel]:
     """Return panels of the command, the angles and the pressures."""
-    width = {"measured": 2.6, "simulated": 1.3}
-    color, alpha = {"measured": "blue", "simulated": "orange"}, {"measured": 0.35, "simulated": 1.0}
-    command = Mark("step", time, joint.command, color="grey")
+    looks = {"measured": ("blue", 2.6, 0.35), "simulated": ("orange", 1.3, 1.0)}
+    command = Mark("step", time, joint.measured.command[:, joint.joint], color="grey")
     angles = tuple(
-        Mark("line", time, angle, color=color[kind], label=kind, width=width[kind])
-        for kind, angle in joint.angle.items()
+        Mark("line", time, angle, color=looks[kind][0], label=kind, width=looks[kind][1])
+        for kind, angle in joint.angles.items()
     )
     pressures = tuple(
-        Mark("line", time, bar, color=shade, label=label, width=width[kind], alpha=alpha[kind])
-        for kind, pressure in joint.pressure.items()
-        for bar, shade, label in zip(pressure.T, ("green", "pink"), ("chamber A", "chamber B"), strict=True)
+        Mark("line", time, bar, color=color, label=label, width=looks[kind][1], alpha=looks[kind][2])
+        for kind, pressure in joint.pressures.items()
+        for bar, color, label in zip(pressure.T, ("green", "pink"), ("chamber A", "chamber B"), strict=True)
     )
     ends = float(time[0]), float(time[-1])
     return [

@@ -1,7 +1,7 @@
 """What the window shows: a plant under its sliders, or a simulated motion beside the measured one.
 
 Both have what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is shown
-and the `duration` after which all stands still [s], `advance`, `restart` and `captions`.
+and the `duration` after which all stands still [s].
 """
 
 import mujoco
@@ -49,14 +49,6 @@ class Sliders:
             plant.step(plant.command)
         place(plant.model, plant.data, plant.data.qpos)  # `mj_step` leaves what is drawn a step behind
 
-    def captions(self) -> tuple[str, str]:
-        """Return the joints, and their commands and angles."""
-        plant = self.plant
-        names, command, angle = plant.names, plant.command, np.degrees(plant.angle)
-        lines = [f"{command[j - 1]:4.0f} %  {angle[j - 1]:7.2f} deg" for j in plant.joints]
-        first = ["time", *(names[j - 1] for j in plant.joints)]
-        return "\n".join(first), "\n".join([f"{plant.time:.1f} s", *lines])
-
 
 class Replay:
     """A simulated motion from its start to its end.
@@ -88,19 +80,6 @@ class Replay:
         self.data.time = self.time
         if self.ghost is not None and motion.measured is not None:
             place(self.model, self.ghost, motion.measured[self._sample])
-
-    def captions(self) -> tuple[str, str]:
-        """Return the driven joints, and their commands, angles and pressures."""
-        first, second, k = ["time"], [f"{self.time:.1f} s"], self._sample
-        for signals in self._motion.signals:
-            line = f"{signals.command[k]:4.0f} %  {signals.angle['simulated'][k]:7.2f} deg"
-            if "measured" in signals.angle:
-                line += f"  (log {signals.angle['measured'][k]:.2f})"
-            if "simulated" in signals.pressure:
-                line += "  {:.0f} / {:.0f} bar".format(*signals.pressure["simulated"][k])
-            first.append(signals.name)
-            second.append(line)
-        return "\n".join(first), "\n".join(second)
 
 
 Playback = Sliders | Replay

@@ -4,8 +4,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from hydroid.errors import RunError
@@ -15,16 +14,6 @@ from hydroid.viewer.playback import Playback
 FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
 CLOSING = 5.0  # the longest that closing the window may take [s]
-
-
-def show(playback: Playback) -> None:
-    """Show a playback in MuJoCo's viewer until its window is closed.
-
-    Raises:
-        RunError: no window can be opened, or the simulation diverged.
-    """
-    with window(playback) as viewer:
-        play(playback, viewer)
 
 
 def play(
@@ -46,7 +35,6 @@ def play(
         late = frame - begun - playback.time - LATE
         begun += max(0.0, late) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
-        viewer.set_texts((None, None, *playback.captions()))
         viewer.user_scn.ngeom = 0
         if playback.ghost is not None:
             view = viewer.cam.azimuth, viewer.cam.elevation
@@ -59,12 +47,11 @@ def play(
         sleep(max(0.0, FRAME - (clock() - frame)))
 
 
-@contextmanager
-def window(playback: Playback) -> Generator[Any]:
-    """Open MuJoCo's viewer on what moves; it closes with the context.
+def show(playback: Playback) -> None:
+    """Show a playback in MuJoCo's viewer until its window is closed.
 
     Raises:
-        RunError: this machine cannot show a window.
+        RunError: no window can be opened, or the simulation diverged.
     """
     others = set(threading.enumerate())
     try:
@@ -83,7 +70,7 @@ def window(playback: Playback) -> Generator[Any]:
             viewer.cam.distance = 2.3 * playback.model.stat.extent
             # where the model's camera `corner` stands
             viewer.cam.azimuth, viewer.cam.elevation = 135.0, -25.0
-        yield viewer
+        play(playback, viewer)
     finally:
         viewer.close()
         for thread in drawing:  # a program that ends while it still draws crashes

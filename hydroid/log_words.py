@@ -75,11 +75,7 @@ LOG_WORDS: dict[str, tuple[str, str]] = {
     "too slow": ("has a sample every {period:.6g} s, at most {slowest:g} s can be used", "{remedy}"),
     "gap": (
         "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
-        "cut the log into two files there (--repair fills gaps up to log.repair_s: {longest:g} s)",
-    ),
-    "short gap": (
-        "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
-        "fill it with --repair",
+        "--repair fills gaps up to {longest:g} s (log.repair_s); cut the log into two files at longer ones",
     ),
     "jitter": (
         "sample period varies from {least:.4g} to {most:.4g} s around {period:.4g} s{rows}",

@@ -71,9 +71,8 @@ def _time(recording: Recording, settings: LogSettings, repaired: bool) -> Iterat
     bridged = per_row > GAP * period
     uneven = np.flatnonzero((np.abs(per_row - period) > 0.25 * period) & ~bridged)
     if len(gaps):
-        kind = "short gap" if short[gaps].all() else "gap"
         numbers = {"gap": steps[gaps[0]], "period": period, "longest": longest}
-        yield recording.finding("error", kind, rows[1:][gaps], signal, **numbers)
+        yield recording.finding("error", "gap", rows[1:][gaps], signal, **numbers)
     elif len(uneven):
         numbers = {"least": per_row.min(), "most": per_row[~bridged].max(), "period": period}
         yield recording.finding("warning", "jitter", rows[1:][uneven], signal, **numbers)

@@ -147,9 +147,11 @@ WRONG = (
         "clocks that differ by 0.2 s", "warning: before the command, as no machine does", lambda: shifted(-20)
     ),
     Wrong(
-        "0.4 s without a sample", "error: cut the log into two files there", lambda: without(*range(900, 940))
+        "0.4 s without a sample",
+        "error: cut the log into two files at longer ones",
+        lambda: without(*range(900, 940)),
     ),
-    Wrong("a dropped sample", "error: fill it with --repair", lambda: without(900)),
+    Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
     Wrong(
         "a sample that stands twice",
         "error: time does not increase",

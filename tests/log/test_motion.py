@@ -29,8 +29,10 @@ def joint_log(dead=0.0, lag=0.0, speed=0.5):
 
 
 @pytest.mark.parametrize("dead", [0.0, 20.0, 50.0])
-def test_a_dead_band_is_found(dead):
-    assert JointMotion(joint_log(dead=dead, lag=0.1), 1).dead_band == pytest.approx(dead + 5, abs=6)
+def test_a_dead_band_and_a_lag_are_found(dead):
+    motion = JointMotion(joint_log(dead=dead, lag=0.1), 1)
+    assert motion.dead_band == pytest.approx(dead + 5, abs=6)
+    assert motion.likely_lag == pytest.approx(0.1, abs=0.03)
 
 
 def test_the_speed_is_that_of_fast_motion():
@@ -127,15 +129,9 @@ def test_a_log_that_begins_with_a_command_starts_at_its_first_sample():
     assert np.array_equal(log.start, log.angle[0])
 
 
-def test_motion_does_not_count_as_rest():
-    log = step_log(POSE, [0.0, 50.0])
+@pytest.mark.parametrize(("levels", "moves"), [([0.0, 50.0], 101), ([0.0] * 5, 300)])
+def test_rest_ends_with_the_first_command_or_after_two_seconds(levels: list[float], moves: int):
+    log = step_log(POSE, levels)
     moving = log.angle.copy()
-    moving[101:, 1] += 1.0
+    moving[moves:, 1] += 1.0
     assert replace(log, angle=moving).start == pytest.approx(POSE, abs=1e-15)
-
-
-def test_a_log_without_commands_rests_two_seconds_at_most():
-    log = step_log(POSE, [0.0] * 5)
-    sinking = log.angle.copy()
-    sinking[300:, 1] -= 0.1
-    assert replace(log, angle=sinking).start == pytest.approx(POSE, abs=1e-15)

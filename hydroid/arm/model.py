@@ -19,8 +19,6 @@ ALONE = "alone"
 """the name of the arm that is not one of two"""
 SIDES = ("right", "left")
 """the arms of a pair in the order of its joints; the names of their parts begin with these and `_`"""
-PAYLOAD_RADIUS = 0.05
-"""of the ball that a payload is taken for [m] (ours): its inertia is small beside what its distance makes"""
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
@@ -45,7 +43,8 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
         raise SettingsError(f"{arm.name} has no place for a payload", where="payloads", hint=hint)
     loaded = spec.copy()
-    site, moment = loaded.site(arm.payload), 0.4 * mass * PAYLOAD_RADIUS**2
+    # of a ball of 5 cm: its own inertia is small beside what its distance makes
+    site, moment = loaded.site(arm.payload), 0.4 * mass * 0.05**2
     ball = {"explicitinertial": True, "mass": mass, "ipos": [0.0] * 3, "inertia": [moment] * 3}
     body = site.parent.add_body(name="payload", pos=site.pos, **ball)
     if site.frame is not None:

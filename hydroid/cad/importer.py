@@ -15,12 +15,8 @@ from hydroid.cad.shapes import HIDDEN, SHOWN, read_mesh, shown_stl
 from hydroid.cad.source import read_source
 from hydroid.mjcf import mujoco_errors
 
-LARGEST_MESH = 50.0
-"""size beyond which meshes are taken to be in millimetres [m]"""
 MESHES = "links"
 """folder of the meshes beside the model"""
-PAINT = (0.94, 0.53, 0.08, 1.0)
-"""colour of what the file gives none"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +111,7 @@ def _convert_meshes(
         if mesh.file in read
     }
     largest = max(sizes, key=lambda name: sizes[name], default="")
-    millimetres = bool(largest) and sizes[largest] > LARGEST_MESH
+    millimetres = bool(largest) and sizes[largest] > 50.0  # [m]
     if millimetres:
         what = f"mesh {files[largest].name} would be {sizes[largest]:.4g} m long"
         notes.append(f"{what}: all meshes are taken to be in mm")
@@ -147,7 +143,7 @@ def _sort_shapes(spec: mujoco.MjSpec) -> None:
             geom.group = SHOWN if geom in (visual or solid) else HIDDEN
             geom.contype = geom.conaffinity = int(geom in (solid or visual))
             if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
-                geom.rgba = PAINT
+                geom.rgba = (0.94, 0.53, 0.08, 1.0)
 
 
 def _mend_joint(joint: mujoco.MjsJoint, notes: list[str]) -> None:

@@ -16,9 +16,6 @@ from hydroid.log.log import Floats
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 
-PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
-"""sample periods that are proposed [s]"""
-
 
 class ColumnGuess(NamedTuple):
     """What the columns of a log seem to hold.
@@ -87,7 +84,8 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
             reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
         used |= {column.name for column in (*commands.get(joint, ()), *angles.get(joint, ()))}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
-    log |= {"period_s": min(PERIODS, key=lambda period: abs(np.log(period / step))), "joints": entries}
+    periods = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+    log |= {"period_s": min(periods, key=lambda period: abs(np.log(period / step))), "joints": entries}
     return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
 
 

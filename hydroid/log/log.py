@@ -7,9 +7,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-LONGEST_REST = 2.0
-"""of a rest before the first command, what counts for the start pose [s]: a leaking valve lets an arm sink"""
-
 
 @dataclass(frozen=True, eq=False)
 class Log:
@@ -102,7 +99,8 @@ class Log:
 
     def _at_rest(self, signal: Floats) -> Floats:
         rest = self.first_command if self.rest is None else self.rest
-        return signal[: min(rest, round(LONGEST_REST / self.period)) + 1]
+        longest = round(2.0 / self.period)  # a leaking valve lets an arm sink
+        return signal[: min(rest, longest) + 1]
 
     def _mean_at_rest(self, signal: Floats) -> Floats:
         resting = self._at_rest(signal)

@@ -22,14 +22,8 @@ Picture = NDArray[np.uint8]
 
 KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
 """width and height of a file's pictures [px], and pictures in a second"""
-MOMENTS = 4
-"""pictures of a motion in a png"""
-SCENE = 0.62
-"""part of the width that shows the machine; the panel has the rest"""
 GHOST = (0.12, 0.44, 0.82, 0.42)
 """colour and opacity of the measured machine"""
-BEHIND = 0.004
-"""distance of the ghost behind where it was measured [m]"""
 AZIMUTH, ELEVATION, FIELD = 125.0, -18.0, 40.0
 """where the camera looks to, and how high its picture is [deg]"""
 
@@ -48,7 +42,7 @@ class Stage:
 
     def __init__(self, motion: Motion, size: tuple[int, int], *, panel: bool = True) -> None:
         width, height = size
-        wide = round(SCENE * width) if panel and motion.signals else width
+        wide = round(0.62 * width) if panel and motion.signals else width
         self._motion, self._model = motion, motion.machine.model
         self._model.vis.global_.fovy = FIELD
         # the map covers what the camera sees, or its border shows as dots on the floor
@@ -109,7 +103,7 @@ def render_motion(
     with Stage(motion, size) as stage:
         if kind == ".png":
             content = io.BytesIO()
-            strip = stage.picture(np.linspace(begin, end, MOMENTS).tolist())
+            strip = stage.picture(np.linspace(begin, end, 4).tolist())
             Image.fromarray(strip).save(content, "PNG", optimize=True)
             return content.getvalue()
 
@@ -138,14 +132,14 @@ def add_ghost(
 ) -> None:
     """Add what moves of a machine to a scene, translucent.
 
-    It stands BEHIND farther away in a view of these angles [deg]: where both machines agree only the
+    It stands 4 mm farther away in a view of these angles [deg]: where both machines agree only the
     simulated one is seen, and their surfaces do not flicker.
     """
     first, seen = scene.ngeom, (mujoco.MjvOption(), mujoco.MjvPerturb())
     mujoco.mjv_addGeoms(model, data, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
     for geom in scene.geoms[first : scene.ngeom]:
         geom.rgba[:], geom.matid, geom.transparent = GHOST, -1, 1
-        geom.pos[:] += BEHIND * sight(*view)[2]
+        geom.pos[:] += 0.004 * sight(*view)[2]
 
 
 def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:

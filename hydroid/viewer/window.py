@@ -13,7 +13,6 @@ from hydroid.viewer.playback import Playback
 
 FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
-CLOSING = 5.0  # the longest that closing the window may take [s]
 
 
 def play(
@@ -74,7 +73,7 @@ def show(playback: Playback) -> None:
     finally:
         viewer.close()
         for thread in drawing:  # a program that ends while it still draws crashes
-            thread.join(CLOSING)
+            thread.join(5.0)
 
 
 def _try_window() -> None:

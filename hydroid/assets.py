@@ -7,8 +7,6 @@ from hydroid.errors import SettingsError
 from hydroid.files import is_file
 
 _PACKAGE = Path(__file__).parent
-_ARMS = ("hydrolek",)
-"""shipped configs that describe an arm; the others are those of fits"""
 
 
 def assets() -> Path:
@@ -36,7 +34,7 @@ def find_config(
         for candidate in (folder / name, folder / f"{name}.yaml"):
             if is_file(candidate):
                 return candidate
-    known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem in _ARMS) == (kind == "arm"))
+    known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem == "hydrolek") == (kind == "arm"))
     raise SettingsError(
         f"no such {kind}", where=str(name), hint=f"give a YAML file or one of: {', '.join(known)}"
     )

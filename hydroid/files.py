@@ -16,8 +16,6 @@ from hydroid.errors import RunError
 PART = ".part"
 """suffix of a file that is being written"""
 
-_STOPS = tuple(getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGUSR1") if hasattr(signal, n))
-
 _log = logging.getLogger(__name__)
 
 
@@ -62,7 +60,8 @@ def undisturbed() -> Generator[None]:
         yield
         return
     held: list[int] = []
-    handlers = {number: signal.getsignal(number) for number in _STOPS}
+    stops = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGUSR1"))
+    handlers = {number: signal.getsignal(number) for number in stops if number is not None}
     before = {number: handler for number, handler in handlers.items() if handler is not None}
     for number in before:
         signal.signal(number, lambda number, _: held.append(number))

@@ -14,9 +14,6 @@ from hydroid.errors import SettingsError
 
 Array = NDArray[np.float64]
 
-LARGEST = 1e100
-"""larger than any quantity; its square is still finite"""
-
 
 @dataclass(frozen=True)
 class Prior:
@@ -164,9 +161,9 @@ def relative_error(estimate: Array, truth: Array) -> Array:
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
         raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)
-    # most quantities cannot be negative; the comparison is False for NaN
+    # most quantities cannot be negative; the comparison is False for NaN, and squares stay finite
     least = min(parameter.lower, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < LARGEST:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e100:
         raise SettingsError(
             f"parameter {parameter.name!r} is {value!r}",
             where=source,

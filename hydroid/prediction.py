@@ -17,9 +17,6 @@ from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response
 
-TRACED = (("pA", "bar"), ("pB", "bar"), ("qA", "Lmin"), ("qB", "Lmin"), ("spool", "mm"), ("force", "N"))
-"""columns of a trace for each joint"""
-
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K).
@@ -76,7 +73,8 @@ def trace_csv(model: IdentifiedModel, log: Log) -> str:
     observed = simulation.trace(bindings.candidates(model.theta[None]))
     names, columns = ["time_s"], [log.time]
     for k, joint in enumerate(simulation.joints + 1):
-        names += [f"{what}{joint}_{unit}" for what, unit in TRACED]
+        units = {"pA": "bar", "pB": "bar", "qA": "Lmin", "qB": "Lmin", "spool": "mm", "force": "N"}
+        names += [f"{what}{joint}_{unit}" for what, unit in units.items()]
         columns += [
             *(observed.pressure[:, k].T / 1e5),
             *(observed.flow[:, k].T * 6e4),

@@ -3,7 +3,14 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import load_settings, open_model
+from hydroid.commands.inputs import (
+    ConfigSource,
+    ModelSource,
+    SettingChanges,
+    Source,
+    load_settings,
+    open_model,
+)
 from hydroid.commands.logs import problem_of
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
@@ -12,7 +19,6 @@ from hydroid.estimate import finite
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
     from hydroid.parameters import Array
     from hydroid.problem.problem import Problem

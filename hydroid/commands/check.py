@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hydroid.commands.inputs import as_list, load_settings
+from hydroid.commands.inputs import ConfigSource, SettingChanges, as_list, load_settings
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, SettingChanges
     from hydroid.commands.logs import LogSources
     from hydroid.log import Log, LogFinding
 

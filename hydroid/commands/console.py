@@ -13,8 +13,6 @@ from hydroid.progress import logging_to
 if TYPE_CHECKING:
     from hydroid.commands.result import Printed
 
-SCHEMA = 1
-"""version of the JSON (docs/json.md)"""
 OPTIONS = {
     "search.algorithm": "--algorithm",
     "search.pymoo.algorithm": "--algorithm",
@@ -61,7 +59,8 @@ def show_error(error: Any) -> None:
 
 
 def _print_json(content: dict[str, Any]) -> None:
-    typer.echo(json.dumps({"schema": SCHEMA} | content, ensure_ascii=False, allow_nan=False))
+    # the schema is the version of the keys (docs/json.md)
+    typer.echo(json.dumps({"schema": 1} | content, ensure_ascii=False, allow_nan=False))
 
 
 def log_lines(*, verbose: bool, quiet: bool) -> AbstractContextManager[None]:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hydroid.commands.check import plain_findings
-from hydroid.commands.inputs import load_settings, refuse_overwriting, setting_changes
+from hydroid.commands.inputs import (
+    ConfigSource,
+    SettingChanges,
+    Source,
+    load_settings,
+    refuse_overwriting,
+    setting_changes,
+)
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
@@ -16,7 +23,6 @@ from hydroid.settings.load import replace_setting, validate
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, SettingChanges, Source
     from hydroid.log import ColumnGuess, Log
 
 

@@ -3,7 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import open_model, setting_changes
+from hydroid.commands.inputs import (
+    ConfigSource,
+    ModelSource,
+    SettingChanges,
+    Source,
+    open_model,
+    setting_changes,
+)
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
@@ -11,11 +18,7 @@ from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
-
-PRECISION = ("parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag")
-"""keys of the table of predicted relative standard deviations"""
 
 
 @command
@@ -70,5 +73,6 @@ def design(
         write_log(Path(out) / "commands.csv", result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, str(commands))
-    content = {"commands": commands, "precision": rows(precision, *PRECISION)}
+    keys = ["parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag"]
+    content = {"commands": commands, "precision": rows(precision, *keys)}
     return Result([precision, *files], content, result)

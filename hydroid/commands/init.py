@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import as_list
+from hydroid.commands.inputs import Source, as_list
 from hydroid.commands.options import command, names
 from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import Source
     from hydroid.project import Project
 
 

@@ -16,7 +16,6 @@ import typer
 P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
-F = TypeVar("F", bound=Callable[..., Any])
 
 SHARED = """
     logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP [default: those of the
@@ -63,7 +62,7 @@ COMMAND_LINES: dict[Callable[..., Any], tuple[str, str, list[inspect.Parameter]]
 """text, example and parameters on the command line of every command that is imported"""
 
 
-def command(function: F) -> F:
+def command(function: Callable[P, R]) -> Callable[P, R]:
     """Make a command of a function: describe all its parameters in its docstring, and keep them for typer."""
     text, _, raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
     text, _, arguments = text.partition("\n\nArgs:")

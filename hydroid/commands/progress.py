@@ -4,6 +4,7 @@ A bar shows it on a terminal, plain lines elsewhere, and nothing in Python or wi
 time is nearly up ends a run as Ctrl-C does: with a checkpoint.
 """
 
+import math
 import signal
 import sys
 import time
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
     from hydroid.settings.fit import FitSettings
 
 NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
-LINE_EVERY = 30.0
-"""seconds between plain lines"""
-DEGREES = 57.29577951308232
-NAMES = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
 
 _visible: ContextVar[bool] = ContextVar("visible", default=False)
 _stopped = False
@@ -90,7 +87,7 @@ class Progress:
         if sys.stderr.isatty():
             self._bar = self._bar or _new_bar()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
-        elif time.monotonic() - self._shown > LINE_EVERY:
+        elif time.monotonic() - self._shown > 30.0:  # seconds between plain lines
             self._shown = time.monotonic()
             of = "" if total is None else f" of {total:.0f}"
             typer.echo(f"{line}{of} {text}".strip(), err=True)
@@ -106,11 +103,12 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings", label: str) -> None:
         search = settings.search
+        names = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
         super().__init__(label)
         what = "start" if search.algorithm == "multistart" else "population"
-        self._step = f"{NAMES.get(search.name, search.name)} {what}"
+        self._step = f"{names.get(search.name, search.name)} {what}"
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._scale, self._unit = (1.0, "") if settings.objective.relative else (DEGREES, " deg")
+        self._scale, self._unit = (1.0, "") if settings.objective.relative else (math.degrees(1), " deg")
         self._began, self._before = time.monotonic(), -1.0
 
     def generation(self, row: "Array") -> None:
@@ -124,7 +122,7 @@ class FitProgress(Progress):
 
     def refining(self, simulated: int, rms: float) -> None:
         """Take the number of simulations of the refinement, and the rms error [rad] so far."""
-        self("refinement, simulations", simulated, None, f"rms error {rms * DEGREES:.4g} deg")
+        self("refinement, simulations", simulated, None, f"rms error {math.degrees(rms):.4g} deg")
 
 
 def _new_bar() -> Any:

@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import as_list
+from hydroid.commands.inputs import Source, as_list
 from hydroid.commands.options import command
 from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import Source
     from hydroid.run.collection import Runs
-
-SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
-"""keys of the table of several runs"""
 
 
 @command
@@ -58,10 +54,11 @@ def report(
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
     tables, best = merged_tables(collected), collected.best
     line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
+    keys = ["name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag"]
     content = {
         "out": str(out),
         "best": best.folder,
         "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected.runs},
-        "parameters": rows(tables["spread"], *SPREAD),
+        "parameters": rows(tables["spread"], *keys),
     }
     return Result([tables["spread"], line, *written(tables, out)], content, collected)

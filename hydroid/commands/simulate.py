@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hydroid.commands.inputs import open_model, refuse_overwriting
+from hydroid.commands.inputs import (
+    ConfigSource,
+    ModelSource,
+    SettingChanges,
+    Source,
+    open_model,
+    refuse_overwriting,
+)
 from hydroid.commands.logs import read_arms
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
@@ -14,7 +21,6 @@ from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.log import Log
 
 

@@ -16,8 +16,6 @@ from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, read_yaml
 
-MOVED = 0.1
-"""relative change of a mass by a stage 1 whose logs do not determine it, from which on it is said"""
 _log = logging.getLogger(__name__)
 
 
@@ -70,7 +68,7 @@ def with_mechanics(
         held[key] = value
         nominal, flag = settings.nominal(p), summary and summary.estimate[name].flag
         doubtful = mass and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
-        if doubtful and nominal and abs(value - nominal) > MOVED * nominal:
+        if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
             _log.warning(
                 "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it "
                 "(%s). Without --mech it is estimated here",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hydroid.commands.fit import FitResult, fit
-from hydroid.commands.inputs import as_list, setting_changes
+from hydroid.commands.inputs import ConfigSource, SettingChanges, Source, as_list, setting_changes
 from hydroid.commands.logs import read_logs, run_logs
 from hydroid.commands.options import command, taking
 from hydroid.commands.progress import FitProgress
@@ -17,7 +17,6 @@ from hydroid.estimate import read_values
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ConfigSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
 
 NAMED = "runs/LOG-STAGE-ALGORITHM"

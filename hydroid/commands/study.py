@@ -4,6 +4,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hydroid.commands.inputs import Source
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
@@ -12,7 +13,6 @@ from hydroid.errors import Stopped
 from hydroid.settings.study import load_study
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import Source
     from hydroid.studies.study import StudyRuns
 
 

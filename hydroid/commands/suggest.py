@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import open_model
+from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source, open_model
 from hydroid.commands.logs import problem_of
 from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
@@ -13,7 +13,6 @@ from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
     from hydroid.advice.suggestions import Advice
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
     from hydroid.reporting.table import Table
 

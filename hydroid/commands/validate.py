@@ -5,14 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.commands.inputs import as_list, open_model
+from hydroid.commands.inputs import ModelSource, SettingChanges, Source, as_list, open_model
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
 from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
 
 if TYPE_CHECKING:
-    from hydroid.commands.inputs import ModelSource, SettingChanges, Source
     from hydroid.commands.logs import LogSources
     from hydroid.estimate import JointVerdict
     from hydroid.fitting.validation import Prediction

@@ -4,7 +4,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hydroid.commands.inputs import load_settings, open_model, require_hydraulics
+from hydroid.commands.inputs import (
+    ConfigSource,
+    ModelSource,
+    SettingChanges,
+    Source,
+    load_settings,
+    open_model,
+    require_hydraulics,
+)
 from hydroid.commands.logs import read_arms, run_logs
 from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
@@ -16,7 +24,6 @@ from hydroid.viewer.opengl import choose_platform
 
 if TYPE_CHECKING:
     from hydroid.arm.collision import Clearance
-    from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source
     from hydroid.log import Log
     from hydroid.settings.fit import FitSettings
 

@@ -30,13 +30,6 @@ from hydroid.parallel.workers import DaskWorkers
 
 CONNECT = 20.0
 """seconds in which a scheduler must answer"""
-PEM = ["tls_ca_file", *(f"tls_{r}_{k}" for r in ("scheduler", "worker", "client") for k in ("cert", "key"))]
-"""attributes of Dask's credentials"""
-CLOSED: dict[str, list[str]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
-"""Dask's configuration for what is started here: its HTTP servers have no TLS, and serve nothing"""
-PATIENT = {"distributed.deploy.lost-worker-timeout": "1 hour"}
-"""Dask's configuration for local workers: one that dies is started again, and Dask would give it up for good
-if that takes longer than 15 s, as on a busy machine"""
 
 
 @contextmanager
@@ -63,14 +56,18 @@ def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskW
         hint = "install it: pip install 'hydroid[cluster]'"
         raise SettingsError(f"Dask cannot be imported ({error})", where="--dask", hint=hint) from None
     with ExitStack() as stack:
-        stack.enter_context(config.set(CLOSED))
+        # HTTP servers of what is started here have no TLS, and serve nothing
+        closed = {f"distributed.{name}.http.routes": list[str]() for name in ("scheduler", "worker")}
+        stack.enter_context(config.set(closed))
         own = re.fullmatch(r"(local|slurm)(?::([1-9][0-9]{0,3}))?", dask)
         if own is None:
             target = _address(dask, insecure)
         elif own[1] == "slurm":
             target = _start_slurm(stack, int(own[2] or 1))
         else:
-            stack.enter_context(config.set(PATIENT))
+            # a worker that dies is started again, and Dask would give it up for good if that takes longer
+            # than 15 s, as on a busy machine
+            stack.enter_context(config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}))
             target = _start_local(stack, int(own[2] or os.cpu_count() or 1))
         client: Any = Client.__new__(Client)
         try:
@@ -153,7 +150,9 @@ def _start_slurm(stack: ExitStack, jobs: int) -> Any:
 
     folder = tempfile.mkdtemp(prefix=".hydroid-dask-", dir=Path.cwd())  # only this user can read it
     stack.callback(shutil.rmtree, folder, ignore_errors=True)
-    credentials, files = _new_credentials(), {name: f"{folder}/{name}.pem" for name in PEM}
+    credentials = _new_credentials()
+    keys = [f"tls_{role}_{kind}" for role in ("scheduler", "worker", "client") for kind in ("cert", "key")]
+    files = {name: f"{folder}/{name}.pem" for name in ("tls_ca_file", *keys)}
     for name, file in files.items():
         Path(file).write_text(getattr(credentials, name))
     cores = config.get("jobqueue.slurm.cores") or 4  # Dask's configuration has the site's defaults

@@ -19,8 +19,6 @@ from hydroid.errors import RunError
 
 Float = NDArray[np.float64]
 
-LOOK = 10.0
-"""seconds between two checks that the scheduler is there and has workers"""
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy", "numba")}
 """packages whose versions decide the bits of a result"""
 
@@ -115,7 +113,8 @@ class DaskWorkers:
         try:
             while True:
                 with suppress(TimeoutError):
-                    distributed.wait(futures, timeout=LOOK)  # pyright: ignore[reportUnknownMemberType]
+                    # from time to time: is the scheduler there, has it workers?
+                    distributed.wait(futures, timeout=10.0)  # pyright: ignore[reportUnknownMemberType]
                     break
                 if self.client.status in ("closing", "closed"):
                     raise ConnectionError("no answer")

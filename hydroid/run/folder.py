@@ -23,9 +23,6 @@ from hydroid.run.run_log import run_log
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
-CHANGING = ("status", "seconds")
-"""its entries that change while the run goes on"""
-
 _log = logging.getLogger(__name__)
 
 
@@ -156,7 +153,8 @@ class RunFolder:
         Raises:
             RunError: no checkpoint is whole.
         """
-        fixed = {key: value for key, value in self.identity().items() if key not in CHANGING}
+        # what does not change while the run goes on
+        fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}
         run = hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
         return CheckpointFile(self.path / "checkpoint.npz", run)
 

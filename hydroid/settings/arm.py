@@ -21,9 +21,6 @@ from hydroid.settings.load import Settings, load
 if TYPE_CHECKING:
     import mujoco
 
-TURN = (-180.0, 180.0)
-"""range of a joint without limits [deg], for sliders and tests"""
-
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
     folder = (info.context or {}).get("folder")
@@ -126,7 +123,8 @@ class Arm:
     def _joint(self, name: str) -> "Joint":
         joint, actuator = self._model.joint(name), self.file.actuators.get(name)
         limited = bool(joint.limited[0])
-        low, high = np.degrees(joint.range).round(DIGITS).tolist() if limited else TURN
+        # sliders and tests take a joint without limits once round
+        low, high = np.degrees(joint.range).round(DIGITS).tolist() if limited else (-180.0, 180.0)
         if isinstance(actuator, Cylinder):
             try:
                 if not limited:

@@ -11,13 +11,6 @@ from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
 
-QUANTILE = 1.96
-"""standard deviations of a Gaussian that hold 95 % on both sides"""
-BOUND_SD = 4.0
-"""standard deviations of its prior that a parameter without bounds may be away"""
-SMALLEST = 0.01
-"""part of the nominal value below which a quantity that must be above 0 is not searched by default"""
-
 
 def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> dict[str, Any]:
     """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
@@ -105,14 +98,15 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
         return Prior(nominal, own.sd)
     if nominal <= 0:
         raise ValueError("within: factor needs a nominal value above 0; give sd: instead")
-    return Prior(nominal, math.log(own.within or 1.0) / QUANTILE, log=True)
+    return Prior(nominal, math.log(own.within or 1.0) / 1.96, log=True)  # 95 % lie within
 
 
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    least = SMALLEST * prior.nominal if CHOICES[own.quantity].positive else CHOICES[own.quantity].lowest
-    return max(prior.value(-BOUND_SD), least), prior.value(BOUND_SD)
+    quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
+    least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
+    return max(prior.value(-4.0), least), prior.value(4.0)
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:

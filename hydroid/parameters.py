@@ -153,11 +153,6 @@ class ParameterSet:
         return dict(zip(self.names, map(float, theta), strict=True))
 
 
-def relative_error(estimate: Array, truth: Array) -> Array:
-    """Return |estimate - truth| / |truth|, as in the article's tables 1 and 6."""
-    return np.abs(estimate - truth) / np.abs(truth)
-
-
 def _number(parameter: Parameter, value: object, source: str) -> float:
     if value is None:
         raise SettingsError(f"parameter {parameter.name!r} is missing", where=source)

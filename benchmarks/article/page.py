@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from claims import Outcome, Verdict, verdicts
 from measures import UNITS
-from studies import FOLDER, ArticleStudy, Table, load_studies, order
+from studies import FOLDER, ArticleStudy, Table, load_studies
 
 from hydroid.settings.study import cell_settings
 from hydroid.studies.study import Row
@@ -53,25 +53,22 @@ def page(results: Path) -> str:
         ]
         for name, study in studies.items()
     }
-    parts = [HEAD, QUICK if about["quick"] else "", overview(studies, made), provenance(about, results)]
+    parts = [HEAD, QUICK if about["quick"] else "", overview(made), provenance(about, results)]
     for name, study in studies.items():
         parts += section(name, study, about["facts"][name], made[name])
         parts += results_of(name, study, rows.get(name, []), results)
     return "".join((*parts, "\n", (FOLDER / "choices.md").read_text(encoding="utf-8")))
 
 
-def overview(studies: dict[str, ArticleStudy], made: dict[str, list[Verdict]]) -> str:
-    """Return how many statements on each item hold."""
+def overview(made: dict[str, list[Verdict]]) -> str:
+    """Return how many statements hold."""
     every = [verdict for some in made.values() for verdict in some]
     theirs, ours = ([v for v in every if v.ours == mine] for mine in (False, True))
-    rows: list[tuple[str, ...]] = []
-    for item in sorted({item for study in studies.values() for item in study.items}, key=order):
-        titles = [study.title for study in studies.values() if item in study.items]
-        links = ", ".join(f"[{title}](#{anchor(title)})" for title in titles)
-        rows.append((whole(item), tally(v for v in theirs if v.item == item), links))
     text = f"\n## In short\n\n- {len(theirs)} statements of the article: {tally(theirs)}.\n"
-    text += f"- {len(ours)} claims of ours, on other searches and another measure: {tally(ours)}.\n{MEANING}"
-    return text + table("", ("item", "what the article says", "made in"), rows)
+    return (
+        text
+        + f"- {len(ours)} claims of ours, on other searches and another measure: {tally(ours)}.\n{MEANING}"
+    )
 
 
 def tally(verdicts: Iterable[Verdict]) -> str:
@@ -86,16 +83,6 @@ def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note
     lines = [header, ["---"] * len(header), *rows]
     text = "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in lines)
     return above + text + (f"\n{note}\n" if note else "")
-
-
-def anchor(title: str) -> str:
-    """Return the address of a heading within the page."""
-    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c == "-")
-
-
-def whole(text: str) -> str:
-    """Return a text that no line ends within, if it is short enough for a narrow column."""
-    return text.replace(" ", "\N{NO-BREAK SPACE}") if len(text) < 20 else text
 
 
 def provenance(about: dict[str, Any], results: Path) -> str:
@@ -118,7 +105,7 @@ def section(name: str, study: ArticleStudy, facts: dict[str, str], made: list[Ve
     lines = [f"\n## {study.title}\n\n{items} ([settings]({settings})). {study.about.strip()}\n\n"]
     lines += [f"- {what}: {text}\n" for what, text in facts.items() if what != "cells"]
     for title, ours in (("What the article says", False), ("Claims of ours", True)):
-        if rows := [(whole(v.item), v.says, whole(v.outcome), v.detail) for v in made if v.ours == ours]:
+        if rows := [(v.item, v.says, v.outcome, v.detail) for v in made if v.ours == ours]:
             lines.append(table(title, ("item", "statement", "verdict", "what that rests on"), rows))
     return lines
 
@@ -141,10 +128,10 @@ def study_table(shown: Table, rows: Sequence[Row], cells: Sequence[str], units: 
     for cell in shown.cells or cells:
         good = [row.values for row in rows if row.cell == cell and not row.failed]
         values = ([row[column] for row in good] for column in shown.columns)
-        lines.append([whole(cell), "ours", str(len(good)), *map(spread, values)])
+        lines.append([cell, "ours", str(len(good)), *map(spread, values)])
         if cell in shown.article:
             values = ("" if v is None else f"{v:g}" for v in shown.article[cell])
-            lines.append([whole(cell), "article", "", *values])
+            lines.append([cell, "article", "", *values])
     named = (f"{c} [{units[c]}]" if units.get(c) else c for c in shown.columns)
     return table(shown.title, ("cell", "from", "runs", *named), lines, f"{SPREAD} {shown.note}".strip())
 

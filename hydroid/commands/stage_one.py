@@ -56,13 +56,19 @@ def with_mechanics(
     if mech is not None and summary is not None:
         changes = {**_inherited(estimate_file(Path(mech)).parent, config, logs), **changes}
     settings = load_stage("hyd", config, changes)
+    parameters = {name: settings.parameters[name] for name in _mechanical(settings)}
+    missing = [
+        name
+        for name, p in parameters.items()
+        if values.get(name) is None and p.fixed is None and (mech is not None or not p.states_start)
+    ]
+    if missing:
+        hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
+        what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
+        raise SettingsError(what, where=str(mech or ""), hint=hint)
     held: dict[str, Any] = {}
-    missing: list[str] = []
-    for name in _mechanical(settings):
-        p, value = settings.parameters[name], values.get(name)
-        if value is None and p.fixed is None and (mech is not None or not p.states_start):
-            missing.append(name)
-        key, mass = f"parameters.{name}.fixed", p.quantity == "mass"
+    for name, p in parameters.items():
+        value, key, mass = values.get(name), f"parameters.{name}.fixed", p.quantity == "mass"
         if value is None or key in changes or (p.states_start and not mass):
             continue
         held[key] = value
@@ -74,10 +80,6 @@ def with_mechanics(
                 "(%s). Without --mech it is estimated here",
                 *(name, value, nominal, flag),
             )
-    if missing:
-        hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
-        what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
-        raise SettingsError(what, where=str(mech or ""), hint=hint)
     return {**changes, **held}
 
 
@@ -86,26 +88,21 @@ def _inherited(folder: Path, config: ConfigSource, logs: Sequence[str]) -> dict[
     if not is_file(folder / CONFIG):
         return {}
     first = load(folder / CONFIG, FitSettings)
-    own = {} if isinstance(config, FitSettings) else read_yaml(find_config(config))[0]
-    layout = own.get("log")
-    taken = {
-        f"log.{key}": value
-        for key, value in first.log.model_dump(mode="json").items()
-        if not isinstance(layout, dict) or key not in layout
-    }
+    own: dict[str, Any] = {} if isinstance(config, FitSettings) else read_yaml(find_config(config))[0]
+    layout, known = own.get("log"), own.get("parameters")
+    stated = layout if isinstance(layout, dict) else {}
+    taken = {f"log.{k}": v for k, v in first.log.model_dump(mode="json").items() if k not in stated}
     payloads = {name: mass for name, mass in first.payloads.items() if name in logs}
     whole = {"start_pose": first.start_pose, "payloads": payloads, "arm": str((folder / ARM).resolve())}
     taken |= {key: value for key, value in whole.items() if key not in own}
-    known: Any = own.get("parameters")
-    if "arm" in own or not isinstance(known, dict):
-        return taken
     links = first.arm.link_names
-    fitting = {n: p for n, p in known.items() if not isinstance(p, dict) or p.get("link", links[0]) in links}
-    if len(fitting) < len(known):  # those of another arm: stage 1's take their place
-        more = {
-            n: first.parameters[n].model_dump(mode="json") for n in _mechanical(first) if n not in fitting
+    if "arm" not in own and isinstance(known, dict):
+        fitting = {
+            n: p for n, p in known.items() if not isinstance(p, dict) or p.get("link", links[0]) in links
         }
-        taken["parameters"] = fitting | more
+        if len(fitting) < len(known):  # those of another arm: stage 1's take their place
+            more = (n for n in _mechanical(first) if n not in fitting)
+            taken["parameters"] = fitting | {n: first.parameters[n].model_dump(mode="json") for n in more}
     return taken
 
 

@@ -23,9 +23,9 @@ _PLAIN = {
 }
 """what the YAML reader stumbled over, by a part of its message"""
 _WORDS = {"": None, "~": None} | {
-    spelling: value
-    for word, value in (("null", None), ("true", True), ("false", False))
-    for spelling in (word, word.title(), word.upper())
+    spelt: value
+    for word, value in {"null": None, "true": True, "false": False}.items()
+    for spelt in (word, word.title(), word.upper())
 }
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")  # longer ones are beyond any float
 _NUMBER = re.compile(

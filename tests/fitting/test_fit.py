@@ -12,7 +12,6 @@ from hydroid.fitting.fit import fit
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
-from hydroid.parameters import relative_error
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
@@ -74,7 +73,7 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(tmp_path, 
     # five seconds do not determine all nine, but the ratios K : D : S are strong
     ratio = (result.best.theta / truth)[:3]
     np.testing.assert_allclose(ratio / ratio[0], 1, rtol=0.01)
-    assert relative_error(result.searched.theta, truth).sum() > 0.1  # the search alone does not find them
+    assert np.sum(np.abs(result.searched.theta / truth - 1)) > 0.1  # the search alone does not find them
     expected = {"best", "refined"} if algorithm == "ga" else {"average", "utopia", "best", "refined"}
     assert set(result.estimates) == expected
     assert set(result.seconds) == {"search", "refinement", "uncertainty"}

@@ -172,6 +172,15 @@ _HYDRAULIC = (
     Quantity("flow_coefficient", "", 0.7, "flow coefficient", "C_q of equation (7), for oil of 860 kg/m³"),
     Quantity("transition_pressure", "bar", 0.2, "pressure drop below which flow is laminar"),
     Quantity("flow_limit", "L/min", None, "largest flow to one actuator", "null: no limit", (0.1, 1000.0)),
+    Quantity(
+        "draw",
+        "",
+        ONE,
+        "flow from the pump over flow into the chamber",
+        "below 1 where a valve feeds oil back from the other chamber, 0 where the load lowers itself",
+        (0.1, 1.0),
+        FROM_ZERO,
+    ),
     # the pump
     Quantity("pump_flow", "L/min", None, "largest flow of the pump", "null: no limit", (0.1, 1000.0)),
     Quantity(

@@ -109,5 +109,5 @@ def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
     Elementwise over COEFFICIENTS; 0 of a joint without actuator.
     """
     speed = rod_motion(angle, c)[1] * velocity
-    flow = np.where(speed > 0, c.a.area, -c.b.area) * speed
+    flow = np.where(speed > 0, c.a.draw * c.a.area, -c.b.draw * c.b.area) * speed
     return np.where(c.kind == NONE, 0.0, flow)

@@ -129,7 +129,7 @@ def couple(pad: Pad, order: Any, idle: int, step: float) -> None:
         pad.gain[a] += step * u.weight * u.thrust * line.change
         for b in range(a, order.size):
             w = pad.joints[order[b]]
-            pad.matrix[a, b] += step * line.softness * u.weight * u.thrust * w.weight * w.thrust
+            pad.matrix[a, b] += step * line.softness * u.weight * u.pull * w.weight * w.pull
 
 
 @compilable
@@ -138,7 +138,7 @@ def release(pad: Pad, order: Any, idle: int, step: float) -> None:
     line = pad.line[0]
     for a in range(idle, order.size):
         w = pad.joints[order[a]]
-        line.change -= line.softness * w.thrust * w.weight * pad.gain[a]
+        line.change -= line.softness * w.sweep * w.weight * pad.gain[a]
     for a in range(idle, order.size):
         fill(line, pad.joints[order[a]], step)
 

@@ -73,10 +73,13 @@ def draw(line: Any, c: Any, w: Any) -> None:
     if line.pressure > c.supply_pressure:
         w.a.give, w.b.give = 0.0, 0.0
     back_a, back_b = w.a.filled * w.a.give * w.a.rise, w.b.filled * w.b.give * w.b.rise
-    line.drawn += w.a.pumped - back_a * w.a.inflow + w.b.pumped - back_b * w.b.inflow
-    line.softness += w.a.give * (1.0 - back_a) + w.b.give * (1.0 - back_b)
+    a, b = c.a.draw, c.b.draw
+    line.drawn += a * w.a.pumped - a * back_a * w.a.inflow + b * w.b.pumped - b * back_b * w.b.inflow
+    line.softness += a * w.a.give * (1.0 - back_a) + b * w.b.give * (1.0 - back_b)
     w.thrust = back_a * w.a.lever + back_b * w.b.lever
-    line.swept += w.thrust * w.speed
+    w.sweep = a * back_a * w.a.lever + b * back_b * w.b.lever
+    w.pull = np.copysign(np.sqrt(max(w.thrust * w.sweep, 0.0)), w.thrust)
+    line.swept += w.sweep * w.speed
 
 
 @compilable
@@ -96,7 +99,7 @@ def fill(line: Any, w: Any, step: float) -> None:
     w.a.inflow += w.a.give * line.change
     w.b.inflow += w.b.give * line.change
     w.push += w.weight * w.thrust * line.change
-    w.oil_stiffness += line.softness * w.thrust * w.thrust / step
+    w.oil_stiffness += line.softness * w.thrust * w.sweep / step
 
 
 @compilable

@@ -116,8 +116,8 @@ SCRATCH = np.dtype(
             # of the whole step: running sums over its sub-steps, and where the joint is
             "inertia way speed torque resistance oil_stiffness travel arm slope "
             # of a sub-step: damping, oil stiffness times step, weight of the new state, torque at rest,
-            # f of `pump`
-            "drag stiffness weight push thrust"
+            # f and g of `pump`, and the mean of both
+            "drag stiffness weight push thrust sweep pull"
         ),
     ]
 )

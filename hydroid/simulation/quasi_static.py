@@ -73,7 +73,7 @@ def rod_speed(c: Any, side: Any, other: Any, w: Any, supply: float, sign: float)
             flow, rise = c.flow_limit, 0.0
     elif flow > c.flow_limit:
         speed, flow, rise = c.flow_limit / side.area, c.flow_limit, 0.0
-    return speed, flow, rise
+    return speed, side.draw * flow, side.draw * rise
 
 
 @compilable

@@ -2,7 +2,8 @@
 
     python examples/excavator/make_meshes.py
 
-The shapes are ours: simple blocks of the size of a 20 t machine. Nothing of the logged machine was measured.
+The distances between the joints are those of the logs' authors; the shapes are ours: simple blocks of the size of a
+7 t machine. x runs along boom, arm and bucket.
 """
 
 import sys
@@ -17,38 +18,40 @@ from trimesh import Trimesh
 
 def base() -> Trimesh:
     """Undercarriage with two tracks, below the slewing ring."""
-    track = plate("y", (0.95, 1.45), (-0.6, -1.6, 0.4), (-0.6, 1.6, 0.4))
+    track = plate("y", (0.7, 1.1), (-0.4, -1.1, 0.3), (-0.4, 1.1, 0.3))
     return join(
-        both(track), box((-0.7, -1.0, -0.7), (0.7, 1.0, -0.2)), rod("z", (0.0, 0.0), (-0.3, 0.0), 0.6)
+        both(track), box((-0.5, -0.75, -0.5), (0.5, 0.75, -0.12)), rod("z", (0.0, 0.0), (-0.2, 0.0), 0.45)
     )
 
 
 def house() -> Trimesh:
     """Upper structure: deck, engine, cab, counterweight."""
-    deck = box((-1.9, -1.25, 0.05), (0.9, 1.25, 0.35))
-    engine = box((-1.9, -1.25, 0.3), (-0.4, 1.25, 1.2))
-    cab = box((-0.4, 0.35, 0.3), (0.9, 1.25, 1.8))
-    weight = plate("z", (0.1, 1.1), (-1.9, -0.7, 0.5), (-1.9, 0.7, 0.5))
-    cheek = plate("y", (0.24, 0.3), (0.3, -0.1, 0.2), (0.7, 0.1, 0.15))
-    return join(deck, engine, cab, weight, both(cheek))
+    deck = box((-1.5, -1.0, 0.05), (0.5, 1.0, 0.3))
+    engine = box((-1.5, -1.0, 0.25), (-0.4, 1.0, 1.0))
+    cab = box((-0.5, 0.15, 0.25), (0.5, 1.0, 1.6))
+    weight = plate("z", (0.1, 0.9), (-1.4, -0.6, 0.35), (-1.4, 0.6, 0.35))
+    cheek = plate("y", (-0.3, -0.24), (0.5, 0.0, 0.2), (0.2, 0.1, 0.15), (0.15, 0.45, 0.1))
+    return join(deck, engine, cab, weight, cheek, cheek.copy().apply_translation((0.0, 0.34, 0.0)))
 
 
 def boom() -> Trimesh:
-    """Bent boom, 4.6 m from foot to arm joint."""
-    lower = plate("y", (-0.2, 0.2), (0.0, 0.0, 0.15), (0.5, 2.0, 0.32))
-    upper = plate("y", (-0.2, 0.2), (0.5, 2.0, 0.32), (0.0, 4.6, 0.16))
+    """Bent boom; the arm's joint lies 3.6957 m from its foot."""
+    lower = plate("y", (-0.13, 0.13), (0.0, 0.0, 0.12), (0.35, 1.6, 0.26))
+    upper = plate("y", (-0.13, 0.13), (0.35, 1.6, 0.26), (0.0, 3.6957, 0.12))
     return join(lower, upper)
 
 
 def arm() -> Trimesh:
-    """Arm, 2.4 m, which hangs down at angle 0."""
-    return plate("y", (-0.16, 0.16), (0.35, -0.1, 0.12), (0.0, 0.0, 0.2), (-2.4, 0.0, 0.12))
+    """Arm; the bucket's joint lies 1.6223 m from its own. Its cylinder pushes the rear end."""
+    return plate(
+        "y", (-0.11, 0.11), (0.05, -0.36, 0.08), (0.15, 0.1, 0.14), (0.0, 0.0, 0.15), (0.0, 1.6223, 0.08)
+    )
 
 
 def bucket() -> Trimesh:
-    """Bucket, curled under the arm at angle 0."""
-    back = plate("y", (-0.5, 0.5), (0.0, 0.0, 0.12), (-0.35, -0.1, 0.12), (-0.3, -0.8, 0.06))
-    floor = plate("y", (-0.5, 0.5), (-0.3, -0.8, 0.06), (0.05, -1.25, 0.03))
+    """Bucket, stretched out beyond the arm at angle 0, its mouth below."""
+    back = plate("y", (-0.35, 0.35), (0.0, 0.0, 0.1), (0.28, 0.2, 0.1), (0.2, 0.6, 0.04))
+    floor = plate("y", (-0.35, 0.35), (0.2, 0.6, 0.04), (-0.05, 0.95, 0.02))
     return join(back, floor)
 
 

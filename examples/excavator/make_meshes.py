@@ -2,8 +2,8 @@
 
     python examples/excavator/make_meshes.py
 
-The distances between the joints are those of the logs' authors; the shapes are ours: simple blocks of the size of a
-7 t machine. x runs along boom, arm and bucket.
+The distances between the joints are those of the logs' authors; the shapes are ours: simple
+blocks of the size of a 7 t machine. x runs along boom, arm and bucket.
 """
 
 import sys

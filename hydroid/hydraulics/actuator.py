@@ -104,7 +104,7 @@ def observe(coefficients: NDArray[np.void], state: NDArray[np.void], angle: Arra
 
 
 def swallowed(c: Records, angle: Array, velocity: Array) -> Array:
-    """Flow [m³/s] that the chamber behind the motion takes in at an angle [rad] and velocity [rad/s].
+    """Flow [m³/s] that a motion takes from the pump at an angle [rad] and velocity [rad/s].
 
     Elementwise over COEFFICIENTS; 0 of a joint without actuator.
     """

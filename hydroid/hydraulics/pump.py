@@ -5,8 +5,10 @@ pressure P of its own. Its oil is compressible, as in the chambers:
 
     Ṗ = β/V_line (Q_P(P) − Σ Q_i),   P ≤ supply pressure, where the relief valve opens,
 
-with Q_i the flow that actuator i takes from it. So P falls until the flows, opening times root of what the
-load leaves of P, add up to what the pump gives, and no equation has to be solved for it. The pump gives
+with Q_i the flow that actuator i takes from it: `draw` times what enters its chamber. The rest comes from the
+other chamber, through a regeneration valve, or from the tank. So P falls until the flows, opening times root
+of what the load leaves of P, add up to what the pump gives, and no equation has to be solved for it. The pump
+gives
 
     Q_P = φ Q_max min(1, (p_S − P)/droop),
 
@@ -19,12 +21,13 @@ the logged speed, however low P falls.
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the chambers eliminated,
 P changes by
 
-    δ = (R − Σ f_i v̄_i) / D,   D = V_line/(β h) − dQ_P/dP + Σ k (1 − k r) > 0,
+    δ = (R − Σ g_i v̄_i) / D,   D = V_line/(β h) − dQ_P/dP + Σ draw k (1 − k r) > 0,
 
 v̄ the joints' mean velocities, k = dQ/dP of a metering edge and r a chamber's rise of pressure per flow. It
-pushes joint i with the torque f_i δ. To the symmetric system of the velocities that adds the matrix
-f fᵀ h / D, which is positive: the sub-step stays as stable as it is without a pump. Where P would pass the
-relief pressure, δ is what is missing to it.
+pushes joint i with the torque f_i δ, and g_i is f_i times the draw. To the symmetric system of the velocities
+that adds the matrix √(f g) √(f g)ᵀ h / D, which is positive: the sub-step stays as stable as it is without a
+pump. (Between joints whose draws differ this is not f gᵀ: the predicted velocities err in the second order of
+the sub-step, no oil is lost.) Where P would pass the relief pressure, δ is what is missing to it.
 """
 
 from typing import Any

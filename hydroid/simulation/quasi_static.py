@@ -8,7 +8,7 @@ and A_out, k = C_q √(2/ρ), the load F (gravity, springs, dry friction against
 which is a quadratic equation in v. Where the load overruns, p_in would fall below 0: the chamber then
 cavitates, and what leaves the other one governs. A load that the supply cannot lift is held. All actuators
 share the pump's line, whose pressure P satisfies one equation, Σ Q_i(P) = Q_P(P) of
-`hydroid.hydraulics.pump`.
+`hydroid.hydraulics.pump`, with Q_i the flow into the chamber times its `draw`.
 
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps are long: what is
 integrated is the angle alone, with load and lever arm taken at the middle of the step. Joints without an
@@ -113,8 +113,8 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) 
             low = pressure
         if abs(excess) <= SETTLED * full or high - low <= SETTLED * some.relief:
             break
-        after = pressure - excess / slope if slope > 0.0 else (low if excess > 0.0 else high)
-        if not low <= after <= high:
+        after = pressure - excess / slope  # infinite where nothing flows
+        if not low < after < high:
             after = high if after > high == some.relief else 0.5 * (low + high)
         pressure = after
     return pressure

@@ -31,17 +31,19 @@ def test_a_pump_that_suffices_changes_nothing():
     np.testing.assert_allclose(angle[1], angle[0], atol=1e-9)
 
 
-@pytest.mark.parametrize("droop", [0.0, 60.0])
-def test_joints_that_move_together_share_the_flow(arm: Arm, droop: float):
+@pytest.mark.parametrize(("droop", "draw"), [(0.0, 1.0), (60.0, 1.0), (60.0, 0.4)])
+def test_joints_that_move_together_share_the_flow(arm: Arm, droop: float, draw: float):
     command = [0.0, 70.0, 0.0, -90.0, 0.0, 60.0, 0.0]
     alone = [observe(arm, [u if j == k else 0.0 for k, u in enumerate(command)], 60)[1] for j in (1, 3, 5)]
     wanted = sum(flow[-1].sum() for flow in alone)
-    most = 0.6 * wanted
-    line, flow, pressure = observe(arm, command, 60, pump_flow=most, pump_droop=droop, line_volume=5.0)
+    most = 0.6 * draw * wanted
+    pump = {"pump_flow": most, "pump_droop": droop, "draw_a": draw, "draw_b": draw}
+    line, flow, pressure = observe(arm, command, 60, line_volume=5.0, **pump)
+    taken = draw * flow
     given = most * min(1.0, (150.0 - line[-1]) / droop) if droop else most
-    assert flow[-5:].sum(axis=1).mean() == pytest.approx(given, rel=0.02)
+    assert taken[-5:].sum(axis=1).mean() == pytest.approx(given, rel=0.02)
     stored = 5e-3 * (150.0 - line[-1]) / 8000.0  # oil that the line gave [L]
-    assert flow.sum(axis=1).mean() * 0.01 <= most / 60 * 0.6 + stored
+    assert taken.sum(axis=1).mean() * 0.01 <= most / 60 * 0.6 + stored
     assert (flow[-1, [1, 3, 5]] > 0).all()
     assert line[-1] < 140
     # no oil runs back: each feeding chamber is below the line where oil flows

@@ -13,6 +13,7 @@ from hydroid.simulation.scenario import Scenario
 
 SHOULDER, ROLL = 1, 3
 """a cylinder that lifts the arm, and a rotary actuator, 0-based"""
+PUMP = {"pump_flow": 6e-5, "pump_droop": 60e5}
 
 
 @pytest.fixture
@@ -48,7 +49,7 @@ def test_without_load_the_speed_is_opening_times_root_of_the_pressure(simulated)
 
 
 @pytest.mark.parametrize("commands", [{SHOULDER: 50}, {SHOULDER: -50}, {SHOULDER: 60, 2: -40}])
-@pytest.mark.parametrize("pump", [{}, {"pump_flow": 6e-5, "pump_droop": 60e5}])
+@pytest.mark.parametrize("pump", [{}, PUMP, PUMP | {"draw_a": 0.3, "draw_b": 0.8}])
 def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simulated, commands, pump):
     def apart(slower, stiffer):
         each = {"opening_a": 3e-7 / slower, "opening_b": 3e-7 / slower, "leakage": 1e-14, "damping": 0.0}
@@ -64,14 +65,27 @@ def test_the_dynamic_model_converges_to_it_as_oil_stiffens_and_motion_slows(simu
     assert near < 0.5 * far
 
 
-def test_what_the_actuators_take_is_what_the_pump_gives(simulated):
-    flow, droop = 6e-5, 60e5
-    _, trace, joints = simulated({SHOULDER: 70, 2: -60}, pump_flow=flow, pump_droop=droop)
-    taken = np.where(trace.flow[..., 0] > 0, trace.flow[..., 0], -trace.flow[..., 1]).sum(axis=1)
-    given = flow * np.minimum((joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / droop, 1.0)
+@pytest.mark.parametrize("draw", [1.0, 0.6])
+def test_what_the_actuators_take_is_what_the_pump_gives(simulated, draw):
+    _, trace, joints = simulated({SHOULDER: 70, 2: -60}, **PUMP, draw_a=draw)
+    taken = np.where(trace.flow[..., 0] > 0, draw * trace.flow[..., 0], -trace.flow[..., 1]).sum(axis=1)
+    left = (joints.supply_pressure[SHOULDER] - trace.line[:, 0]) / PUMP["pump_droop"]
+    given = PUMP["pump_flow"] * np.minimum(left, 1.0)
     moving = trace.line[:, 0] < joints.supply_pressure[SHOULDER]
     assert moving.sum() > 100
     np.testing.assert_allclose(taken[moving], given[moving], rtol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["quasi-static", "dynamic"])
+def test_what_is_not_drawn_from_the_pump_does_not_load_it(simulated, model):
+    one, both = {SHOULDER: 70}, {SHOULDER: 70, 2: -60}
+    constant = simulated(both, 1.0, model)[0]
+    np.testing.assert_array_equal(simulated(both, 1.0, model, draw_a=0.3)[0], constant)
+    weak = {"pump_flow": 8e-6, "line_volume": 1e-6}
+    free = simulated(both, 1.0, model, **weak, draw_a=0.0, draw_b=0.0)[0]
+    np.testing.assert_allclose(free, constant, atol=2e-3 * np.ptp(constant))
+    full, less = (simulated(one, 1.0, model, **weak, draw_a=draw)[0] for draw in (1.0, 0.5))
+    assert np.ptp(less) == pytest.approx(2 * np.ptp(full), rel=0.05)  # all that the pump gives
 
 
 def test_pressures_carry_the_load_and_a_closed_valve_holds_it(simulated, arm, spec):

@@ -1,6 +1,6 @@
 """A log file -> `Log`: open, map, repair, check, resample."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,7 @@ def check_log(
     ranges: Floats,
     *,
     outputs: Sequence[int] = (),
+    backward: Collection[int] = (),
     angles_required: bool = True,
     repair: bool = False,
 ) -> tuple[Log | None, list[LogFinding]]:
@@ -76,6 +77,7 @@ def check_log(
         settings: its columns, units and tolerances.
         ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
         outputs: joints (numbers, from 1) whose angles a fit compares.
+        backward: joints (from 1) that a positive command turns to negative angles.
         angles_required: whether an angle column that the file lacks is an error, or the joint unmeasured.
         repair: fill holes up to `settings.repair_s`.
 
@@ -104,7 +106,8 @@ def check_log(
             findings += check_recording(recording, settings, repaired=repair)
             if all(finding.level != "error" for finding in findings):
                 log = _to_log(recording, settings, len(ranges), findings)
-                findings += contradictions(log, settings, outputs, {finding.kind for finding in findings})
+                said = {finding.kind for finding in findings}
+                findings += contradictions(log, settings, outputs, said, backward)
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))

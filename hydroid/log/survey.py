@@ -14,9 +14,16 @@ from hydroid.settings.log import Kind, LogSettings
 
 
 def contradictions(
-    log: Log, settings: LogSettings, outputs: Collection[int], said: Collection[str]
+    log: Log,
+    settings: LogSettings,
+    outputs: Collection[int],
+    said: Collection[str],
+    backward: Collection[int],
 ) -> list[LogFinding]:
-    """Return what the motion says against the settings, but for commands' range if the file `said` a unit."""
+    """Return what the motion says against the settings, but for commands' range if the file `said` a unit.
+
+    A positive command turns the joints `backward` to negative angles.
+    """
     motions, findings = driven_joints(log), list[LogFinding]()
 
     def add(level: Level, kind: str, of: Kind, joints: Sequence[int], **numbers: float | str) -> None:
@@ -39,7 +46,7 @@ def contradictions(
         if likely and columns and fits and "unit of command" not in said:
             numbers = likely.remedy(columns.scale, columns.offset)
             add("warning", "range", "command", [joint], **numbers)
-        if motion.turned:
+        if motion.turned and joint not in backward:
             path, against = motion.directed
             add("warning", "turned", "command", [joint], path=path, against=against)
     still = {j: m.travel for j, m in motions.items() if m.push > 300 and 0 < m.travel < 2}

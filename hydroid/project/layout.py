@@ -72,24 +72,25 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     if log is None:
         reasons.append(f"the log cannot be used as it is: {findings[0]}")
     motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
+    wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
     for joint, motion in motions.items():
         reasons += _outside(motion.log, joint, arm, settings.angle_margin_deg)
-        reasons += _remarks(motion, names) if motion.log.driven[joint - 1] else []
+        reasons += _remarks(motion, names, joint in wrong) if motion.log.driven[joint - 1] else []
         command = entries[joint]["command"]
-        if command is not None and motion.turned:
+        if command is not None and joint in wrong:
             entries[joint]["command"] = turned(command)
-    reasons += [REVERSED] if any(motion.turned for motion in motions.values()) else []
+    reasons += [REVERSED] if wrong else []
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)
 
 
-def _remarks(motion: JointMotion, names: Sequence[str]) -> list[str]:
+def _remarks(motion: JointMotion, names: Sequence[str], wrong: bool) -> list[str]:
     """Return what a user should know of a driven joint."""
     name, lines = names[motion.joint - 1], list[str]()
     path, against = motion.directed
-    if motion.turned:
-        share = f"for {against:.0%} of {path:.3g} deg of travel"
+    if wrong:
+        share = f"for {max(against, 1 - against):.0%} of {path:.3g} deg of travel"
         lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")
     if motion.dead_band > 10:
         lines.append(f"{name} does not move below about {motion.dead_band:g} % of command: a dead band")

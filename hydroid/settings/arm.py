@@ -171,6 +171,12 @@ class Arm:
         return np.radians([free if joint.continuous else joint.range for joint in self.joints])
 
     @property
+    def backward(self) -> tuple[int, ...]:
+        """Joints, from 1, that turn to negative angles as their rods run out, at positive commands."""
+        actuators = enumerate((joint.actuator for joint in self.joints), 1)
+        return tuple(j for j, one in actuators if isinstance(one, LinearActuator) and one.sense < 0)
+
+    @property
     def lower(self) -> NDArray[np.float64]:
         """Lower joint stops [rad], shape (J,)."""
         return self.ranges[:, 0]

@@ -118,6 +118,14 @@ class ParameterSet:
         stated = [p.start if p.fixed is None else None for p in self.parameters]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 
+    def started(self, values: Mapping[str, float]) -> Array:
+        """Return values by name as theta, shape (P,), the others as at the start, all within the bounds."""
+        theta = self.start
+        for column, p in enumerate(self.parameters):
+            if p.fixed is None and p.name in values:
+                theta[column] = min(max(values[p.name], p.lower), p.upper)
+        return theta
+
     def from_unit(self, unit: Array) -> Array:
         """Map points of the unit box, shape (.., free), to theta, shape (.., P)."""
         theta, places = np.empty((*unit.shape[:-1], len(self.parameters))), iter(np.moveaxis(unit, -1, 0))

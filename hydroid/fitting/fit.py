@@ -121,28 +121,41 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     """
     watch, checkpoints = watch or Silent(), {} if checkpoints is None else checkpoints
     times, settings = [time.perf_counter()], problem.settings
-    searched = search(problem, watch.generation, watch.refining, checkpoints)
-    estimates = _estimates(problem, _candidates(problem, searched))
-    final, last = next(iter(estimates)), problem
+    last = problem.varied(settings.of_estimate("best"))
+    searched = search(last, watch.generation, watch.refining, checkpoints)
+    estimates = _estimates(last, _candidates(last, searched))
+    final = next(iter(estimates))
     start = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
     times.append(time.perf_counter())
     refinements = dict[str, Descent]()
+
+    def climb(name: str, *, if_nearer: bool) -> None:
+        """Refine with the settings of an estimate, from the last one; keep the result as the final one."""
+        nonlocal final, last, start
+        own = problem.varied(settings.of_estimate(name))
+        theta = own.parameters.started(last.parameters.mapping(start.theta))
+        result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
+        if not result.converged:
+            _log.warning(
+                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
+                "optimum.",
+                result.ending.value,
+                name,
+            )
+        new = _estimates(own, {name: own.parameters.from_unit(result.point)})
+        if not if_nearer or new[name].rms < NEARER * start.rms:
+            final, last, start = name, own, new[name]
+        estimates.update(new)
+        refinements[name] = result
+
     if settings.refinement is not None:
-        ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"
-        for name in ("refined", *["dynamic"] * ladder, *["joint"] * settings.joint_refinement):
-            own = problem.varied(settings.of_estimate(name))
-            result = refine(own, start.theta, settings.refinement, watch.refining, checkpoints, name)
-            if not result.converged:
-                _log.warning(
-                    "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
-                    "optimum.",
-                    result.ending.value,
-                    name,
-                )
-            estimates |= _estimates(own, {name: own.parameters.from_unit(result.point)})
-            refinements[name] = result
-            if name != "dynamic" or estimates[name].rms < NEARER * start.rms:
-                final, last, start = name, own, estimates[name]
+        climb("refined", if_nearer=False)
+        for term in settings.terms:
+            climb(f"{final}+{term}", if_nearer=True)
+        if settings.stage == "hyd" and settings.simulation.model == "ladder":
+            climb(final.replace("refined", "dynamic"), if_nearer=True)
+        if settings.joint_refinement:
+            climb(final.replace("refined", "joint"), if_nearer=False)
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
     directions, determined = identifiability(last, about), quantities(last, about)

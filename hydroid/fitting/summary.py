@@ -19,7 +19,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     known = account(last, fit.uncertainty, fit.identifiability)
     estimates = {
         e.name: NamedEstimate(
-            values=problem.parameters.mapping(e.theta),
+            values=problem.settings.of_estimate(e.name).parameter_set().mapping(e.theta),
             rms_deg=finite(np.degrees(e.rms)),
             objective=finite(objective * e.overall),
         )

@@ -121,10 +121,24 @@ class FitSettings(Settings):
         """Whether speeds follow valve and load at once, without oil stiffness and inertia."""
         return self.stage == "hyd" and self.simulation.model != "dynamic"
 
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the terms that a fit may add, in the order of the parameters."""
+        return tuple(dict.fromkeys(p.term for p in self.parameters.values() if p.term is not None))
+
     def of_estimate(self, name: str | None) -> "FitSettings":
-        """Return the settings that an estimate of a fit was refined with, and predicts with."""
-        settings = self.freed() if name == "joint" else self
-        if name != "dynamic":
+        """Return the settings that an estimate of a fit was refined with, and predicts with.
+
+        `name` is that of the estimate, then those of the terms that it has: refined+pump; None: no fit's.
+        """
+        if name is None:
+            return self
+        model, *terms = name.split("+")
+        settings = self.freed() if model == "joint" else self
+        if self.terms != tuple(terms):
+            own = {n: p for n, p in settings.parameters.items() if p.term is None or p.term in terms}
+            settings = settings.model_copy(update={"parameters": own})
+        if model != "dynamic":
             return settings
         simulation = self.simulation.model_copy(update={"model": "dynamic"})
         return settings.model_copy(update={"simulation": simulation})

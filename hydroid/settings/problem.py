@@ -43,6 +43,9 @@ class ParameterSettings(Settings):
     """where the search starts; null: nominal, else the middle of the bounds on the parameter's scale"""
     fixed: float | None = None
     """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
+    term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
+    """name of a term of the model, of one parameter or several: a fit begins without it, adds it after the
+    refinement, and keeps it where it brings the model clearly nearer to the logs; null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":

@@ -149,10 +149,13 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         refinements[name] = result
 
     if settings.refinement is not None:
+        ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"
         climb("refined", if_nearer=False)
+        if ladder:
+            climb("dynamic", if_nearer=True)
         for term in settings.terms:
             climb(f"{final}+{term}", if_nearer=True)
-        if settings.stage == "hyd" and settings.simulation.model == "ladder":
+        if ladder and final.startswith("refined+"):
             climb(final.replace("refined", "dynamic"), if_nearer=True)
         if settings.joint_refinement:
             climb(final.replace("refined", "joint"), if_nearer=False)

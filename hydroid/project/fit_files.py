@@ -15,14 +15,13 @@ LONGEST_STEP = 0.025
 """of MuJoCo [s], in a log of fewer samples"""
 DEAD = 0.8
 """part of the command below which a joint seems to stand that its dead band is"""
-RESPONSE = 0.05
+RESPONSE = 0.1
 """of a valve and its oil without any delay [s]"""
 
 FIT = """\
 # hydroid fit-hyd LOG --config {file}
 #
-# The whole chain: command, valve, oil, cylinder, arm. Every setting: docs/settings.md. More terms that a
-# machine may need: configs/fit-hyd-machine.yaml of hydroid.
+# The whole chain: command, valve, oil, cylinder, arm. Every setting: docs/settings.md.
 stage: hyd
 arm: {arm}
 outputs: {outputs}             # joints whose angles are compared
@@ -35,6 +34,8 @@ hydraulics:
   onset_a: 0                       # V      no jump behind the dead band
   onset_b: 0
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
+  opening_exponent: 1.4            #        speed rises with this power of the command behind the dead band
+  plunger_damping: 200             # N·s/m  2000 N·s/m are a lag of 1 s
   substeps: 5                      # of valves and oil in one MuJoCo step
 
 # Starts and priors follow from the arm's weight and the speeds in the log. They are wide guesses: write what
@@ -44,11 +45,19 @@ hydraulics:
 parameters:
 {parameters}
   M: {{quantity: mass, each: true, within: 2}}    # kg, M_LINK of every link
+  # One pump for all joints, whose pressure falls with flow: a term that is kept if the logs ask for it.
+  P_flow: {{quantity: pump_flow, fixed: {flow}, term: pump}}    # L/min, all joints at full speed
+  P_droop: {{quantity: pump_droop, bounds: [0, 140], start: 30, term: pump}}    # bar, at that flow
 
-# Each joint alone, then all together, from the nominal values.
+# The two sides of a spool are made alike.
+priors:
+{alike}
+
+# Each joint alone, then all together, without oil stiffness and inertia, which takes seconds; then with both,
+# and then with the pump: what is not clearly nearer to the logs is not kept.
 objective: {{norm: 2, segments: {{equal: 4}}}}
-search: {{algorithm: multistart, seed: 1, multistart: {{starts: 1, iterations: 30, gain_tolerance: 0.001}}}}
-refinement: {{iterations: 60, gain_tolerance: 1.0e-6}}
+search: {{algorithm: multistart, seed: 1, multistart: {{starts: 1, horizons: [], iterations: 40}}}}
+refinement: {{iterations: 60, gain_tolerance: 1.0e-5}}
 """
 JOINT = """\
 {actuator}
@@ -58,14 +67,23 @@ JOINT = """\
   dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 75]}}
   open_A_{own}: {{quantity: opening_a, joints: [{name}], within: 4}}    # mm², at full command
   open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
-  lag_{own}: {{quantity: plunger_damping, joints: [{name}], within: 10}}    # N·s/m  2000 N·s/m are 1 s
-  # friction_{own}: {{quantity: dry_friction, joints: [{name}], bounds: [0, 5000], start: 100}}  # {friction}
-  # exponent_{own}: {{quantity: opening_exponent, joints: [{name}], within: 2}}"""
+  exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
+  exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
+  lag_{own}: {{quantity: plunger_damping, joints: [{name}], within: 10}}    # N·s/m, behind the dead band
+  pilot_A_{own}: {{quantity: pilot_lag_a, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, before it
+  pilot_B_{own}: {{quantity: pilot_lag_b, joints: [{name}], bounds: [0, 0.6], start: 0.03}}
+  draw_A_{own}: {{quantity: draw_a, joints: [{name}], within: 10, term: pump}}    # flow from the pump, over
+  draw_B_{own}: {{quantity: draw_b, joints: [{name}], within: 10, term: pump}}    # flow into the chamber"""
+ALIKE = """\
+  dead_{own}: {{of: {{dead_A_{own}: 1, dead_B_{own}: -1}}, value: 0, sd: 5}}
+  exponent_{own}: {{of: {{exponent_A_{own}: 1, exponent_B_{own}: -1}}, value: 0, sd: 0.2}}"""
 CYLINDER = """\
   area_A_{own}: {{quantity: area_a, joints: [{name}], within: 1.5}}    # mm²
   area_B_{own}: {{quantity: area_b, joints: [{name}], within: 1.5}}"""
 STAND_IN = """\
-  size_{own}: {{quantity: area, joints: [{name}], within: 3}}    # cm³/rad, of the stand-in"""
+  size_{own}: {{quantity: area, joints: [{name}], within: 3}}    # cm³/rad, of the stand-in
+  slope_{own}: {{quantity: lever_slope, joints: [{name}], nominal: 0, sd: 0.2}}    # of its lever
+  bend_{own}: {{quantity: lever_bend, joints: [{name}], nominal: 0, sd: 0.2}}"""
 NO_LOG = """\
 # Columns of your log. `hydroid init --log LOG` guesses them.
 # log:
@@ -82,7 +100,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
 
     `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it.
     """
-    lines, volumes = list[str](), list[float]()
+    lines, alike, volumes, flow_rate = list[str](), list[str](), list[float](), 0.0
     outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
     for joint in outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
@@ -90,14 +108,15 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
+        flow_rate += 0.06 * size.displacement * size.speed
         words = {"own": name.removesuffix("_joint"), "name": name}
+        alike.append(ALIKE.format(**words))
         lines.append(
             JOINT.format(
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
                 damping=short(0.1 * size.damping),
                 delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 dead=short(DEAD * min(max(motion.dead_band, 5.0), 70.0) if motion else 5.0),
-                friction="N" if linear else "N·m",
                 **words,
             )
         )
@@ -108,7 +127,9 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         log=_log(arm, layout),
         others=_others(layout),
         volume=short(min(volumes, default=50.0)),
+        flow=short(flow_rate),
         parameters="\n".join(lines),
+        alike="\n".join(alike),
     )
 
 
@@ -138,7 +159,7 @@ def _others(layout: Layout | None) -> str:
     period = 0.01 if layout is None else float(layout.section["period_s"])
     steps = max(math.ceil(period / LONGEST_STEP - 1e-9), 1)
     other = "measured" if layout is not None and layout.followed else "locked"
-    text = f"simulation: {{steps_per_sample: {steps}, other_joints: {other}}}"
+    text = f"simulation: {{model: ladder, steps_per_sample: {steps}, other_joints: {other}}}"
     return f"{text}    # joints without a command: locked, passive or measured (they follow the log)\n"
 
 

@@ -20,11 +20,12 @@ LIFT = 2.5
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil per angle [cm³/rad], valve opening [mm²], and damping [N·m·s/rad]."""
+    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s]."""
 
     displacement: float
     opening: float
     damping: float
+    speed: float
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
@@ -56,5 +57,5 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     for joint, most in enumerate(torque.tolist(), 1):
         speed = max(speeds.get(joint, 0.5), 0.01)
         volume = most / pressure
-        sizes.append(JointSize(1e6 * volume, 1e6 * volume * speed / through, most / speed))
+        sizes.append(JointSize(1e6 * volume, 1e6 * volume * speed / through, most / speed, speed))
     return tuple(sizes)

@@ -129,7 +129,9 @@ class RunFolder:
     def write_estimate(self, log: Log, theta: Array, summary: FitSummary) -> None:
         """Write `estimate.yaml`, and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, summary)
-        model = IdentifiedModel(self.settings().of_estimate(summary.final), theta, str(self.path / NAME), summary)
+        model = IdentifiedModel(
+            self.settings().of_estimate(summary.final), theta, str(self.path / NAME), summary
+        )
         plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")

@@ -76,7 +76,8 @@ def resample(
 ) -> tuple[Floats, Floats, Floats]:
     """Bring a recording to the grid k · period [s], from its first sample to its last.
 
-    Commands, shape (R, J), act `delay` [s] later than logged, and are 0 % before the first one acts. Angles
+    Commands, shape (R, J), act `delay` [s] later than logged, and are 0 % before the first one acts. On a
+    finer grid they change on a line from sample to sample: when between them is not known. Angles
     and other signals that are interpolated have the shape (R, M); times [s] increase strictly.
 
     Returns:
@@ -87,7 +88,12 @@ def resample(
     if is_on_grid(time, period):
         time = period * np.rint(time / period)  # whose values then pass unchanged
     angle = np.stack([np.interp(grid, time, column) for column in angle.T], axis=1)
-    return grid, hold(time, command, grid - delay, period), angle
+    at = grid - delay
+    if period > 0.8 * sample_period(time):
+        return grid, hold(time, command, at, period), angle
+    middle = at + 0.5 * period
+    lines = np.stack([np.interp(middle, time, column, left=0.0) for column in command.T], axis=1)
+    return grid, lines, angle
 
 
 def is_on_grid(time: Floats, period: float) -> bool:
@@ -99,12 +105,8 @@ def is_on_grid(time: Floats, period: float) -> bool:
 def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:
     """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
 
-    It is the last one at or before that time; where several fit into a period their mean over it; where one
-    spans several periods, on the line to the next: a logger that slow saw little of what the valve was told.
+    It is the last one at or before that time, or where several fit into a period their mean over it.
     """
-    if period < 0.8 * sample_period(time):
-        lines = [np.interp(at + 0.5 * period, time, one, left=0.0) for one in command.T]
-        return np.where(at[:, None] >= time[0], np.stack(lines, axis=1), 0.0)
     if period > 1.2 * sample_period(time):  # jitter alone does not make a log a faster one
         steps = np.diff(time, prepend=time[0])[:, None]
         areas = np.cumsum(steps * np.roll(command, 1, axis=0), axis=0)

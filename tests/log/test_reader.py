@@ -217,8 +217,13 @@ def test_a_faster_log_gives_the_means_of_its_commands(tmp_path: Path) -> None:
             np.cumsum(coarse.command * 0.05, axis=0)[:-1], travel[4::5][:79], atol=1e-9
         )
         np.testing.assert_array_equal(coarse.command[0, 0], 0)
-    slower, _ = read(save(tmp_path / "slow.csv", lines(values[::5])))
-    np.testing.assert_array_equal(slower.command[::5], values[::5, 1:3])
+
+
+def test_a_slower_log_gives_commands_on_a_line_between_its_samples(tmp_path: Path) -> None:
+    values = cells(400)[::5]
+    slower, _ = read(save(tmp_path / "slow.csv", lines(values)))
+    means = slower.command[:395].reshape(79, 5, 2).mean(axis=1)
+    np.testing.assert_allclose(means, 0.5 * (values[:-1, 1:3] + values[1:, 1:3]), atol=1e-9)
 
 
 def test_the_delay_setting_moves_the_command_only(tmp_path: Path) -> None:

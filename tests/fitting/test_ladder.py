@@ -1,0 +1,44 @@
+"""A fit climbs: it keeps the dynamic model, and a term, where the logs ask for them, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recovery import duties, settings_of
+
+from hydroid.fitting.fit import fit
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.settings.search import MultistartSettings, RefinementSettings
+
+SHOULDER = (60, -40, 90, -80, 40, 0, -30, 70, -60, 30)
+ELBOW = (-50, 80, -70, 50, 0, 60, -80, 40, 30, -60)
+TRUTH = {"open_A": 0.35, "open_B": 0.3, "P_flow": 3.0, "P_droop": 100.0}
+CONFIG = {
+    "open_A": {"quantity": "opening_a", "nominal": 0.3, "within": 2},
+    "open_B": {"quantity": "opening_b", "nominal": 0.3, "within": 2},
+    "P_flow": {"quantity": "pump_flow", "fixed": 3.0, "term": "pump"},
+    "P_droop": {"quantity": "pump_droop", "bounds": [0, 140], "start": 20, "term": "pump"},
+}
+
+
+@pytest.mark.parametrize("name", ["refined", "refined+pump", "dynamic", "dynamic+pump"])
+def test_a_fit_keeps_what_the_logs_ask_for(name):
+    """Soft oil shows in the logs, and a droop shows where two joints move together."""
+    settings = settings_of(CONFIG, bulk_modulus=20.0)
+    changes = {
+        "outputs": (2, 3),
+        "simulation": settings.simulation.model_copy(update={"model": "ladder"}),
+        "search": settings.search.model_copy(
+            update={"algorithm": "multistart", "multistart": MultistartSettings(starts=1, horizons=())}
+        ),
+        "refinement": RefinementSettings(iterations=40),
+    }
+    ladder = settings.model_copy(update=changes)
+    machine = ladder.of_estimate(name)
+    log = duties(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
+    exact = simulate_log(machine, log, {n: TRUTH[n] for n in CONFIG if n in machine.parameters}, "truth")
+    noise = np.radians(0.02) * np.random.default_rng(1).standard_normal(exact.angle.shape)
+    found = fit(Problem(ladder, [replace(exact, angle=exact.angle + noise)]))
+    assert found.final == name
+    assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)

@@ -1,6 +1,6 @@
 """Forty machines that hydroid has not seen, through the commands that `hydroid init` prints.
 
-    python benchmarks/strangers.py [--machines 40] [--first 0] [--seed 1] [--quasi-static]
+    python benchmarks/strangers.py [--machines 40] [--first 0] [--seed 1]
 
 Every machine is random: three to six joints, 0.2 to 20 t, rotary actuators and cylinders, dead bands to 60 %,
 exponents of 0.7 to 3, delays to 0.4 s, lags, asymmetries, friction; half of them share a pump that droops, a
@@ -8,8 +8,7 @@ third of those draws differently in each direction; half have oil and inertia th
 equations and their integrator are those of this file: nothing of hydroid simulates them. Each is recorded
 three times as with sticks, with 0.02 to 0.2 deg of noise at 10 to 100 Hz with jitter; two logs are fitted,
 and the third is predicted. Good is an rms error on every joint of at most twice the noise plus 2 % of its
-travel. A joint that is not good must be named by the verdict. With --quasi-static the settings that `init`
-wrote are changed: the quasi-static model, exponents, pilot stages, levers and a drooping pump are free.
+travel. A joint that is not good must be named by the verdict.
 """
 
 import shutil
@@ -19,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from common import options, row, table
 from numba import njit
 from numpy.random import Generator
@@ -282,49 +280,8 @@ def urdf(m: Machine) -> str:
     return "\n".join([*parts, "</robot>\n"])
 
 
-def richer(config: Path) -> None:
-    """Change what `init` wrote: the quasi-static model, with the terms of unknown machines free."""
-    settings: Any = yaml.safe_load(config.read_text())
-    parameters, flow = dict[str, Any](), 0.0
-    for name, one in settings["parameters"].items():
-        kind, _, own = name.partition("_")
-        here = {"joints": one.get("joints")}
-        match kind:
-            case "D":
-                continue
-            case "size" | "open":
-                one |= {"within": 10}
-            case "dead":
-                one |= {"bounds": [0, 80]}
-            case "lag":
-                for side in "ab":
-                    shape = {"quantity": f"opening_exponent_{side}", "within": 3, "bounds": [0.4, 5]}
-                    pilot = {"quantity": f"pilot_lag_{side}", "bounds": [0, 0.6], "start": 0.03}
-                    parameters |= {
-                        f"exponent_{side}_{own}": shape | here,
-                        f"pilot_{side}_{own}": pilot | here,
-                    }
-                for change in ("slope", "bend"):
-                    lever = {"quantity": f"lever_{change}", "nominal": 0, "sd": 0.2}
-                    parameters[f"{change}_{own}"] = lever | here
-            case "M":
-                one |= {"within": 1.5}
-            case _:
-                pass
-        parameters[name] = one
-    for actuator in yaml.safe_load((config.parent / "arm.yaml").read_text())["actuators"].values():
-        flow += 0.06 * float(actuator["displacement"]) * 0.5  # at half a radian a second
-    parameters["P_droop"] = {"quantity": "pump_droop", "bounds": [0, 140], "start": 15}
-    settings["parameters"] = parameters
-    settings["hydraulics"] |= {"opening_exponent": 1.4, "plunger_damping": 200, "pump_flow": flow}
-    settings["simulation"] |= {"model": "quasi-static"}
-    settings["search"]["multistart"] |= {"horizons": [], "iterations": 40}
-    settings["refinement"] = {"iterations": 100, "gain_tolerance": 1e-5}
-    config.write_text(yaml.safe_dump(settings, sort_keys=False))
-
-
-def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[float], list[int], float]:
-    """Run what `hydroid init` prints; `rich`: with the settings of `richer`.
+def run_commands(folder: Path, logs: list[Path]) -> tuple[list[float], list[int], float]:
+    """Run what `hydroid init` prints.
 
     Returns:
         Rms error of each joint on the unseen log [deg], the joints that are not predicted by the verdict,
@@ -332,8 +289,6 @@ def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[fl
     """
     mine, began = folder / "mine", time.perf_counter()
     hydroid.init(mine, arm=folder / "robot.urdf", log=[*logs])
-    if rich:
-        richer(mine / "fit.yaml")
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
     seconds = time.perf_counter() - began
     judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").plain()
@@ -343,7 +298,7 @@ def run_commands(folder: Path, logs: list[Path], *, rich: bool) -> tuple[list[fl
 
 def main() -> None:
     """Make the machines, run the commands, and print the table."""
-    given = options(__doc__, machines=40, first=0, seed=1, quasi_static=False, folder="build/strangers")
+    given = options(__doc__, machines=40, first=0, seed=1, folder="build/strangers")
     home = Path(given.folder)
     shutil.rmtree(home, ignore_errors=True)
     good, silent = 0, 0
@@ -355,7 +310,7 @@ def main() -> None:
         angles = np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -len(machine.names) :]
         most = 2 * np.degrees(machine.noise) + 0.02 * np.ptp(angles, axis=0)
         try:
-            errors, blamed, seconds = run_commands(folder, logs, rich=given.quasi_static)
+            errors, blamed, seconds = run_commands(folder, logs)
         except hydroid.HydroidError as error:
             row(f"{number} | {len(most)} | refused: {error} | | |")
             continue

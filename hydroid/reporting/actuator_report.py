@@ -24,6 +24,9 @@ _COMMAND = np.linspace(-100.0, 100.0, 401)
 _LEAD = "What its parameters mean in steady state, from the command to the torque at the joint."
 _BANDS = " Bands: 95 % intervals, some thinner than the line. A curve of given values has none."
 
+Curves = Mapping[str, Array]
+"""by the label of each, shape (m,)"""
+
 
 @dataclass(frozen=True, eq=False)
 class JointActuator:
@@ -46,7 +49,7 @@ class JointActuator:
         title: str,
         labels: tuple[str, str],
         at: Array,
-        curves: Callable[[Any], Mapping[str, Array]],
+        curves: Callable[[Any], Curves],
         more: Sequence[Mark] = (),
     ) -> Panel:
         """Draw curves of one record over `at`, shape (m,), by label, each with a 95 % band if it has one."""
@@ -117,23 +120,23 @@ def draw(actuator: JointActuator) -> Chart:
     if isinstance(linkage, LinearActuator):
         arm = linkage.moment_arm(np.radians(angle))
 
-    def force(p: Any) -> Mapping[str, Array]:
+    def force(p: Any) -> Curves:
         currents = {"rated current": p.rated_current, "smallest current": p.current_min}
         forces = {name: coil_force(p.coil * i**2, stroke, p.gap) for name, i in currents.items()}
         return forces | {"spring": p.plunger_stiffness * stroke}
 
-    def displacement(p: Any) -> Mapping[str, Array]:
+    def displacement(p: Any) -> Curves:
         strokes = (resting_stroke(p.coil * i**2, p.gap, p.plunger_stiffness) for i in _currents(p).values())
         return {"": 1e3 * spool(*strokes)}
 
-    def flow(p: Any) -> Mapping[str, Array]:
+    def flow(p: Any) -> Curves:
         area = opening(reach, p) + p.leakage
         return {
             f"{drop} bar": 6e4 * port_flow(p.supply_pressure - 1e5 * drop, p.supply_pressure, area, 0.0, p)[0]
             for drop in (10, 50, 100)
         }
 
-    def torque(p: Any) -> Mapping[str, Array]:
+    def torque(p: Any) -> Curves:
         most, least = p.supply_pressure, p.tank_pressure
         return {
             "A at supply": arm * (p.a.area * most - p.b.area * least),
@@ -153,7 +156,7 @@ def draw(actuator: JointActuator) -> Chart:
     return Chart(panels, columns=2)
 
 
-def _currents(p: Any) -> Mapping[str, Array]:
+def _currents(p: Any) -> Curves:
     """Current of both coils [A] over _COMMAND."""
     sides = {"side A": (_COMMAND, p.a), "side B": (-_COMMAND, p.b)}
     return {

@@ -75,9 +75,11 @@ def check(
     settings = load_settings(config, set)
     from hydroid.log import check_log, driven_joints, grouped, motion_findings, survey
 
-    checks, how = list[LogCheck](), {"outputs": settings.outputs, "backward": settings.arm.backward}
+    arm, outputs, checks = settings.arm, settings.outputs, list[LogCheck]()
     for path in map(Path, as_list(logs)):
-        log, faults = check_log(path, settings.log, settings.arm.ranges, repair=repair, **how)
+        log, faults = check_log(
+            path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair
+        )
         moved = {joint: motion.travel for joint, motion in (driven_joints(log) if log else {}).items()}
         checks.append(LogCheck(path, log, [*faults, *(motion_findings(log) if log else ())], moved))
     usable = [(one, one.log) for one in checks if one.log]

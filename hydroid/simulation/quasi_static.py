@@ -26,7 +26,7 @@ from hydroid.hydraulics.cylinder import bent, four_bar, triangle, volume
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import command, move_spool, opened
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
-from hydroid.hydraulics.pump import begin_line, come_up
+from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
 from hydroid.simulation.rollout import mujoco_library
 
@@ -87,8 +87,8 @@ def directed_speed(c: Any, w: Any, supply: float) -> Any:
 
 
 @compilable
-def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) -> float:
-    """Pressure of the line [Pa] at which the actuators take what the pump gives, at most `full` [m³/s].
+def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any) -> float:
+    """Pressure of the line [Pa] at which the actuators take what the pump gives with its φ at `share`.
 
     Newton's method from the last step's, within a bracket: what is taken rises with the pressure, and what is
     given falls.
@@ -96,9 +96,7 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) 
     low, high = 0.0, some.relief
     pressure = min(max(line.pressure, 1e-3 * high), high)
     for _ in range(ITERATIONS):
-        given, slope = full, 0.0
-        if some.relief - pressure < some.pump_droop:
-            given, slope = full * (some.relief - pressure) / some.pump_droop, full / some.pump_droop
+        given, slope = delivery(pressure, share, some.relief, some)
         excess = line.taken - given
         for a in range(plugin.idle, plugin.order.size):
             j = plugin.order[a]
@@ -111,7 +109,7 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, full: float, some: Any) 
             high = pressure
         else:
             low = pressure
-        if abs(excess) <= SETTLED * full or high - low <= SETTLED * some.relief:
+        if abs(excess) <= SETTLED * share * some.pump_flow or high - low <= SETTLED * some.relief:
             break
         after = pressure - excess / slope  # infinite where nothing flows
         if not low < after < high:
@@ -187,8 +185,7 @@ def share_pump(plugin: Plugin, state: Any, pad: Any, demanded: bool) -> float:
     if c.pump_flow == np.inf:
         return np.inf
     begin_line(line, c, state[last], demanded, plugin.period)
-    full = come_up(line, c, plugin.period) * c.pump_flow
-    pressure = line_pressure(plugin, pad.joints, line, full, c)
+    pressure = line_pressure(plugin, pad.joints, line, come_up(line, c, plugin.period), c)
     for j in range(state.size):
         state[j].line, state[j].share, state[j].demand = pressure, line.share, line.demand
     return pressure

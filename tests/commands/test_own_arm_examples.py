@@ -69,9 +69,11 @@ def test_what_is_made_up_is_called_so(name: str, words: str):
     assert words in " ".join((EXAMPLES / name / "README.md").read_text(encoding="utf-8").split())
 
 
-def test_all_logs_of_the_excavator_are_read_without_repair():
+def test_all_logs_of_the_excavator_are_read_without_repair_and_its_boom_rises_as_its_rod_runs_out(caplog):
     files = sorted((EXAMPLES / "excavator").glob("*_*.csv"))
     assert len(files) == 18
     logs = hydroid.read_logs(files, hydroid.load_settings(EXAMPLES / "excavator" / "fit.yaml"))
     assert all(log.driven.all() and log.measured.all() for log in logs)
     assert {log.period for log in logs} == {0.05}
+    assert "sample period varies" in caplog.text
+    assert "moves against" not in caplog.text

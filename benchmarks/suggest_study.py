@@ -97,6 +97,5 @@ if __name__ == "__main__":
         every = np.array([tried(term, k, given.seconds) for k in range(given.logs)])
         counts = " | ".join(f"{n:.0f} of {given.logs}" for n in every[:, :3].sum(axis=0))
         without, freed = every[:, 3], every[np.isfinite(every[:, 4]), 4]
-        row(
-            f"{term} | {counts} | {np.median(without):.3f} | {f'{np.median(freed):.3f}' if len(freed) else ''}"
-        )
+        last = f"{np.median(freed):.3f}" if len(freed) else ""
+        row(f"{term} | {counts} | {np.median(without):.3f} | {last}")

@@ -45,8 +45,7 @@ def read_logs(
 
     read: list[Log] = []
     findings: list[LogFinding] = []
-    needed = {"outputs": settings.outputs if angles else (), "angles_required": angles}
-    needed |= {"backward": settings.arm.backward}
+    needed = {"outputs": settings.outputs if angles else None, "backward": settings.arm.backward}
     for source in as_list(logs):
         if isinstance(source, Log):
             read.append(source)

@@ -132,6 +132,7 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
     def climb(name: str, *, if_nearer: bool) -> None:
         """Refine with the settings of an estimate, from the last one; keep the result as the final one."""
         nonlocal final, last, start
+        assert settings.refinement is not None
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)

@@ -65,9 +65,8 @@ def check_log(
     settings: LogSettings,
     ranges: Floats,
     *,
-    outputs: Sequence[int] = (),
+    outputs: Sequence[int] | None = (),
     backward: Collection[int] = (),
-    angles_required: bool = True,
     repair: bool = False,
 ) -> tuple[Log | None, list[LogFinding]]:
     """Find everything that is wrong with a log.
@@ -76,27 +75,27 @@ def check_log(
         path: the file.
         settings: its columns, units and tolerances.
         ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
-        outputs: joints (numbers, from 1) whose angles a fit compares.
+        outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
+            file lacks is unmeasured, which else is an error.
         backward: joints (from 1) that a positive command turns to negative angles.
-        angles_required: whether an angle column that the file lacks is an error, or the joint unmeasured.
         repair: fill holes up to `settings.repair_s`.
 
     Returns:
         The log, None if any finding is an error; and all findings, errors first.
     """
-    source, log, findings = str(path), None, list[LogFinding]()
+    source, log, findings, compared = str(path), None, list[LogFinding](), outputs or ()
     try:
         signals = map_signals(settings, ranges)
         table = open_table(path, settings)
-        for joint in sorted({*outputs, *settings.joints}):
+        for joint in sorted({*compared, *settings.joints}):
             if joint > len(ranges):
                 joints = str(len(ranges))
                 findings.append(log_finding("error", "no such joint", source, [joint], joints=joints))
-            elif joint in outputs and ("angle", joint) not in {(s.kind, s.joint) for s in signals}:
+            elif joint in compared and ("angle", joint) not in {(s.kind, s.joint) for s in signals}:
                 findings.append(log_finding("error", "no output angle", source, [joint]))
-        if not angles_required:
+        if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        signals = match_signals(table, signals, {*outputs, *settings.joints}, findings)
+        signals = match_signals(table, signals, {*compared, *settings.joints}, findings)
         if signals and signals[0].kind == "time":
             recording = unwrap(_in_si(table.read(signals)), findings)
             remarks = (*table.remarks, *recording.remarks)
@@ -107,7 +106,7 @@ def check_log(
             if all(finding.level != "error" for finding in findings):
                 log = _to_log(recording, settings, len(ranges), findings)
                 said = {finding.kind for finding in findings}
-                findings += contradictions(log, settings, outputs, said, backward)
+                findings += contradictions(log, settings, compared, said, backward)
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))

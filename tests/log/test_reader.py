@@ -156,7 +156,7 @@ def test_a_joint_is_undriven_or_unmeasured_only_if_the_config_says_so(tmp_path: 
 
 def test_commands_alone_are_enough_where_angles_are_not_required(tmp_path: Path) -> None:
     path = edited(tmp_path, lambda rows: [row.__delitem__(slice(3, 5)) for row in rows])
-    log, _ = read(path, angles_required=False)
+    log, _ = read(path, outputs=None)
     assert not log.measured.any()
     assert log.driven.all()
 

@@ -46,8 +46,8 @@ parameters:
 {parameters}
   M: {{quantity: mass, each: true, within: 2}}    # kg, M_LINK of every link
   # One pump for all joints, whose pressure falls with flow: a term that is kept if the logs ask for it.
-  P_flow: {{quantity: pump_flow, fixed: {flow}, term: pump}}    # L/min, all joints at full speed
-  P_droop: {{quantity: pump_droop, bounds: [0, 140], start: 30, term: pump}}    # bar, at that flow
+  P_flow: {{quantity: pump_flow, fixed: {flow}, term: pump}}    # L/min, four times all joints at full speed
+  P_droop: {{quantity: pump_droop, bounds: [0, 600], start: 10, term: pump}}    # bar, at that flow
 
 # The two sides of a spool are made alike.
 priors:
@@ -108,7 +108,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
-        flow_rate += 0.06 * size.displacement * size.speed
+        flow_rate += 4 * 0.06 * size.displacement * size.speed  # so large that it limits no flow
         words = {"own": name.removesuffix("_joint"), "name": name}
         alike.append(ALIKE.format(**words))
         lines.append(

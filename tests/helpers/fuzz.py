@@ -7,6 +7,7 @@ log is also read by an independent reader, and must hold the same numbers.
 import contextlib
 import csv
 import io
+import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,6 @@ import numpy as np
 import trimesh
 import typer
 import yaml
-from damage import TOKENS, damage
 
 import hydroid
 from hydroid.commands.app import app
@@ -27,6 +27,77 @@ from hydroid.errors import HydroidError
 ROOT = Path(__file__).parents[2]
 LOGS = ROOT / "examples" / "logs"
 TINY = ("--algorithm=ga", "--set=search.ga={population: 4, generations: 1}", "--no-refinement", "--quiet")
+NUMBERS = (
+    """0 -0 1e308 -1e308 1e999 1e-320 nan inf -inf .nan .inf 1e3 0x1F 010 1_0 1,5 1:30 2024-01-01 1.5.2"""
+)
+MARKS = """true false null yes off ~ " ' "" [ ] [[[[ { } # % %s%n {joint} &a *a <<:*a | > ? ; =1+1 sep=;"""
+TOKENS = (
+    *("", *NUMBERS.split(), *MARKS.split()),
+    *("9" * 30, "9" * 5000, "0x" + "f" * 6000, "a" * 5000, "٣", "é", "\u2028", "\x1b[31m", "\x85", "\x00"),
+    *("&a [*a]", "- ", ": ", "\t", "\n", "\r", '"\\ud800"', "\ufeff", "\\", "# "),
+    *("../../etc/passwd", "/", "..", "~root", "file:///etc/passwd", "<script>alert(1)</script>", "&x;"),
+    *("!!python/object/apply:os.mkdir [made]", "!!python/name:os.system", "!!set {a, b}", "!!int x"),
+)
+Edit = Callable[[Random, bytes], bytes]
+
+
+def damage(rng: Random, data: bytes) -> bytes:
+    """Make one to four edits of the bytes, most of them at a token or a line."""
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
+        data = rng.choice(EDITS)(rng, data)
+    return data
+
+
+def _flip(rng: Random, data: bytes) -> bytes:
+    out = bytearray(data or b"\0")
+    for _ in range(rng.choice((1, 1, 8))):
+        out[rng.randrange(len(out))] ^= 1 << rng.randrange(8)
+    return bytes(out)
+
+
+def _cut(rng: Random, data: bytes) -> bytes:
+    start = rng.randrange(len(data) + 1)
+    return rng.choice((data[:start], data[:start] + data[start + rng.choice((1, 2, 9, 100)) :]))
+
+
+def _insert(rng: Random, data: bytes) -> bytes:
+    at = rng.randrange(len(data) + 1)
+    return data[:at] + rng.choice((_token(rng), rng.randbytes(rng.choice((1, 4, 64, 1000))))) + data[at:]
+
+
+def _replace(rng: Random, data: bytes) -> bytes:
+    """Replace a word by a token, or a number by one that differs a little."""
+    words = [*re.finditer(rb"[A-Za-z0-9_.+-]+", data[:100_000])]
+    if not words:
+        return data
+    word = rng.choice(words)
+    new = _token(rng)
+    if re.fullmatch(rb"-?\d{1,12}\.?\d*", word[0]) and rng.random() < 0.7:
+        value = float(word[0]) * rng.choice((-1, 0.1, 0.5, 1.01, 2, 1e3)) + rng.choice((0, 0, 1))
+        new = f"{value:.6g}".encode()
+    return data[: word.start()] + new + data[word.end() :]
+
+
+def _lines(rng: Random, data: bytes) -> bytes:
+    lines = data.split(b"\n")
+    at, to = rng.randrange(len(lines)), rng.randrange(len(lines))
+    match rng.randrange(4):
+        case 0:
+            del lines[at]
+        case 1:
+            lines.insert(to, lines[at])
+        case 2:
+            lines[at], lines[to] = lines[to], lines[at]
+        case _:
+            lines[at] = lines[at] * rng.choice((2, 3, 1000))
+    return b"\n".join(lines)
+
+
+def _token(rng: Random) -> bytes:
+    return rng.choice(TOKENS).encode("utf-8", "surrogatepass")
+
+
+EDITS: tuple[Edit, ...] = (_flip, _cut, _insert, _insert, *[_replace] * 6, _lines, _lines)
 
 
 @dataclass(frozen=True)
@@ -43,10 +114,14 @@ class Kind:
     command: Callable[[Path, bytes], Sequence[str]]
     check: Callable[[Path, bytes], None] | None = None
 
-    def make(self, seed: int) -> bytes:
-        """Return the damaged file of a seed."""
+    def read_damaged(self, room: Path, seed: int) -> bool:
+        """Damage a file as the seed says, and read it; what is raised names kind and seed."""
         rng = Random(f"{self.name} {seed}")
-        return damage(rng, rng.choice(self.seeds()))
+        try:
+            return self.read(room, damage(rng, rng.choice(self.seeds())))
+        except Exception as error:
+            error.add_note(f"the damaged {self.name} of seed {seed}")
+            raise
 
     def read(self, room: Path, data: bytes) -> bool:
         """Return whether a file is accepted; False where it is refused in one line. All else raises."""

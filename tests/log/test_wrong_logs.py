@@ -1,15 +1,220 @@
 """What `hydroid check` says of logs that are wrong in many ways; docs/logs.md shows the same."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from log_files import RIG_RANGES
-from wrong_logs import ROOT, WRONG, Wrong, boom, rig, save
+from log_files import RIG, RIG_RANGES
 
 import hydroid
 from hydroid.log import check_log
 from hydroid.settings.log import LogSettings
+
+ROOT = Path(__file__).parents[2]
+Table = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """One way in which logs are wrong.
+
+    how: in words, for the table. said: level and words of the finding that must be there. make: the logs.
+    settings: of `log`. header: what stands between the names and the numbers.
+    """
+
+    how: str
+    said: str
+    make: Callable[[], list[Table]]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    header: str = ""
+
+    def line(self, folder: Path) -> str:
+        """Return the line of the finding that `hydroid check` says of the logs."""
+        level, words = self.said.split(": ", 1)
+        overrides = {f"log.{key}": value for key, value in self.settings.items()}
+        lines = hydroid.check(save(self, folder), set=overrides).lines
+        return next(x for x in lines if x.startswith(level) and words in x).replace(f"{folder}/", "")
+
+
+def rig(name: str = "rig_all_joints_1", rows: int = 4000) -> Table:
+    """A log of the virtual rig, by column, after one second of rest."""
+    path = RIG / f"{name}.csv"
+    values = np.loadtxt(path, delimiter=",", skiprows=1)[:rows]
+    rest = np.repeat(values[:1], 100, axis=0)
+    rest[:, 1:8] = 0.0
+    values = np.vstack([rest, values])
+    values[:, 0] = 0.01 * np.arange(len(values))
+    return dict(zip(path.read_text().partition("\n")[0].split(","), values.T, strict=True))
+
+
+def of(prefix: str, change: Callable[[np.ndarray], np.ndarray], table: Table | None = None) -> list[Table]:
+    """The rig's log with the columns changed whose names begin with `prefix`."""
+    table = rig() if table is None else table
+    return [{name: change(values) if name.startswith(prefix) else values for name, values in table.items()}]
+
+
+def boom(duties: list[float], *, stop: float = 60.0, seconds: float = 4.0) -> Table:
+    """A boom of ours that rests, is driven by each duty [%], and rests; its pump comes up after 1.5 s."""
+    period, noise = 0.01, np.random.default_rng(4)
+    blocks = [np.zeros(100)] + [np.r_[np.full(int(seconds * 100), duty), np.zeros(100)] for duty in duties]
+    command = np.concatenate(blocks)
+    angle, speed, since, angles = 20.0, 0.0, 0.0, []
+    for u in command:
+        since = since + period if u else 0.0
+        wanted = 0.3 * np.sign(u) * max(abs(u) - 20, 0) * (1.0 if since > 1.5 else 0.6)
+        speed += (wanted - speed) * period / 0.1
+        angle += speed * period
+        if not -10 < angle < stop:
+            angle, speed = float(np.clip(angle, -10, stop)), 0.0
+        angles.append(angle)
+    table = rig(rows=len(command) - 100)
+    still = {
+        n: np.full(len(command), v[0]) * (not n.startswith("u")) for n, v in table.items() if n != "time_s"
+    }
+    moving = np.array(angles) + 0.02 * noise.normal(size=len(command))
+    return {"time_s": period * np.arange(len(command)), **still, "u2_pct": command, "q2_deg": moving}
+
+
+def shifted(by: int) -> list[Table]:
+    """The rig's log with its angles later by a number of samples."""
+    return of(
+        "q",
+        lambda q: np.r_[np.full(max(by, 0), q[0]), q, np.full(max(-by, 0), q[-1])][max(-by, 0) :][: len(q)],
+    )
+
+
+def without(*rows: int) -> list[Table]:
+    return of("", lambda values: np.delete(values, rows))
+
+
+def wrapped(table: Table) -> Table:
+    return {**table, "q6_deg": (table["q6_deg"] + 280) % 360 - 180}
+
+
+UNITS = "\n" + ",".join(["s"] + ["V"] * 7 + ["deg", "rad"] + ["deg"] * 5)
+WRONG = (
+    Wrong("commands from −1 to 1", "warning: set log.command.scale: 100", lambda: of("u", lambda u: u / 100)),
+    Wrong("commands in ±10 V", "warning: set log.command.scale: 10", lambda: of("u", lambda u: u / 10)),
+    Wrong("commands in ±1000", "error: set log.command.scale: 0.1", lambda: of("u", lambda u: u * 10)),
+    Wrong(
+        "commands in 4 to 20 mA",
+        "warning: set log.command.scale: 12.5 and log.command.offset: -150",
+        lambda: of("u2", lambda u: 12 + 0.08 * u),
+    ),
+    Wrong(
+        "a joystick of 0 to 5 V",
+        "warning: set log.command.scale: 40 and log.command.offset: -100",
+        lambda: of("u2", lambda u: 2.5 + 0.025 * u),
+    ),
+    Wrong("angles in rad, read as deg", "warning: set log.angle.unit: rad", lambda: of("q", np.deg2rad)),
+    Wrong(
+        "angles in deg, read as rad",
+        "error: set log.angle.unit: deg",
+        lambda: of("", np.asarray),
+        {"angle": {"unit": "rad"}},
+    ),
+    Wrong(
+        "the file's own row of units says rad and V",
+        "warning: the file says that q2_deg is in rad",
+        lambda: of("q", np.deg2rad, rig("rig_shoulder_1")),
+        header=UNITS,
+    ),
+    Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
+    Wrong(
+        "a clock in days, read as s", "error: set log.time.unit: day", lambda: of("time", lambda t: t / 86400)
+    ),
+    Wrong(
+        "an angle that counts the other way",
+        "error: set log.joints.3.angle.scale: -1",
+        lambda: of("q3", np.negative),
+    ),
+    Wrong(
+        "a command wired the other way",
+        "warning: angle of joint 2 moves against the command (for 99% of",
+        lambda: of("u2", np.negative),
+    ),
+    Wrong(
+        "one of three logs wired the other way",
+        "warning: joint 2 moves against its command in 1 of 3 logs",
+        lambda: [*of("u2", np.negative), rig(), rig("rig_shoulder_2")],
+    ),
+    Wrong(
+        "a command that is logged 0.3 s early",
+        "note: looks 0.33 s early against the angle; set log.delay_s: 0.33",
+        lambda: shifted(30),
+    ),
+    Wrong(
+        "clocks that differ by 0.2 s", "warning: before the command, as no machine does", lambda: shifted(-20)
+    ),
+    Wrong(
+        "0.4 s without a sample",
+        "error: cut the log into two files at longer ones",
+        lambda: without(*range(900, 940)),
+    ),
+    Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
+    Wrong(
+        "a sample that stands twice",
+        "error: time does not increase",
+        lambda: of("", lambda v: np.insert(v, 900, v[900])),
+    ),
+    Wrong(
+        "a cell that holds no number",
+        "error: 'nan' is not a number",
+        lambda: of("q2", lambda q: np.where(np.arange(len(q)) == 700, np.nan, q)),
+    ),
+    Wrong(
+        "a dead sensor",
+        "warning: angle of joint 2 never changes",
+        lambda: of("q2", lambda q: np.full_like(q, q[0])),
+    ),
+    Wrong(
+        "the angle of another joint",
+        "warning: strong commands hardly move joint 2",
+        lambda: [{**(t := rig("rig_shoulder_1")), "q2_deg": t["q1_deg"]}],
+    ),
+    Wrong(
+        "an encoder that wraps",
+        "note: angle of joint 6 wraps by 360 deg and was joined",
+        lambda: [wrapped(rig())],
+    ),
+    Wrong(
+        "a misspelt column",
+        "error: did you mean 'U2_pct'?",
+        lambda: [{n.replace("u2", "U2"): v for n, v in rig().items()}],
+    ),
+    Wrong(
+        "a joint that is pushed against its stop",
+        "note: joint 2 is driven against the end of its travel for",
+        lambda: [boom([60, -60, 100, -100], seconds=8)],
+    ),
+    Wrong(
+        "constant command levels with gaps",
+        "note: between 40 and 60, between 60 and 80",
+        lambda: [boom([40, 60, 80, -40, -60, -80])],
+    ),
+    Wrong(
+        "commands in one direction only",
+        "note: no command [%] of joint 2 above 50, below 0",
+        lambda: [boom([30, 40, 50])],
+    ),
+    Wrong(
+        "no rest before the first command", "note: begins with a command", lambda: of("", lambda v: v[100:])
+    ),
+)
+
+
+def save(wrong: Wrong, folder: Path) -> list[Path]:
+    """Write the logs of one way to be wrong."""
+    paths: list[Path] = []
+    for k, table in enumerate(wrong.make(), 1):
+        paths.append(folder / f"log{k}.csv")
+        header = ",".join(table) + wrong.header
+        np.savetxt(paths[-1], np.stack([*table.values()], axis=1), "%.8g", ",", header=header, comments="")
+    return paths
+
 
 SETTINGS = hydroid.load_settings("fit-mech")
 
@@ -18,7 +223,7 @@ SETTINGS = hydroid.load_settings("fit-mech")
 def test_it_is_said_and_the_page_shows_it(wrong: Wrong, tmp_path: Path) -> None:
     line = wrong.line(tmp_path)
     page = (ROOT / "docs" / "logs.md").read_text()
-    assert f"| {wrong.how} | {line} |\n" in page, "python tests/helpers/wrong_logs.py prints the table"
+    assert f"| {wrong.how} | {line} |\n" in page
 
 
 def findings(folder: Path, *tables: dict) -> list[tuple[str, str]]:

@@ -1,18 +1,18 @@
 """The figures of a study, in the article's arrangement, as vectors."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import mujoco
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from studies import Figure, Runs
 
-from hydroid.arm.model import load_model
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
+from hydroid.reporting.arm_chart import arm_chart
+from hydroid.reporting.figure import rendered
 
 COLORS = [f"C{i}" for i in range(10)]
 POINTS = 1200
@@ -21,15 +21,17 @@ CURVES = 20
 """values of a parameter within its bounds, as in the article's figure 10"""
 
 
-def draw(runs: Runs, figure: Figure) -> Drawing:
-    """Draw one figure of a study."""
+def draw(runs: Runs, figure: Figure, file: Path) -> None:
+    """Draw one figure of a study as SVG; that of the arm is the one that `hydroid init` draws."""
+    if figure.kind == "arm":
+        file.write_bytes(rendered(arm_chart(runs.problem.settings.arm), figure.title)[1])
+        return
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "hydroid", "axes.spines.top": False}):
-        drawing = Drawing(
-            (7.0, 4.8 if figure.kind in ("arm", "surface", "sensitivity") else 3.6), layout="constrained"
-        )
+        size = (7.0, 4.8 if figure.kind in ("surface", "sensitivity") else 3.6)
+        drawing = Drawing(size, layout="constrained")
         KINDS[figure.kind](drawing, runs, figure)
         drawing.suptitle(figure.title, fontsize=10)
-        return drawing
+        drawing.savefig(file, metadata={"Date": None})
 
 
 def _line(axes: Any, time: Array, values: Array, **how: Any) -> None:
@@ -111,32 +113,9 @@ def _surface(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel="error [deg]")
 
 
-def _arm(drawing: Drawing, runs: Runs, figure: Figure) -> None:
-    """The arm's meshes in the pose that begins the data."""
-    arm = runs.problem.settings.arm
-    model = load_model(arm).compile()
-    data = mujoco.MjData(model)
-    data.qpos[[model.joint(name).qposadr[0] for name in arm.joint_names]] = runs.problem.logs[0].start
-    mujoco.mj_kinematics(model, data)
-    axes = drawing.add_subplot(projection="3d")
-    every: list[Array] = []
-    for geom in np.flatnonzero(model.geom_dataid >= 0):
-        mesh = model.mesh(model.geom_dataid[geom])
-        corners = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]] @ data.geom_xmat[geom].reshape(3, 3).T
-        every.append(corners + data.geom_xpos[geom])
-        faces = every[-1][model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]]
-        color = COLORS[int(model.geom_bodyid[geom]) % len(COLORS)]
-        axes.add_collection3d(Poly3DCollection(faces, facecolors=color, shade=True, linewidths=0))
-    low, high = np.concatenate(every).min(axis=0), np.concatenate(every).max(axis=0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", box_aspect=high - low)
-    axes.view_init(elev=20, azim=-60)
-
-
 KINDS: dict[str, Callable[[Drawing, Runs, Figure], None]] = {
     "convergence": _convergence,
     **dict.fromkeys(("responses", "commands", "segments", "segment bests"), _record),
     "sensitivity": _sensitivity,
     "surface": _surface,
-    "arm": _arm,
 }

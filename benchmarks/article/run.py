@@ -43,8 +43,7 @@ def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
         if runs.rows:
             (results / f"{runs.plan.name}_runs.csv").write_text(runs_table(runs.rows).csv(), encoding="utf-8")
         for figure in runs.plan.study.figures:
-            file = results / f"{figure.item.replace(' ', '_')}.svg"
-            draw(runs, figure).savefig(file, metadata={"Date": None})
+            draw(runs, figure, results / f"{figure.item.replace(' ', '_')}.svg")
     if not chosen:
         text = json.dumps(account(made, quick=quick), indent=1, ensure_ascii=False) + "\n"
         (results / "about.json").write_text(text, encoding="utf-8")

@@ -1,10 +1,9 @@
-"""How exact and how stable the hydraulics are over the whole search space (takes minutes).
+"""How exact the hydraulics are over the whole search space (takes minutes).
 
-    python benchmarks/hydraulic_accuracy.py [--sets 24] [--candidates 1000]
+    python benchmarks/hydraulic_accuracy.py [--sets 24]
 
-1. One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25
-   to 2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
-2. The seven-joint arm, all joints driven at once, every actuator with its own random set.
+One joint against Radau (rtol 1e-8) of the full coupled equations: feasible parameter sets drawn from 0.25 to
+2.5 times the article's values, 30 s of pseudo-random pulses, several sub-steps and MuJoCo steps.
 """
 
 import sys
@@ -14,10 +13,8 @@ from common import ROOT, Clock, options, table
 
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
-from hydraulic_arm import DrivenArm, nominal, scatter
 from hydraulic_reference import draw, parameters, pulses, reference, simulate
 
-from hydroid.settings.arm import load_arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
 STEPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (2, 4), (4, 4)]
@@ -48,24 +45,5 @@ def accuracy(sets: int) -> None:
     )
 
 
-def stability(candidates: int) -> None:
-    arm, settings, rng = load_arm("hydrolek"), HydraulicSettings(), np.random.default_rng(2)
-    command = np.stack([pulses(rng, 3000) for _ in range(7)], axis=1)
-    command[-200:] = 0.0
-    diverged, fastest, last = 0, np.zeros(7), np.zeros(7)
-    for first in range(0, candidates, 100):
-        joints = scatter(nominal(arm, settings, min(100, candidates - first)), rng)
-        speed = abs(np.diff(DrivenArm(arm, joints, command, settings, threads=2).run(), axis=1)) / 0.01
-        diverged += int((~np.isfinite(speed).all(axis=(1, 2))).sum())
-        fastest = np.maximum(fastest, np.nanmax(speed, axis=(0, 1)))
-        last = np.maximum(last, np.nanmax(speed[:, -50:], axis=(0, 1)))
-    print(f"{candidates} random parameter sets, seven joints driven at once, 30 s: {diverged} diverged")
-    print(f"fastest [rad/s] {fastest.round(2)}, after 1.5 s of rest {last.round(3)}")
-
-
 if __name__ == "__main__":
-    given = options(__doc__, sets=24, candidates=1000)
-    if given.sets:
-        accuracy(given.sets)
-    if given.candidates:
-        stability(given.candidates)
+    accuracy(options(__doc__, sets=24).sets)

@@ -25,7 +25,7 @@ def commands(samples: int, joints: list[int], seed: int = 1) -> np.ndarray:
 
 
 def test_seven_joints_at_once_are_stable_for_random_parameters(arm: Arm):
-    """100 of the benchmark's 1,000 candidates; joint stops included."""
+    """100 candidates; joint stops included."""
     command = commands(500, ALL)
     command[-150:] = 0.0
     angle = DrivenArm(arm, candidates(arm, 100), command, SETTINGS).run()

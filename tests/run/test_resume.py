@@ -1,6 +1,9 @@
 """Runs that are killed and resumed end as if nobody had touched them."""
 
 import json
+import os
+import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -32,35 +35,59 @@ def finish(process: "subprocess.Popen[str]", code: int = 0) -> str:
     return errors
 
 
-def wait_for(process: "subprocess.Popen[str]", file: Path) -> None:
-    while not file.exists() and process.poll() is None:
+def wait_for(process: "subprocess.Popen[str]", run: Path, pattern: str) -> None:
+    while not any(run.rglob(pattern)) and process.poll() is None:
         time.sleep(1e-3)
 
 
 def content(folder: Path) -> dict[str, object]:
-    """Files by name, and what run.json says besides how long the run took."""
-    found = (p for p in folder.rglob("*") if p.is_file() and p.name not in (*OWN, "run.json"))
-    described = json.loads((folder / "run.json").read_text())
-    del described["seconds"]
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in found} | {"run.json": described}
+    """Files by name; of run.json what it says besides how long the run took."""
+    found = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
+    return {
+        name: json.loads(p.read_bytes()) | {"seconds": 0} if p.name == "run.json" else p.read_bytes()
+        for name, p in found.items()
+        if p.name not in OWN
+    }
+
+
+SEARCHES = {
+    "ga": [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"],
+    "nsga2": ["-q", "--set", "search.nsga2={population: 10, generations: 20}", "--no-refinement"],
+    "multistart": [
+        "-q",
+        "--algorithm",
+        "multistart",
+        "--set",
+        "search.multistart={starts: 3, iterations: 5}",
+    ],
+    "study": [*SHORT, "--set", "search.ga.generations=5", "--runs", "3"],
+}
 
 
 @pytest.mark.slow
-def test_killed_runs_end_the_same(tmp_path: Path):
-    options = [*SHORT, "--set", "search.ga.generations=20", "--set", "refinement.iterations=20"]
+@pytest.mark.parametrize("kind", SEARCHES)
+def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
+    """Every run is killed at moments drawn at random, and resumed; KILLS in the environment asks for more."""
+    rng = random.Random(kind)
     whole, killed = tmp_path / "whole", tmp_path / "killed"  # the report's commands name the run's folder
     whole.mkdir()
     killed.mkdir()
-    finish(start(whole, *options, out="run"))
-    for met in ("run.json", "checkpoint.npz", "checkpoint.previous.npz"):
-        process = start(killed, *options, out="run")
-        wait_for(process, killed / "run" / met)
-        time.sleep(0.02)
+    hits, began = 0, time.monotonic()
+    finish(start(whole, *SEARCHES[kind], out="run"))
+    took = time.monotonic() - began
+    while hits < int(os.environ.get("KILLS", "3")):
+        process = start(killed, *SEARCHES[kind], out="run")
+        if rng.random() < 0.5:
+            time.sleep(took * rng.random())
+        else:  # while a file is written
+            wait_for(process, killed / "run", rng.choice((".checkpoint.npz.*.part", ".*.part")))
         process.kill()
         process.communicate()
-        assert process.returncode == -signal.SIGKILL
-        assert not (killed / "run" / "estimate.yaml").exists()
-    finish(start(killed, *options, out="run"))
+        if process.returncode == 0:  # it was faster
+            assert content(killed / "run") == content(whole / "run")
+            shutil.rmtree(killed / "run")
+        hits += process.returncode == -signal.SIGKILL
+    finish(start(killed, *SEARCHES[kind], out="run"))
     assert content(killed / "run") == content(whole / "run")
 
 
@@ -68,7 +95,7 @@ def test_killed_runs_end_the_same(tmp_path: Path):
 def test_a_clusters_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(tmp_path: Path):
     options = [*SHORT, "--set", "search.ga.generations=4000"]
     process = start(tmp_path, *options, out="run")
-    wait_for(process, tmp_path / "run" / "checkpoint.npz")
+    wait_for(process, tmp_path / "run", "checkpoint.npz")
     errors = finish(start(tmp_path, *options, out="run"), 2)
     assert f"run: is in use by process {process.pid} on " in errors
     assert len(errors.splitlines()) == 1

@@ -38,6 +38,13 @@ def read(path: Path, settings: LogSettings = SETTINGS, **options: object) -> tup
     return read_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
 
 
+def assert_same(log: Log, other: Log) -> None:
+    """Every bit of time, commands and angles."""
+    np.testing.assert_array_equal(log.time, other.time)
+    np.testing.assert_array_equal(log.command, other.command)
+    np.testing.assert_array_equal(log.angle, other.angle)
+
+
 def faults(path: Path, settings: LogSettings = SETTINGS, **options: object) -> list[LogFinding]:
     """Errors only."""
     log, findings = check_log(path, settings, RANGES, **options)  # type: ignore[arg-type]

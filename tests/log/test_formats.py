@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_files import NAMES, cells, faults, lines, read, save
+from log_files import NAMES, assert_same, cells, faults, lines, read, save
 from log_formats import BagWriter, matlab, write_mat, write_mat73, write_parquet
 
 from hydroid.errors import LogError
@@ -19,9 +19,7 @@ WRITERS = {"mat": write_mat, "mat73": write_mat73, "parquet": write_parquet}
 
 def same(log: Log, tmp_path: Path) -> None:
     reference, _ = read(save(tmp_path / "plain.csv", lines(VALUES)))
-    np.testing.assert_array_equal(log.time, reference.time)
-    np.testing.assert_array_equal(log.command, reference.command)
-    np.testing.assert_array_equal(log.angle, reference.angle)
+    assert_same(log, reference)
 
 
 @pytest.mark.parametrize("kind", WRITERS)

@@ -71,12 +71,6 @@ def deadly(candidate: int) -> np.ndarray:
     return theta
 
 
-def test_a_killed_workers_candidates_are_simulated_by_another(two: DaskWorkers, tmp_path: Path):
-    theta, deaths = deadly(4), tmp_path / "deaths"
-    np.testing.assert_array_equal(two(Deadly(Rows(), deaths, times=1), "squares", theta, 2), theta**2)
-    assert deaths.read_text() == "x"
-
-
 def test_only_the_candidate_that_kills_is_infeasible(two: DaskWorkers, tmp_path: Path):
     problem = Problem(*arguments())
     theta = random_candidates(problem, 7)[:6]

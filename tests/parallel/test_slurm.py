@@ -25,15 +25,7 @@ pytestmark = [
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples" / "cluster"
 LOG = ROOT / "examples" / "logs" / "rig_shoulder_1.csv"
-QUICK = [
-    "--set",
-    "search.ga.population=6",
-    "--set",
-    "refinement.iterations=2",
-    "--algorithm",
-    "ga",
-    "--quiet",
-]
+QUICK = ["--algorithm=ga", "--set=search.ga.population=6", "--set=refinement.iterations=2", "--quiet"]
 OFTEN = f"""#!{sys.executable}
 from hydroid.commands.app import main
 from hydroid.fitting import checkpoints

@@ -1,8 +1,6 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import hydroid
 from hydroid.errors import SettingsError
@@ -157,30 +155,6 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, mes
 def test_a_column_is_named_once(tmp_path: Path):
     with pytest.raises(SettingsError, match=r"^--set log\.angle\.column: column 'foo' is meant"):
         load(written(tmp_path, MINIMAL), FitSettings, {"log.angle.column": "foo"})
-
-
-names = st.text("abcxyz_ []°", min_size=1, max_size=6)
-scales = st.floats(0.1, 10)
-command = st.fixed_dictionaries(
-    {},
-    optional={"column": names | st.lists(names, min_size=2, max_size=2), "scale": scales, "offset": scales},
-)
-angle = st.fixed_dictionaries(
-    {}, optional={"column": names, "unit": st.sampled_from(["deg", "rad"]), "scale": scales}
-)
-joint = st.none() | st.fixed_dictionaries(
-    {}, optional={"command": st.none() | command, "angle": st.none() | angle}
-)
-
-
-@given(st.dictionaries(st.integers(1, 9), joint), st.none() | scales, st.booleans())
-def test_dumped_settings_read_back_as_the_same(joints: dict, scale: float | None, unmapped: bool) -> None:
-    values: dict = {"joints": joints, "command": None if unmapped else {}}
-    if scale and not unmapped:
-        values["command"] = {"column": "c{joint}", "scale": scale}
-    settings = LogSettings.model_validate(values)
-    assert LogSettings.model_validate(settings.model_dump()) == settings
-    assert LogSettings.model_validate(settings.model_dump(mode="json")) == settings
 
 
 def test_a_joint_inherits_what_it_does_not_say() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import TRUTH
 
 import hydroid
 from hydroid.errors import RunError, SettingsError
@@ -14,8 +15,6 @@ from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import load
 
-VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
-
 
 def nominal(source: Path | None = None, **overrides: object):
     model = load_identified(source, None, overrides, default="fit-hyd", nominal=True)
@@ -24,10 +23,10 @@ def nominal(source: Path | None = None, **overrides: object):
 
 def run_folder(folder: Path, final: str) -> Path:
     """A folder as a fit of stage 2 leaves it."""
-    fixed = {f"parameters.{name}.fixed": value for name, value in VALUES.items() if name != "K"}
+    fixed = {f"parameters.{name}.fixed": value for name, value in TRUTH.items() if name != "K"}
     settings = load_identified(None, "fit-hyd", fixed, nominal=True).settings
     write_settings(folder, settings)
-    estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in VALUES.items() if n != "K"}
+    estimate = {n: ParameterEstimate(value=v, unit="?") for n, v in TRUTH.items() if n != "K"}
     write_estimate(folder, FitSummary(stage="hyd", estimate=estimate, final=final))
     return folder
 

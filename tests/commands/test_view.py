@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
+from conftest import TRUTH
 
 import hydroid
 from hydroid import load_settings
@@ -18,12 +19,11 @@ from hydroid.log import Log
 from hydroid.settings.arm import Arm
 
 ROOT = Path(__file__).parents[2]
-VALUES = {"K": 0.2, "D": 231.8, "S": 53.4, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
 @pytest.fixture(scope="module")
 def model() -> IdentifiedModel:
-    return identified(load_settings("article-mech", {"start_pose": "study"}), VALUES, "truth")
+    return identified(load_settings("article-mech", {"start_pose": "study"}), TRUTH, "truth")
 
 
 def test_an_actuator_is_drawn_with_the_settings_beside_the_estimate(hydroid_cli: Run, tmp_path: Path):

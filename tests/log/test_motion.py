@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from conftest import step_log
+from conftest import noisy, step_log
 from log_files import RIG, RIG_RANGES
 
 from hydroid.log import JointMotion, Log, read_log
@@ -113,19 +113,17 @@ def test_a_log_that_cannot_tell_raises_no_alarm(command: np.ndarray) -> None:
 POSE = np.deg2rad([0.0, 25.0, -60.0, 0.0, 0.0, 0.0, 20.0])
 
 
-def noisy(levels: list[float], seed: int = 0):
-    log = step_log(POSE, levels)
-    noise = np.random.default_rng(seed).normal(0.0, np.deg2rad(0.1), log.angle.shape)
-    return replace(log, angle=log.angle + noise)
+def steps(levels: list[float], seed: int = 0) -> Log:
+    return noisy(step_log(POSE, levels), 0.1, seed, exact_start=False)
 
 
 def test_a_rest_before_the_first_command_averages_the_noise():
-    errors = [noisy([0.0, 50.0], seed).start[1] - POSE[1] for seed in range(300)]
+    errors = [steps([0.0, 50.0], seed).start[1] - POSE[1] for seed in range(300)]
     assert np.std(errors) == pytest.approx(np.deg2rad(0.1) / np.sqrt(101), rel=0.2)
 
 
 def test_a_log_that_begins_with_a_command_starts_at_its_first_sample():
-    log = noisy([50.0, 0.0])
+    log = steps([50.0, 0.0])
     assert np.array_equal(log.start, log.angle[0])
 
 

@@ -103,7 +103,7 @@ def section(name: str, study: ArticleStudy, facts: dict[str, str], made: list[Ve
     """Return what a study is, and its verdicts."""
     items, settings = ", ".join(study.items).capitalize(), f"../benchmarks/article/{name}.yaml"
     lines = [f"\n## {study.title}\n\n{items} ([settings]({settings})). {study.about.strip()}\n\n"]
-    lines += [f"- {what}: {text}\n" for what, text in facts.items() if what != "cells"]
+    lines += [f"- {what}: {text}\n" for what, text in facts.items()]
     for title, ours in (("What the article says", False), ("Claims of ours", True)):
         if rows := [(v.item, v.says, v.outcome, v.detail) for v in made if v.ours == ours]:
             lines.append(table(title, ("item", "statement", "verdict", "what that rests on"), rows))

@@ -177,15 +177,12 @@ class Runs:
     def surface(self, figure: Figure) -> tuple[list[Parameter], list[Array], Array]:
         """Return the two parameters of a figure, their values, (n,), and the error [rad], (n, n).
 
-        All other parameters are at the truth. Wide bounds have equal ratios between values.
+        All other parameters are at the truth; the values are even on each parameter's own scale.
         """
         at = [self.problem.parameters.names.index(name) for name in figure.parameters]
         chosen = [self.problem.parameters.parameters[i] for i in at]
         count = QUICK_POINTS if self.plan.quick else POINTS
-        values = [
-            (np.geomspace if p.lower > 0 and p.upper > 20 * p.lower else np.linspace)(p.lower, p.upper, count)
-            for p in chosen
-        ]
+        values = [p.at(np.linspace(0, 1, count)) for p in chosen]
         points = np.tile(self.theta, (count**2, 1))
         points[:, at] = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, 2)
         return chosen, values, self.problem.evaluate(points).overall.reshape(count, count)

@@ -18,11 +18,6 @@ COUNTS = {"log": 40, "config": 40, "set": 40, "arm": 25, "mesh": 25, "values": 1
 HEADER = logs()[0].split(b"\n", 1)[0]
 
 
-@pytest.fixture(scope="module")
-def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("fuzz")
-
-
 @pytest.mark.parametrize("name", COUNTS)
 def test_damaged_files_are_read_rightly_or_refused_in_one_line(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -72,9 +67,9 @@ def test_damaged_runs_are_refused_in_one_line(tmp_path_factory: pytest.TempPathF
         b"time_s\0,u1_pct\n0,0\n",
     ],
 )
-def test_hostile_logs_are_refused_at_once(room: Path, data: bytes) -> None:
+def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
     started = time.perf_counter()
-    assert not KINDS["log"].read(room, data)
+    assert not KINDS["log"].read(tmp_path, data)
     assert time.perf_counter() - started < 10
 
 

@@ -161,7 +161,7 @@ def _starts(table: Baseline) -> Iterator[Floats]:
     for side, sign in enumerate((1, -1)):
         if np.any(here := commands * sign > 0):
             size, speed = np.abs(commands[here]), speeds[here]
-            dead[side] = 0.9 * size[np.abs(speed) > 0.05 * np.abs(speed).max()].min(initial=90.0)
+            dead[side] = 0.9 * size[np.abs(speed) > 0.05 * np.abs(speed).max()].min(initial=size.max())
             largest[side], last[side] = size.max(), speed[size.argmax()]
     for exponent in (1.0, 1.6, 2.5):
         full = last * ((100 - dead) / (largest - dead)) ** exponent

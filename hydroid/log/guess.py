@@ -84,10 +84,8 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
             reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
         used |= {column.name for column in (*commands.get(joint, ()), *angles.get(joint, ()))}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
-    # A slow log is simulated in two steps a sample; nothing that a fast one adds is seen on such machines.
-    wanted = max(step, 0.02) if step < 0.03 else 0.5 * step
-    periods = (0.02, 0.05, 0.1)
-    log |= {"period_s": min(periods, key=lambda period: abs(np.log(period / wanted))), "joints": entries}
+    periods = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+    log |= {"period_s": min(periods, key=lambda period: abs(np.log(period / step))), "joints": entries}
     return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
 
 

@@ -13,11 +13,15 @@ from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
+MARGIN_DEG = 1.0
+"""distance by which angles may lie outside the joint's range: sensors are noisy at the stops. Up to 2 % of
+the range they are used with a warning"""
+
 
 def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
     """Return the signals that the settings ask for, time first; joint ranges [rad], shape (J, 2)."""
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
-    margin = np.deg2rad(settings.angle_margin_deg)
+    margin = np.deg2rad(MARGIN_DEG)
     for kind in get_args(Kind):
         for joint, (low, high) in enumerate(ranges.tolist(), 1):
             if columns := settings.columns(kind, joint):

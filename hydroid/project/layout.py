@@ -9,6 +9,7 @@ import numpy as np
 
 from hydroid.errors import LogError, SettingsError
 from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
+from hydroid.log.columns import MARGIN_DEG
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -77,7 +78,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
     wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
     for joint, motion in motions.items():
-        reasons += _outside(motion.log, joint, arm, settings.angle_margin_deg)
+        reasons += _outside(motion.log, joint, arm)
         reasons += _remarks(motion, names, joint in wrong) if motion.log.driven[joint - 1] else []
         command = entries[joint]["command"]
         if command is not None and joint in wrong:
@@ -108,10 +109,10 @@ def turned(command: dict[str, Any]) -> dict[str, Any]:
     return command | changed | ({"offset": -command["offset"]} if command.get("offset") else {})
 
 
-def _outside(log: Log, joint: int, arm: Arm, margin: float) -> list[str]:
+def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
     angle, own = np.degrees(log.angle[:, joint - 1]), arm.joints[joint - 1]
     low, high, limits = float(angle.min()), float(angle.max()), own.range
-    if own.continuous or (low >= limits[0] - margin and high <= limits[1] + margin):
+    if own.continuous or (low >= limits[0] - MARGIN_DEG and high <= limits[1] + MARGIN_DEG):
         return []
     return [
         f"{arm.joint_names[joint - 1]}: the angles in the log run from {low:.1f} to {high:.1f} deg, but the "

@@ -128,15 +128,12 @@ class LogSettings(Settings):
     joints: dict[JointNumber, JointColumns | None] = Field(default_factory=dict[int, JointColumns | None])
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
-    """sample period to which logs are resampled [s]: angles are interpolated, commands held, or averaged
-    over the period where the log is faster"""
+    """sample period to which logs are resampled [s]: angles are interpolated, commands held. Commands of a
+    faster log are averaged over the period, those of a slower one change on a line from sample to sample"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
-    angle_margin_deg: Annotated[float, Field(ge=0)] = 1.0
-    """distance by which angles may lie outside the joint's range [deg]; sensors are noisy at the stops. Up to
-    2 % of the range they are used with a warning"""
 
     _prefix: str = PrivateAttr("")
 

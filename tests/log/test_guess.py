@@ -40,8 +40,8 @@ def test_the_range_of_a_command(scale: float, offset: float, unit: str, entry: d
     mapped = found.log["joints"][2]
     assert mapped["command"] == {"column": names[1], **entry}
     assert mapped["angle"] == {"column": "boomAngle", "unit": "rad"}
-    settings = LogSettings.model_validate({**found.log, "angle_margin_deg": 10})
-    log, _ = read_log(tmp_path / "log.csv", settings, np.deg2rad([[-60, 60]] * 4))
+    settings = LogSettings.model_validate(found.log)
+    log, _ = read_log(tmp_path / "log.csv", settings, np.deg2rad([[-70, 70]] * 4))
     np.testing.assert_allclose(log.command[:, 1], STEPS, atol=1e-9)
     np.testing.assert_allclose(np.rad2deg(log.angle[:, 1]), SWEEP, atol=1e-9)
 

@@ -43,6 +43,6 @@ if __name__ == "__main__":
     print(f"{clock}, {int(fit.history[-1, 2]) + fit.refinement.evaluations} simulations")
     for estimate in fit.estimates.values():
         print(f"{estimate.name}: rms {np.rad2deg(estimate.rms):.3f} deg")
-    print(f"converged: {fit.converged} ({fit.refinement.ending.value})")
+    print(f"converged: {fit.refinement.converged} ({fit.refinement.ending.value})")
     error = np.rad2deg(np.abs(logs[0].angle[:, :6] - fit.best.responses[0]).mean(axis=0))
     print("mean absolute [deg], joints 1 to 6:", *(f"{e:.3f}" for e in error))

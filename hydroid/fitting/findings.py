@@ -28,12 +28,12 @@ _LEVELS: dict[str, Level] = {
 
 def fit_findings(fit: Fit) -> tuple[Finding, ...]:
     """Return what is to be said about a fit's way to its estimate."""
-    findings = [] if fit.refinements else [Finding("not refined", "warning")]
-    findings += [
-        Finding("not converged", "warning", (name,), {"ending": refinement.ending.value})
-        for name, refinement in fit.refinements.items()
-        if not refinement.converged
-    ]
+    findings = list[Finding]()
+    if fit.refinement is None:
+        findings.append(Finding("not refined", "warning"))
+    elif not fit.refinement.converged:
+        ending = {"ending": fit.refinement.ending.value}
+        findings.append(Finding("not converged", "warning", (fit.final,), ending))
     for prior, score in fit.strains.items():
         numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}
         findings.append(Finding("strained prior", "warning", (prior,), numbers))

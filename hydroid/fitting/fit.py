@@ -75,13 +75,8 @@ class Fit:
 
     @property
     def refinement(self) -> Descent | None:
-        """The last refinement; None where there was none."""
-        return next(reversed(self.refinements.values()), None)
-
-    @property
-    def converged(self) -> bool:
-        """Whether every refinement reached an optimum."""
-        return all(r.converged for r in self.refinements.values())
+        """The refinement that gave the estimate to use; None where the search did."""
+        return self.refinements.get(self.final)
 
     @property
     def best(self) -> Estimate:
@@ -136,13 +131,6 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
-        if not result.converged:
-            _log.warning(
-                "The least-squares refinement did not converge: %s. The estimate '%s' need not be an "
-                "optimum.",
-                result.ending.value,
-                name,
-            )
         new = _estimates(own, {name: own.parameters.from_unit(result.point)})
         if not if_nearer or new[name].rms < NEARER * start.rms:
             final, last, start = name, own, new[name]
@@ -160,6 +148,9 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             climb(final.replace("refined", "dynamic"), if_nearer=True)
         if settings.joint_refinement:
             climb(final.replace("refined", "joint"), if_nearer=False)
+        if not refinements[final].converged:
+            words = "The least-squares refinement did not converge: %s. '%s' need not be an optimum."
+            _log.warning(words, refinements[final].ending.value, final)
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
     directions, determined = identifiability(last, about), quantities(last, about)

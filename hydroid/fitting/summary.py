@@ -28,8 +28,8 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     own = {
         "joints": problem.active_joints,
         "final": fit.final,
-        "converged": fit.converged if fit.refinements else None,
-        "ending": [r.ending.value for r in fit.refinements.values()][-1] if fit.refinements else None,
+        "converged": None if fit.refinement is None else fit.refinement.converged,
+        "ending": None if fit.refinement is None else fit.refinement.ending.value,
         "rms_deg": finite(np.degrees(fit.best.rms)),
         "seed": problem.settings.search.seed,
         "simulations": int(fit.history[-1, 2]),

@@ -91,7 +91,8 @@ def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     assert np.rad2deg(result.searched.rms) < 0.5
     np.testing.assert_allclose(result.searched.theta[own], truth[own], rtol=0.2)
     np.testing.assert_allclose(result.best.theta, truth, rtol=1e-3)
-    assert result.converged
+    assert result.refinement is not None
+    assert result.refinement.converged
 
 
 def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say(problem):

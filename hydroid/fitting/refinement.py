@@ -9,7 +9,7 @@ import numpy as np
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, saving
 from hydroid.parameters import Array
 from hydroid.posterior.noise import prior_weight
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.open_start import least_squares_rows, with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Descent, start
 from hydroid.search.least_squares import step
@@ -120,10 +120,5 @@ def _following(problem: Problem, now: _Refinement) -> _Refinement:
 
 def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:
     """What least squares minimises: points of the unit box, (n, p), to residuals and weighed scores."""
-    opened = with_open_start(problem, problem.parameters.from_unit(now.anchor))
-
-    def residuals(unit: Array) -> Array:
-        theta = problem.parameters.from_unit(unit)
-        return np.hstack([opened.residuals(theta), now.weight * problem.priors.scores(theta)])
-
-    return residuals
+    rows = least_squares_rows(problem, problem.parameters.from_unit(now.anchor), now.weight)
+    return lambda unit: rows(problem.parameters.from_unit(unit))

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 OPTIONS = {
     "search.algorithm": "--algorithm",
-    "search.pymoo.algorithm": "--algorithm",
     "search.seed": "--seed",
     "simulation.threads": "--threads",
     "refinement": "--no-refinement",

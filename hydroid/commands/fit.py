@@ -82,7 +82,6 @@ def fit(
         hint = f"logs: {', '.join(names)}"
         raise SettingsError("is none of the logs", where=f"payloads.{stray[0]}", hint=hint)
     from hydroid.fitting.fit import fit as run_fit
-    from hydroid.fitting.search import check_search
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
 
@@ -90,7 +89,6 @@ def fit(
     if folder is not None and folder.exists and not resume:
         raise RunError("holds a run already", where=str(out), hint="resume it, or choose another folder")
     problem = Problem(settings, read, workers)
-    check_search(problem)
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)
     with folder.owned():

@@ -37,7 +37,7 @@ SHARED = """
         moves.
     pose (NAME): The start pose, one of the arm's file [default: the first angles of the log].
 
-    algorithm (NAME): Search: ga, nsga2, cmaes, multistart, or one of the library pymoo, such as pymoo:NSGA3.
+    algorithm (NAME): Search: ga, nsga2 or multistart.
     runs (1 to 10000): Number of runs, with the seeds SEED, SEED + 1, ...
     start (RUN|YAML): Start the search from the values of an estimate.
     resume: Continue the stopped run in --out; start it if there is none.

@@ -103,10 +103,10 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings", label: str) -> None:
         search = settings.search
-        names = {"ga": "GA", "nsga2": "NSGA-II", "cmaes": "CMA-ES", "multistart": "multi-start"}
+        names = {"ga": "GA", "nsga2": "NSGA-II", "multistart": "multi-start"}
         super().__init__(label)
         what = "start" if search.algorithm == "multistart" else "population"
-        self._step = f"{names.get(search.name, search.name)} {what}"
+        self._step = f"{names[search.algorithm]} {what}"
         self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (math.degrees(1), " deg")
         self._began, self._before = time.monotonic(), -1.0

@@ -47,10 +47,8 @@ class FitOptions:
 
     def changes(self) -> dict[str, Any]:
         """Return the settings that the options replace."""
-        algorithm, _, library = (self.algorithm or "").partition(":")
         changes = {
-            "search.algorithm": algorithm or None,
-            "search.pymoo.algorithm": library or None,
+            "search.algorithm": self.algorithm,
             "search.seed": self.seed,
             "simulation.threads": self.threads,
         }
@@ -183,7 +181,7 @@ def _fit(options: FitOptions) -> FitRuns:
     logs, out, runs = options.logs or run_logs(options.out or ""), options.out, options.runs
     read = read_logs(logs, settings, repair=options.repair)
     if str(out) == NAMED:
-        out = f"runs/{Path(read[0].source).stem}-{settings.stage}-{settings.search.name}"
+        out = f"runs/{Path(read[0].source).stem}-{settings.stage}-{settings.search.algorithm}"
     results: list[FitResult] = []
     with options.workers() as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):

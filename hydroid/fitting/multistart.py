@@ -23,9 +23,9 @@ from hydroid.fitting.memo import Memo
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.algorithm import Population
 from hydroid.search.coding import Genes
 from hydroid.search.descent import Descent
+from hydroid.search.genetic import Population
 from hydroid.settings.search import RefinementSettings
 
 DRAWS = 16
@@ -35,7 +35,7 @@ MOVES = 0.01
 
 
 class Multistart:
-    """Least squares from one random start after the other: an `Algorithm` whose chromosomes are theta.
+    """Least squares from one random start after the other: a search whose chromosomes are theta.
 
     Its objective is the rms residual, priors included. A start depends on the seed and its number alone.
 
@@ -84,10 +84,6 @@ class Multistart:
     def decode(self, chromosomes: Genes) -> Array:
         """The points themselves, shape (n, P)."""
         return chromosomes
-
-    def reached(self, population: Population) -> bool:
-        """Never: it ends after all starts."""
-        return False
 
     def start(self, number: int) -> Array:
         """Draw start `number`, shape (P,): the first of DRAWS that can be simulated at all.

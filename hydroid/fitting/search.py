@@ -6,18 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.errors import SettingsError
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, saving
 from hydroid.fitting.memo import Memo
 from hydroid.fitting.multistart import Multistart
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.algorithm import Algorithm, Population
-from hydroid.search.cmaes import cmaes
 from hydroid.search.coding import Genes
-from hydroid.search.ga import SimpleGa
-from hydroid.search.moo import pymoo
-from hydroid.search.nsga2 import Nsga2
+from hydroid.search.genetic import Nsga2, Population, SimpleGa
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")
 """Columns of a run's history; `best` is over the run so far, `median` over the population, both of (18) or
@@ -50,7 +45,7 @@ def search(
     progress: Callable[[int, float], None],
     checkpoints: Checkpoints,
 ) -> Searched:
-    """Search to the last generation or convergence, from the seed or from what `checkpoints` holds.
+    """Search to the last generation, from the seed or from what `checkpoints` holds.
 
     Args:
         problem: what is minimised.
@@ -59,15 +54,16 @@ def search(
         checkpoints: where the search is stored as "search".
 
     Raises:
-        SettingsError: a library is not installed, or has no such algorithm.
-        RunError: a library does not repeat what it did before the checkpoint.
+        RunError: the search does not repeat what it did before the checkpoint.
     """
-    settings = problem.settings.search
+    settings, free = problem.settings.search, int(problem.parameters.free.sum())
     memo = Memo(problem, checkpoints.get("search"))
     if settings.algorithm == "multistart":
         algorithm = Multistart(problem, memo, progress, checkpoints)
+    elif settings.algorithm == "ga":
+        algorithm = SimpleGa(settings.ga, free, problem.start)
     else:
-        algorithm = make_algorithm(problem)
+        algorithm = Nsga2(settings.nsga2, free, problem.start)
 
     def theta(chromosomes: Genes) -> Array:
         points = algorithm.decode(chromosomes)
@@ -82,7 +78,7 @@ def search(
     generations, rng = 1 + algorithm.settings.generations, np.random.default_rng(settings.seed)
     population, history, evaluations = None, np.empty((0, len(HISTORY))), 0
     with saving(checkpoints, "search") as keep:
-        while population is None or not (len(history) == generations or algorithm.reached(population)):
+        while population is None or len(history) < generations:
             repeats = memo.replays
             chromosomes = algorithm.ask(population, rng)
             result = memo.evaluate(theta(chromosomes))
@@ -99,33 +95,3 @@ def search(
                 keep(state)
                 watch(history[-1])
     return Searched(theta(population.chromosomes), population, algorithm.single, history, memo)
-
-
-def check_search(problem: Problem) -> None:
-    """Refuse a search that cannot begin, before anything is written.
-
-    Raises:
-        SettingsError: as `make_algorithm`.
-    """
-    if problem.settings.search.algorithm != "multistart":
-        make_algorithm(problem)
-
-
-def make_algorithm(problem: Problem) -> Algorithm:
-    """The search by populations that the settings name, on the unit box of the problem's free parameters.
-
-    Raises:
-        SettingsError: a library is not installed, or has no such algorithm.
-    """
-    settings, free, start = problem.settings.search, int(problem.parameters.free.sum()), problem.start
-    match settings.algorithm:
-        case "ga":
-            return SimpleGa(settings.ga, free, start)
-        case "nsga2":
-            return Nsga2(settings.nsga2, free, start)
-        case "cmaes":
-            return cmaes(settings.cmaes, free, start)
-        case "pymoo":
-            return pymoo(settings.pymoo, free, len(problem.bounds), start)
-        case other:
-            raise SettingsError(f"{other} is no search by populations", where="search.algorithm")

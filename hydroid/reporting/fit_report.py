@@ -94,7 +94,7 @@ def _search(record: Record) -> Section:
     if len(result.history):
         _, candidates, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
         tried = f"{candidates} candidates, of which {simulated} were simulated and {diverged} diverged"
-        facts.append((record.settings.search.name, tried))
+        facts.append((record.settings.search.algorithm, tried))
     facts += [
         (one.name, f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}")
         for one in result.refinements

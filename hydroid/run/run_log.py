@@ -41,7 +41,7 @@ def log_start(settings: FitSettings, logs: Sequence[Log]) -> None:
     versions = ", ".join(f"{name} {version(name)}" for name in ("hydroid", "mujoco", "numpy", "numba"))
     _log.info("%s, Python %s", versions, platform.python_version())
     _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
-    search = f"search {settings.search.name}, seed {settings.search.seed}"
+    search = f"search {settings.search.algorithm}, seed {settings.search.seed}"
     _log.info("stage %s, %s; settings in config.yaml", settings.stage, search)
     _log.info("logs: %s", ", ".join(log.source for log in logs))
 

@@ -3,14 +3,11 @@
 All work on whole populations, leave their arguments alone, and draw from the generator passed in.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from hydroid.search.algorithm import Population
-from hydroid.search.coding import Coding, Genes, GrayCoding, IntegerCoding
+from hydroid.search.coding import Coding, Genes
 from hydroid.settings.search import GeneticSettings
 
 Float = NDArray[np.float64]
@@ -103,40 +100,3 @@ def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> G
     """
     hit = rng.random((len(chromosomes), coding.parameters)) < rate
     return np.where(np.repeat(hit, coding.width, axis=1), coding.altered(chromosomes, rng), chromosomes)
-
-
-@dataclass(frozen=True)
-class GeneticAlgorithm:
-    """The part that both genetic algorithms share: coding and reproduction.
-
-    start: point of the unit box that joins the first population, shape (p,).
-    """
-
-    settings: GeneticSettings
-    parameters: int
-    start: Float | None = None
-
-    @property
-    def coding(self) -> Coding:
-        """How candidates are written as chromosomes."""
-        return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
-
-    def decode(self, chromosomes: Genes) -> Float:
-        """Points of the unit box, shape (n, p)."""
-        return self.coding.decode(chromosomes)
-
-    def reached(self, population: Population) -> bool:
-        """Never: it ends after all generations."""
-        return False
-
-    def first(self, rng: Generator) -> Genes:
-        """The first population: random but for the start, shape (population, length)."""
-        chromosomes = self.coding.random(self.settings.population, rng)
-        if self.start is not None:
-            chromosomes[:1] = self.coding.encode(self.start[None])
-        return chromosomes
-
-    def breed(self, parents: Genes, count: int, rng: Generator) -> Genes:
-        """Cross and mutate parents, shape (even n >= count, length); return `count` children."""
-        children = crossover(parents, self.settings, rng)[:count]
-        return mutate(children, self.settings.mutation_rate, self.coding, rng)

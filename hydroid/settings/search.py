@@ -10,22 +10,17 @@ Rate = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
 
 
-class PopulationSettings(Settings):
-    """A search by populations."""
-
-    population: Annotated[int, Field(ge=4, le=100_000)] = 20
-    """number of candidates in a population"""
-    generations: Annotated[int, Field(ge=0)] = 140
-    """number of populations after the first one"""
-
-
-class GeneticSettings(PopulationSettings):
+class GeneticSettings(Settings):
     """A genetic algorithm of the article.
 
     For NSGA-II table 5 says "proportional" parent selection too. With several objectives there is no one
     fitness to be proportional to, and the article names NSGA-II: parents come from its crowded tournament.
     """
 
+    population: Annotated[int, Field(ge=4, le=100_000)] = 20
+    """number of candidates in a population"""
+    generations: Annotated[int, Field(ge=0)] = 140
+    """number of populations after the first one"""
     crossover_rate: Rate = 0.8
     """probability P_c that a pair of parents is crossed; otherwise its children are copies"""
     mutation_rate: Rate = 0.05
@@ -34,13 +29,6 @@ class GeneticSettings(PopulationSettings):
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
     """pointwise: cut parents at two places; uniform: choose each element from either parent"""
-
-
-class PymooSettings(PopulationSettings):
-    """An algorithm of the library pymoo."""
-
-    algorithm: Literal["NSGA3", "MOEAD", "RVEA", "AGEMOEA", "SMSEMOA", "DE", "PSO"] = "NSGA3"
-    """its name there; DE and PSO minimise the error over the whole log, the others that of every segment"""
 
 
 class MultistartSettings(Settings):
@@ -76,7 +64,7 @@ class RefinementSettings(Settings):
 class SearchSettings(Settings):
     """The search: its algorithm, its seed, and how one estimate is taken from a Pareto set."""
 
-    algorithm: Literal["ga", "nsga2", "cmaes", "pymoo", "multistart"] = "nsga2"
+    algorithm: Literal["ga", "nsga2", "multistart"] = "nsga2"
     """the search algorithm; its settings stand under the same name"""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """seed of all random numbers"""
@@ -87,10 +75,6 @@ class SearchSettings(Settings):
     """the simple genetic algorithm, article 4.1"""
     nsga2: GeneticSettings = GeneticSettings(crossover_rate=0.4, mutation_rate=0.2)
     """the multi-objective genetic algorithm NSGA-II, article 4.2"""
-    cmaes: PopulationSettings = PopulationSettings()
-    """CMA-ES (Hansen) of the library cma; its objective is the error over the whole log. It ends
-    earlier where it converges"""
-    pymoo: PymooSettings = PymooSettings(population=40, generations=70)
     multistart: MultistartSettings = MultistartSettings()
 
     @model_validator(mode="before")
@@ -99,14 +83,9 @@ class SearchSettings(Settings):
         """Give an algorithm what its section leaves out: defaults differ, though a class may be shared."""
         if not isinstance(values, dict):
             return values
-        sections = ((name, values.get(name)) for name in ("ga", "nsga2", "pymoo"))
+        sections = ((name, values.get(name)) for name in ("ga", "nsga2"))
         return values | {
             name: cls.model_fields[name].default.model_dump() | section
             for name, section in sections
             if isinstance(section, dict)
         }
-
-    @property
-    def name(self) -> str:
-        """The algorithm, one of pymoo by its name there."""
-        return self.pymoo.algorithm if self.algorithm == "pymoo" else self.algorithm

@@ -5,7 +5,6 @@ import pytest
 from conftest import TRUTH
 from small_fits import Study, Watcher
 
-import hydroid
 from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
 from hydroid.fitting.fit import fit
@@ -15,10 +14,6 @@ from hydroid.fitting.validation import error_indices
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
 from hydroid.run.folder import RunFolder
-
-SEARCHES = {name: {"search.algorithm": name} for name in ("ga", "nsga2", "cmaes")} | {
-    name: {"search.algorithm": "pymoo", "search.pymoo.algorithm": name} for name in ("NSGA3", "MOEAD", "DE")
-}
 
 
 def test_truth_has_no_error_and_evaluation_does_not_depend_on_the_chunk(tmp_path, monkeypatch):
@@ -80,10 +75,10 @@ def test_a_fit_recovers_what_the_data_tell_and_names_what_they_do_not(tmp_path, 
     assert min(result.seconds.values()) > 0
 
 
-@pytest.mark.parametrize(("algorithm", "stop"), [("ga", 1), ("nsga2", 6), ("cmaes", 4), ("MOEAD", 1)])
+@pytest.mark.parametrize(("algorithm", "stop"), [("ga", 1), ("nsga2", 6)])
 def test_a_resumed_search_ends_as_the_uninterrupted_one(tmp_path, algorithm, stop):
     """A search is repeated, and what it had simulated is not simulated again."""
-    problem = Study(tmp_path, **SEARCHES[algorithm]).problem
+    problem = Study(tmp_path, **{"search.algorithm": algorithm}).problem
     whole = search(problem, lambda row: None, lambda n, rms: None, {})
     stopped, rest, stored = Watcher(stop_at=stop), Watcher(), {}
     with pytest.raises(KeyboardInterrupt):
@@ -95,7 +90,7 @@ def test_a_resumed_search_ends_as_the_uninterrupted_one(tmp_path, algorithm, sto
 
 
 def test_a_fit_resumed_in_its_folder_ends_as_the_uninterrupted_one(tmp_path):
-    study = Study(tmp_path, **SEARCHES["nsga2"], refinement={"iterations": 2})
+    study = Study(tmp_path, refinement={"iterations": 2})
     whole = study.fit_in(RunFolder(tmp_path / "whole"), Watcher())
     folder = RunFolder(tmp_path / "parts")
     with pytest.raises(KeyboardInterrupt):
@@ -106,8 +101,8 @@ def test_a_fit_resumed_in_its_folder_ends_as_the_uninterrupted_one(tmp_path):
     assert whole.estimates["best"].overall == whole.history[-1, 4]  # the best of all that was simulated
 
 
-def test_a_library_that_does_not_repeat_itself_is_found_out(tmp_path):
-    study = Study(tmp_path, **SEARCHES["cmaes"], refinement=None)
+def test_a_search_that_does_not_repeat_itself_is_found_out(tmp_path):
+    study = Study(tmp_path, refinement=None)
     folder = RunFolder(tmp_path / "run")
     with pytest.raises(KeyboardInterrupt):
         study.fit_in(folder, Watcher(stop_at=4))
@@ -118,14 +113,6 @@ def test_a_library_that_does_not_repeat_itself_is_found_out(tmp_path):
     with pytest.raises(RunError, match="does not repeat"):
         fit(study.problem, checkpoints=checkpoints)
     assert (folder.path / "checkpoint.npz").read_bytes() == before
-
-
-def test_an_algorithm_that_cannot_begin_leaves_no_folder(tmp_path):
-    study = Study(tmp_path, **{"objective.segments": {"equal": 1}})
-    settings = load_settings("article-mech", SEARCHES["NSGA3"] | {"objective.segments": {"equal": 1}})
-    with pytest.raises(SettingsError, match="minimises several objectives"):
-        hydroid.fit(settings, [study.log], tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hydroid.search.algorithm import Population
+from hydroid.search.genetic import Population
 
 
 def evaluate(algorithm, chromosomes, function):
@@ -17,8 +17,6 @@ def advance(algorithm, function, population, rng, generations):
     if population is None:
         population = algorithm.tell(None, evaluate(algorithm, algorithm.ask(None, rng), function))
     for _ in range(generations):
-        if algorithm.reached(population):
-            break
         offspring = evaluate(algorithm, algorithm.ask(population, rng), function)
         population = algorithm.tell(population, offspring)
     return population

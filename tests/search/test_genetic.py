@@ -6,9 +6,8 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from search_runs import advance, evaluate, same
 
-from hydroid.search.algorithm import Population
-from hydroid.search.ga import SimpleGa
-from hydroid.search.nsga2 import Nsga2, crowded_order, tournament
+from hydroid.search.genetic import Nsga2, Population, SimpleGa, crowded_order, tournament
+from hydroid.search.pareto import feasible
 from hydroid.settings.search import GeneticSettings
 
 
@@ -50,7 +49,7 @@ def test_the_infeasible_neither_survive_nor_win_while_a_feasible_candidate_is_th
     population = Population(chromosomes, objectives)
     assert sorted(crowded_order(objectives)[:10]) == list(range(1, 20, 2))
     good = evaluate(search, search.ask(None, rng), two_goals)
-    assert search.tell(population, good).feasible.all()
+    assert feasible(search.tell(population, good).objectives).all()
     # one of two contestants is feasible in all but the pairs of two infeasible ones
     wins = np.concatenate([tournament(objectives, 20, rng) for _ in range(200)])
     assert (wins % 2 == 0).mean() == pytest.approx(0.25 * 9 / 9.5, abs=0.03)
@@ -71,3 +70,37 @@ def test_the_seed_alone_decides_every_bit(kind, coding):
     assert same(one, again)
     assert len(one) == 13
     assert not same(one, other)
+
+
+def sphere(points):
+    return ((points - 0.3) ** 2).sum(axis=1, keepdims=True)
+
+
+def half_fail(points):
+    value = sphere(points)
+    value[points[:, 0] > 0.5] = np.nan
+    value[points[:, 1] > 0.8] = np.inf
+    return value
+
+
+@pytest.mark.parametrize("coding", ["binary", "integer"])
+@pytest.mark.parametrize("cross", ["pointwise", "uniform"])
+def test_finds_the_bottom_of_a_sphere(coding, cross):
+    ga = SimpleGa(GeneticSettings(coding=coding, crossover=cross), 9)
+    population = advance(ga, sphere, None, np.random.default_rng(0), 200)
+    random = sphere(np.random.default_rng(0).random((201 * 70, 9))).min()
+    assert population.objectives.min() < random / 5  # random search with the same number of evaluations
+
+
+def test_the_best_one_is_kept_and_not_evaluated_again():
+    ga = SimpleGa(GeneticSettings(population=11), 3)
+    rng = np.random.default_rng(0)
+    population = advance(ga, half_fail, None, rng, 0)
+    for _ in range(30):
+        chromosomes = ga.ask(population, rng)
+        assert len(chromosomes) == 10
+        successor = ga.tell(population, evaluate(ga, chromosomes, half_fail))
+        assert len(successor) == 11
+        best = np.sort(population.objectives[:, 0])[:1]  # numpy sorts nan last
+        assert np.array_equal(successor.objectives[:1, 0], best, equal_nan=True)
+        population = successor

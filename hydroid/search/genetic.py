@@ -1,0 +1,172 @@
+"""The article's two searches: the simple genetic algorithm (4.1, figure 12), and NSGA-II (4.2).
+
+A search is deterministic: it draws from the generator passed in alone. So a run is continued by running it
+again from its seed, with the objectives that are known (`fitting.memo`).
+
+    population = None
+    for _ in range(1 + generations):
+        chromosomes = algorithm.ask(population, rng)
+        offspring = Population(chromosomes, objectives(algorithm.decode(chromosomes)))
+        population = algorithm.tell(population, offspring)
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from hydroid.search.coding import Coding, Genes, GrayCoding, IntegerCoding
+from hydroid.search.operators import crossover, mutate, roulette
+from hydroid.search.pareto import crowding, feasible, ranks
+from hydroid.settings.search import GeneticSettings
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+ELITE = 1
+"""best candidates of the simple GA that survive unchanged (ours; the article gives none)"""
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Candidates and their objectives; nothing ever writes into its arrays.
+
+    Attributes:
+        chromosomes: shape (n, length), see `coding`.
+        objectives: to be minimised, shape (n, m). A candidate with an objective that is not finite is
+            infeasible.
+    """
+
+    chromosomes: Genes
+    objectives: Float
+
+    def __len__(self) -> int:
+        return len(self.chromosomes)
+
+    def take(self, index: Int) -> "Population":
+        """Return the candidates at `index`, in that order."""
+        return Population(self.chromosomes[index], self.objectives[index])
+
+    def join(self, other: "Population") -> "Population":
+        """Return these candidates, then the others."""
+        both = zip((self.chromosomes, self.objectives), (other.chromosomes, other.objectives), strict=True)
+        return Population(*map(np.concatenate, both))
+
+
+@dataclass(frozen=True)
+class GeneticAlgorithm:
+    """What both algorithms share: coding and reproduction.
+
+    Attributes:
+        settings: population, generations and rates.
+        parameters: dimensions p of the unit box.
+        start: point of the box that joins the first population, shape (p,).
+        single: whether it minimises one objective, shape (n, 1), rather than several at once.
+    """
+
+    settings: GeneticSettings
+    parameters: int
+    start: Float | None = None
+    single: ClassVar[bool]
+
+    @property
+    def coding(self) -> Coding:
+        """How candidates are written as chromosomes."""
+        return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
+
+    def decode(self, chromosomes: Genes) -> Float:
+        """Return points of the unit box, shape (n, p)."""
+        return self.coding.decode(chromosomes)
+
+    def ask(self, population: Population | None, rng: Generator) -> Genes:
+        """Return chromosomes to be evaluated: the first population, or the offspring of one."""
+        if population is not None:
+            return self.offspring(population, rng)
+        chromosomes = self.coding.random(self.settings.population, rng)
+        if self.start is not None:
+            chromosomes[:1] = self.coding.encode(self.start[None])
+        return chromosomes
+
+    def offspring(self, population: Population, rng: Generator) -> Genes:
+        """Return the chromosomes of the next generation that are to be evaluated."""
+        raise NotImplementedError
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """Return the next population, from the present one (none at the start) and its offspring."""
+        raise NotImplementedError
+
+    def breed(self, parents: Genes, count: int, rng: Generator) -> Genes:
+        """Cross and mutate parents, shape (even n >= count, length); return `count` children."""
+        children = crossover(parents, self.settings, rng)[:count]
+        return mutate(children, self.settings.mutation_rate, self.coding, rng)
+
+
+class SimpleGa(GeneticAlgorithm):
+    """Roulette, crossover, mutation; the best few survive, the children replace the rest."""
+
+    single = True
+
+    def offspring(self, population: Population, rng: Generator) -> Genes:
+        """Return (population - ELITE, length): the elite is not simulated again."""
+        count = self.settings.population - ELITE
+        parents = roulette(_objective(population), count + count % 2, rng)
+        return self.breed(population.chromosomes[parents], count, rng)
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """Return the best ELITE candidates of the present population, then all offspring."""
+        if population is None:
+            return offspring
+        best = np.argsort(_objective(population), kind="stable")[:ELITE]
+        return population.take(best).join(offspring)
+
+
+class Nsga2(GeneticAlgorithm):
+    """NSGA-II (Deb, Pratap, Agarwal, Meyarivan 2002) on the simple GA's operators.
+
+    Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
+    """
+
+    single = False
+
+    def offspring(self, population: Population, rng: Generator) -> Genes:
+        """Return (population, length), from parents of the crowded tournament."""
+        count = self.settings.population
+        parents = tournament(population.objectives, count + count % 2, rng)
+        return self.breed(population.chromosomes[parents], count, rng)
+
+    def tell(self, population: Population | None, offspring: Population) -> Population:
+        """Return the best of parents and children together, in crowded order."""
+        everyone = offspring if population is None else population.join(offspring)
+        return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
+
+
+def crowded_order(objectives: Float) -> Int:
+    """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
+
+    That is the crowded comparison: lower rank first, then more room around them.
+    """
+    rank = ranks(objectives)
+    return np.lexsort((-crowding(objectives, rank), rank))
+
+
+def tournament(objectives: Float, count: int, rng: Generator) -> Int:
+    """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
+
+    The contestants of each round are a random permutation of the population, so that every candidate
+    competes equally often. No infeasible candidate beats a feasible one.
+    """
+    rank = ranks(objectives)
+    room = crowding(objectives, rank)
+    n = len(objectives)
+    rounds = -(-2 * count // n)
+    contestants = np.concatenate([rng.permutation(n) for _ in range(rounds)])[: 2 * count]
+    a, b = contestants[0::2], contestants[1::2]
+    a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
+    return np.where(a_wins, a, b)
+
+
+def _objective(population: Population) -> Float:
+    """The one objective, shape (n,), inf where infeasible."""
+    return np.where(feasible(population.objectives), population.objectives[:, 0], np.inf)

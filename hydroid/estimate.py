@@ -159,7 +159,7 @@ class FitSummary(Settings):
     diverged: int | None = None
     """simulations of the search that diverged"""
     findings: tuple[Annotated[Finding, BeforeValidator(_finding)], ...] = ()
-    """what to know before using the estimate, the most important first; `hydroid.words` has the sentences"""
+    """what to know before using the estimate, the most important first (`hydroid.findings`)"""
     verdict: tuple[JointVerdict, ...] = ()
     """of each compared joint on the fitted logs; the page of a run adds the unseen logs"""
     strained_priors: dict[str, float] = Field(default_factory=dict[str, float])

@@ -14,7 +14,6 @@ LAYERS = [
         "assets",
         "files",
         "findings",
-        "log_words",
         "mjcf",
         "parameters",
         "progress",

@@ -66,10 +66,9 @@ def match_signals(
             "missing column",
             missing[0].name,
             part="header" if table.header else "file",
-            missing=listed([f"{s.name!r} ({s}{guess.get(s.name, '')})" for s in missing], 4),
-            columns=listed([name for name in table.names if name], 40),
+            missing=listed([f"{s.name!r} ({s}{guess.get(s.name, '')})" for s in missing], 2),
+            columns=listed([name for name in table.names if name], 6),
             settings=", ".join(dict.fromkeys(f"log.{signal.kind}" for signal in missing)),
-            joint=str(missing[-1].joint or 1),
         )
     for name in dict.fromkeys(signal.name for signal in wanted):
         if (count := table.names.count(name)) > 1:

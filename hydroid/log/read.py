@@ -15,7 +15,7 @@ from hydroid.log.columns import map_signals, match_signals
 from hydroid.log.csv import open_csv, read_start
 from hydroid.log.finding import LogFinding, log_finding
 from hydroid.log.log import Floats, Log
-from hydroid.log.repair import fill, is_on_grid, resample, sample_period, unwrap
+from hydroid.log.repair import fill, resample, sample_period, unwrap
 from hydroid.log.survey import contradictions
 from hydroid.log.table import Recording, Table
 from hydroid.settings.log import LogSettings
@@ -139,7 +139,7 @@ def _to_log(recording: Recording, settings: LogSettings, joints: int, findings: 
     pressure = measured[..., 1:] if "pressure" in kinds else None
     log = Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
     step = sample_period(recording.time)
-    if abs(step - period) > 0.01 * period or not is_on_grid(recording.time, period):
+    if abs(step - period) > 0.01 * period:
         findings.append(recording.finding("note", "resampled", step=step, period=period))
     if "command" in kinds and not log.driven.any():
         findings.append(recording.finding("warning", "undriven"))

@@ -61,7 +61,7 @@ FAULTS = {
 """change of a file, and line, column and words of its only fault"""
 WARNINGS = {
     "slightly outside": (cell(40, 3, "88.2"), {"slightly outside": "q1_deg"}),
-    "an uneven period": (cell(41, 0, "0.403"), {"jitter": "time_s", "resampled": ""}),
+    "an uneven period": (cell(41, 0, "0.403"), {"jitter": "time_s"}),
     "nothing driven": (
         values(lambda t: t * [1, 0, 0, 1, 1]), {"undriven": "", "command is constant": "u1_pct"},
     ),

@@ -1,6 +1,5 @@
 """The figures of a study, in the article's arrangement, as vectors."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,32 +10,24 @@ from studies import Figure, Runs
 
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.reporting.arm_chart import arm_chart
-from hydroid.reporting.figure import rendered
 
 COLORS = [f"C{i}" for i in range(10)]
-POINTS = 1200
-"""samples of a record that are drawn"""
-CURVES = 20
-"""values of a parameter within its bounds, as in the article's figure 10"""
 
 
 def draw(runs: Runs, figure: Figure, file: Path) -> None:
-    """Draw one figure of a study as SVG; that of the arm is the one that `hydroid init` draws."""
-    if figure.kind == "arm":
-        file.write_bytes(rendered(arm_chart(runs.problem.settings.arm), figure.title)[1])
-        return
+    """Draw one figure of a study as SVG."""
+    kinds = {"convergence": _convergence, "sensitivity": _sensitivity, "surface": _surface}
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "hydroid", "axes.spines.top": False}):
         size = (7.0, 4.8 if figure.kind in ("surface", "sensitivity") else 3.6)
         drawing = Drawing(size, layout="constrained")
-        KINDS[figure.kind](drawing, runs, figure)
+        kinds.get(figure.kind, _responses)(drawing, runs, figure)
         drawing.suptitle(figure.title, fontsize=10)
         drawing.savefig(file, metadata={"Date": None})
 
 
 def _line(axes: Any, time: Array, values: Array, **how: Any) -> None:
-    """Draw a curve over time; without more, the data."""
-    step = max(1, len(time) // POINTS)
+    """Draw a curve over time, 1200 samples at most; without more, the data."""
+    step = max(1, len(time) // 1200)
     axes.plot(time[::step], values[::step], **(how or {"color": "black", "linestyle": "--", "label": "data"}))
 
 
@@ -58,19 +49,12 @@ def _convergence(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     axes.legend(fontsize=8)
 
 
-def _record(drawing: Drawing, runs: Runs, figure: Figure) -> None:
-    """The command or the angle; with it its segments, or responses of the median run of each cell."""
+def _responses(drawing: Drawing, runs: Runs, figure: Figure) -> None:
+    """The angle, and responses of the median run of each cell."""
     axes, problem, (time, angle) = drawing.subplots(), runs.problem, runs.record
-    axes.set(xlabel="time [s]", ylabel="command [%]" if figure.kind == "commands" else "angle [deg]")
-    if figure.kind == "commands":
-        return _line(axes, time, problem.logs[0].command[:, problem.outputs[0]], drawstyle="steps-post")
+    axes.set(xlabel="time [s]", ylabel="angle [deg]")
     _line(axes, time, angle)
-    if figure.kind == "segments":
-        for number, (first, end) in enumerate(problem.bounds, 1):
-            axes.axvline(float(time[first]), color="grey", lw=0.8, linestyle="--")
-            axes.text(float(time[(first + end) // 2]), angle.max(), str(number), ha="center")
-        return None
-    for cell, color in zip(figure.cells or runs.plan.cells, COLORS, strict=False):
+    for cell, color in zip(figure.cells, COLORS, strict=False):
         if (run := runs.median_run(cell)) is None:
             continue
         of_cell = Problem(runs.plan.cells[cell], problem.logs[:1])
@@ -81,41 +65,36 @@ def _record(drawing: Drawing, runs: Runs, figure: Figure) -> None:
             how = {"lw": 2, "label": cell} if values is run["theta"] else {"lw": 0.6, "alpha": 0.5}
             _line(axes, time, response, color=color, **how)
     axes.legend(fontsize=8)
-    return None
 
 
 def _sensitivity(drawing: Drawing, runs: Runs, figure: Figure) -> None:
     """The output for 20 values of each of some parameters over their bounds, dark to light."""
     problem, (time, angle) = runs.problem, runs.record
-    low, high = figure.window_s or (0.0, np.inf)
-    part = slice(*np.searchsorted(time, (low, high) if low < time[-1] else (0, np.inf)).tolist())
     panels = drawing.subplots(-(-len(figure.parameters) // 2), 2, sharex=True, squeeze=False)
     for axes, name in zip(panels.ravel(), figure.parameters, strict=False):
         column = problem.parameters.names.index(name)
         parameter = problem.parameters.parameters[column]
-        candidates = np.tile(runs.theta, (CURVES, 1))
-        candidates[:, column] = parameter.at(np.linspace(0, 1, CURVES))
+        candidates = np.tile(runs.theta, (20, 1))
+        candidates[:, column] = parameter.at(np.linspace(0, 1, 20))
         curves = np.degrees(problem.responses(candidates)[0].angle[:, :, 0])
-        for shade, curve in zip(np.linspace(0, 0.95, CURVES), curves, strict=True):
-            _line(axes, time[part], curve[part], color=mpl.colormaps["viridis"](shade), lw=0.8)
-        _line(axes, time[part], angle[part])
+        for shade, curve in zip(np.linspace(0, 0.95, 20), curves, strict=True):
+            _line(axes, time, curve, color=mpl.colormaps["viridis"](shade), lw=0.8)
+        _line(axes, time, angle)
         axes.set_title(f"{name}: {parameter.lower:g} to {parameter.upper:g} {parameter.unit}", fontsize=9)
-        axes.set(xlabel="time [s]", ylabel="angle [deg]")
+        axes.set(xlabel="time [s]", ylabel="angle [deg]", xlim=figure.window_s)
 
 
 def _surface(drawing: Drawing, runs: Runs, figure: Figure) -> None:
-    """The error over two parameters, all others at the truth."""
-    (parameters, values, error), axes = runs.surface(figure), drawing.add_subplot(projection="3d")
-    error = np.where(np.isfinite(error), np.degrees(error), np.nan)
-    first, second = np.meshgrid(*values, indexing="ij")
-    axes.plot_surface(first, second, error, cmap="viridis_r", rstride=1, cstride=1)
-    labels = [f"{p.name} [{p.unit}]" if p.unit else p.name for p in parameters]
+    """The error over two parameters, even on their scales; all others are at the truth."""
+    problem, count = runs.problem, 7 if runs.plan.quick else 31
+    at = [problem.parameters.names.index(name) for name in figure.parameters]
+    chosen = [problem.parameters.parameters[i] for i in at]
+    first, second = np.meshgrid(*(p.at(np.linspace(0, 1, count)) for p in chosen), indexing="ij")
+    points = np.tile(runs.theta, (count**2, 1))
+    points[:, at] = np.stack([first, second], axis=-1).reshape(-1, 2)
+    error = np.degrees(problem.evaluate(points).overall.reshape(count, count))
+    axes = drawing.add_subplot(projection="3d")
+    shown = np.where(np.isfinite(error), error, np.nan)
+    axes.plot_surface(first, second, shown, cmap="viridis_r", rstride=1, cstride=1)
+    labels = [f"{p.name} [{p.unit}]" if p.unit else p.name for p in chosen]
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel="error [deg]")
-
-
-KINDS: dict[str, Callable[[Drawing, Runs, Figure], None]] = {
-    "convergence": _convergence,
-    **dict.fromkeys(("responses", "commands", "segments", "segment bests"), _record),
-    "sensitivity": _sensitivity,
-    "surface": _surface,
-}

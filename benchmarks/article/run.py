@@ -12,21 +12,17 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from figures import draw
+from measures import DETERMINED_AT_DEG
 from page import page
-from statements import statements
-from studies import DETERMINED_AT_DEG, Plan, Runs, load_studies
+from studies import Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.reporting.study_report import runs_table
-from hydroid.studies.execution import processes
+from hydroid.studies.study import processes
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,51 +41,30 @@ def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
         for figure in runs.plan.study.figures:
             draw(runs, figure, results / f"{figure.item.replace(' ', '_')}.svg")
     if not chosen:
-        text = json.dumps(account(made, quick=quick), indent=1, ensure_ascii=False) + "\n"
+        about = {
+            "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
+            "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+            "quick": quick,
+            "facts": {runs.plan.name: facts(runs) for runs in made},
+        }
+        text = json.dumps(about, indent=1, ensure_ascii=False) + "\n"
         (results / "about.json").write_text(text, encoding="utf-8")
         target = results.with_suffix(".md")
         target.write_text(page(results), encoding="utf-8")
         print(target)
 
 
-def account(studies: Sequence[Runs], *, quick: bool) -> dict[str, Any]:
-    """Return with what the studies were run, and what the CSV files do not tell.
-
-    A run's seconds count as the median of its cell: a machine that slept would count otherwise.
-    """
-    pairs = [pair for runs in studies for pair in zip(runs.plan.tasks, runs.results, strict=True)]
-    distinct = {task.key(): (task.cell, result) for task, result in pairs}
-    seconds = dict[str, list[float]]()
-    for cell, result in distinct.values():
-        seconds.setdefault(cell, []).append(result.get("measures", {}).get("seconds", 0.0))
-    return {
-        "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "quick": quick,
-        "runs": len(distinct),
-        "seconds": round(sum(float(np.median(times)) * len(times) for times in seconds.values())),
-        "facts": {runs.plan.name: facts(runs) for runs in studies},
-        "findings": {runs.plan.name: [asdict(v) for v in statements(runs)] for runs in studies},
-    }
-
-
 def facts(runs: Runs) -> dict[str, str]:
     """Return what was run on what."""
     plan, log = runs.plan, runs.problem.logs[0]
-    found = {"base settings": plan.study.base}
-    if plan.tasks:
-        total, seconds = (
-            sum(row.values.get(n, 0.0) for row in runs.rows) for n in ("simulations", "seconds")
-        )
-        found["seeds"] = f"1 to {max(task.seed for task in plan.tasks)}"
-        found["simulations"] = f"{total:,.0f} in {seconds:,.0f} s of one core"
     data = "simulated at the truth under random commands, no noise"
     if plan.study.simulated is None:
         data = ", ".join(Path(one.source).name for one in plan.logs)
-    found["data"] = f"{log.duration:.3g} s, {data}"
+    found = {"base settings": plan.study.base, "data": f"{log.duration:.3g} s, {data}"}
     if (known := runs.directions) is not None:
         limit = f"to {100 * WEAK_ABOVE:g} % or better at {DETERMINED_AT_DEG:g} deg of white noise"
-        found["identifiable directions"] = f"{known.rank} of {len(known.names)} ({limit})"
+        count = int(known.parameters.free.sum())
+        found["identifiable directions"] = f"{known.rank} of {count} ({limit})"
     return found
 
 

@@ -1,8 +1,8 @@
 """The article's studies: cells and seeds, the truth, what is shown, and what is claimed."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -14,23 +14,22 @@ from pydantic import Field
 from hydroid import read_logs
 from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.errors import RunError
+from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.parameters import Array, Parameter
-from hydroid.prediction import simulate_log
+from hydroid.parameters import Array
+from hydroid.prediction import predict, simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 from hydroid.settings.study import Changes, StudySettings, cell_settings
-from hydroid.studies.execution import run_all
 from hydroid.studies.runs import Result, Task
-from hydroid.studies.study import Row, make_tasks, measured, read_checks
+from hydroid.studies.study import Row, make_tasks, measured, run_all
 
 FOLDER = Path(__file__).parent
-DETERMINED_AT_DEG = 0.1
-"""noise of the angle for which a direction counts as identifiable [deg]"""
-POINTS, QUICK_S, QUICK_SEEDS, QUICK_POINTS = 31, 15.0, 2, 7
-"""values of each parameter of a surface; in the short form length of the data, seeds, and these values"""
+QUICK_S, QUICK_SEEDS = 15.0, 2
+"""length of the data and number of seeds in the short form"""
+BLIND_DRAWS = 100
 
 
 class Simulated(Settings):
@@ -55,18 +54,14 @@ class Table(Settings):
 
 
 class Figure(Settings):
-    """A figure, and the statement `says` or the orders of effects that it is judged by."""
+    """A figure."""
 
     title: str
-    kind: Literal["convergence", "responses", "commands", "segments", "segment bests",
-                  "sensitivity", "surface", "arm"]  # fmt: skip
-    says: str = ""
+    kind: Literal["convergence", "responses", "segment bests", "sensitivity", "surface"]
     cells: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
-    orders: dict[str, tuple[tuple[str, ...], ...]] = Field(default_factory=dict[str, Any])
     window_s: tuple[float, float] | None = None
     normalized: bool = False
-    actuators: dict[str, int] = Field(default_factory=dict[str, int])
 
     @property
     def item(self) -> str:
@@ -79,19 +74,27 @@ class Claim(Settings):
 
     says: str
     item: str
-    column: str = ""
-    lower: str = ""
-    than: str = ""
+    column: str
+    lower: str
+    than: str
     ours: bool = False
     """the statement is not the article's"""
-    untested: str = ""
-    """why no run can tell, in place of column, lower and than"""
+
+
+class CheckLog(Settings):
+    """A log that every estimate predicts, and settings of its own, by dotted key."""
+
+    log: str
+    set: Changes = Field(default_factory=dict[str, Any])
 
 
 class ArticleStudy(StudySettings):
     """A study with what the article prints and says of it."""
 
+    about: str
     items: tuple[str, ...]
+    checks: dict[str, CheckLog] = Field(default_factory=dict[str, CheckLog])
+    """further logs, by name; their measure is the mean absolute error"""
     truth: dict[str, float] = Field(default_factory=dict[str, float])
     simulated: Simulated | None = None
     tables: tuple[Table, ...] = ()
@@ -136,21 +139,42 @@ class Plan:
     @cached_property
     def tasks(self) -> list[Task]:
         """All runs."""
-        changes = self.study.quick if self.quick else {}
-        checks = read_checks(self.study, FOLDER / self.name, read_logs, changes)
-        if self.quick:
-            checks = {name: (log.first(QUICK_S), own) for name, (log, own) in checks.items()}
         seeds = min(self.study.seeds, QUICK_SEEDS) if self.quick else self.study.seeds
-        return make_tasks(self.cells, range(1, seeds + 1), self.logs, checks)
+        return make_tasks(self.cells, seeds, self.logs)
 
     def run(self, folder: Path, executor: Executor) -> "Runs":
         """Perform the runs that `folder` does not have yet; return what all of them gave."""
         problem, truth = Problem(next(iter(self.cells.values())), self.logs), self.study.truth
-        directions = true_directions(problem, truth, DETERMINED_AT_DEG) if truth else None
+        directions = true_directions(problem, truth) if truth else None
         results = tuple(run_all(self.tasks, folder, executor, no_progress))
-        pairs = zip(self.tasks, results, strict=True)
-        rows = tuple(with_truth(measured(task, one), task, one, directions) for task, one in pairs)
-        return Runs(self, problem, directions, results, rows)
+        pairs = list(zip(self.tasks, results, strict=True))
+        rows = [with_truth(measured(task, one), one, directions) for task, one in pairs]
+        for name, check in self.study.checks.items():
+            errors = self.check_errors(check, pairs)
+            rows = [
+                replace(row, values={**row.values, f"check {name}": error})
+                for row, error in zip(rows, errors, strict=True)
+            ]
+        if rows and directions:
+            rows += directions.without_data(BLIND_DRAWS)
+        return Runs(self, problem, directions, results, tuple(rows))
+
+    def check_errors(self, check: CheckLog, runs: Sequence[tuple[Task, Result]]) -> Iterator[float]:
+        """Yield the mean absolute error [deg] of each run on another log; NaN where it diverged."""
+        changes = (self.study.quick if self.quick else {}) | check.set
+        cells = cell_settings(self.study, FOLDER / self.name, changes)
+        (log,) = read_logs([FOLDER / check.log], next(iter(cells.values())))
+        log = log.first(QUICK_S if self.quick else np.inf)
+        for task, result in runs:
+            settings = cells[task.cell]
+            try:
+                theta = settings.parameter_set().vector(result["theta"], "a run")
+                angle = predict(IdentifiedModel(settings, theta, "a run"), log, settings.outputs)
+            except (RunError, KeyError):
+                yield np.nan
+                continue
+            measured = log.angle[:, [j - 1 for j in settings.outputs]]
+            yield float(np.degrees(np.abs(angle - measured)).mean())
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,22 +198,9 @@ class Runs:
         log = self.problem.logs[0]
         return log.time, np.degrees(log.angle[:, self.problem.outputs[0]])
 
-    def surface(self, figure: Figure) -> tuple[list[Parameter], list[Array], Array]:
-        """Return the two parameters of a figure, their values, (n,), and the error [rad], (n, n).
-
-        All other parameters are at the truth; the values are even on each parameter's own scale.
-        """
-        at = [self.problem.parameters.names.index(name) for name in figure.parameters]
-        chosen = [self.problem.parameters.parameters[i] for i in at]
-        count = QUICK_POINTS if self.plan.quick else POINTS
-        values = [p.at(np.linspace(0, 1, count)) for p in chosen]
-        points = np.tile(self.theta, (count**2, 1))
-        points[:, at] = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, 2)
-        return chosen, values, self.problem.evaluate(points).overall.reshape(count, count)
-
     def of(self, cell: str) -> list[tuple[Row, Result]]:
         """Return the runs of a cell that did not fail."""
-        pairs = zip(self.rows, self.results, strict=True)
+        pairs = zip(self.rows, self.results, strict=False)  # blind draws have no result
         return [(row, result) for row, result in pairs if row.cell == cell and not row.failed]
 
     def median_run(self, cell: str) -> Result | None:

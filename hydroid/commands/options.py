@@ -29,8 +29,8 @@ SHARED = """
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves
         stay as they are.
     seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
-    dask (local[:N]|slurm[:N]|ADDRESS): Simulate in N processes of this machine, in N Slurm jobs, or on the
-        workers of the Dask scheduler at ADDRESS. The result is the same.
+    dask (local[:N]|ADDRESS): Simulate in N processes of this machine, or on the workers of the Dask
+        scheduler at ADDRESS. The result is the same.
     dask_insecure: Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.
     arm (right|left|both): Simulate the two-arm machine of the arm's file; the value names the arms that move.
         Columns such as right_u2_pct and left_q2_deg belong to one arm. All others apply to every arm that

@@ -13,7 +13,7 @@ from hydroid.errors import Stopped
 from hydroid.settings.study import load_study
 
 if TYPE_CHECKING:
-    from hydroid.studies.study import StudyRuns
+    from hydroid.studies.study import Row
 
 
 @command
@@ -24,7 +24,7 @@ def study(
     processes: int = 0,
     dask: str | None = None,
     dask_insecure: bool = False,
-) -> "Result[StudyRuns]":
+) -> "Result[tuple[Row, ...]]":
     """Compare settings over many seeds.
 
     The file names a config, the settings that vary, and the logs. Every run leaves a small file in DIR/runs
@@ -34,7 +34,7 @@ def study(
     Example: hydroid study my-study.yaml --out runs/my-study
 
         runs = hydroid.study("my-study.yaml", out="runs/my-study").result
-        print([(row.cell, row.seed, row.values["rms error"]) for row in runs.rows])
+        print([(row.cell, row.seed, row.values["rms error"]) for row in runs])
 
     Args:
         file (STUDY.yaml): The study's file (docs/studies.md).
@@ -50,7 +50,7 @@ def study(
     from hydroid.parallel.cluster import open_workers
     from hydroid.reporting.study_report import cell_table, runs_table
     from hydroid.run.lock import locked
-    from hydroid.studies.execution import processes as open_processes
+    from hydroid.studies.study import processes as open_processes
     from hydroid.studies.study import run_study
 
     with locked(folder), open_workers(dask, insecure=dask_insecure) as workers:
@@ -62,12 +62,12 @@ def study(
             count = len(list(folder.glob("runs/*.json")))
             kept = f"{folder} holds {count} runs that have ended; the same command goes on"
             raise Stopped(kept) from None
-    cells, failed = cell_table(runs), [row for row in runs.rows if row.failed]
+    cells, failed = cell_table(runs), [row for row in runs if row.failed]
     failures = [f"failed: {row.cell}, seed {row.seed}: {row.failed}" for row in failed]
-    lines = [cells, *failures, *written({"cells": cells, "runs": runs_table(runs.rows)}, folder)]
+    lines = [cells, *failures, *written({"cells": cells, "runs": runs_table(runs)}, folder)]
     each = [
         {"cell": row.cell, "seed": row.seed, "failed": row.failed or None}
         | {name: finite(value) for name, value in row.values.items()}
-        for row in runs.rows
+        for row in runs
     ]
     return Result(lines, {"out": str(folder), "runs": each}, runs)

@@ -1,6 +1,6 @@
-"""Which Dask scheduler hydroid uses: its own on this machine or for Slurm jobs, or one that runs already.
+"""Which Dask scheduler hydroid uses: its own on this machine, or one that runs already.
 
-A Dask scheduler runs whatever code reaches its port. Every scheduler that is started here therefore uses TLS
+A Dask scheduler runs whatever code reaches its port. The one that is started here therefore uses TLS
 with credentials made for the run, and refuses clients and workers without them. A scheduler that was started
 elsewhere needs TLS too, with the credentials of Dask's configuration, unless it listens on the loopback
 interface. `python -m hydroid.parallel.cluster FOLDER` makes credentials for a scheduler and workers that a
@@ -12,10 +12,8 @@ import json
 import logging
 import os
 import re
-import shutil
 import signal
 import sys
-import tempfile
 import warnings
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager, suppress
@@ -37,13 +35,12 @@ def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskW
     """Connect to workers; at the end, stop those that were started here.
 
     Args:
-        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; `slurm[:N]` submits
-            N jobs, one if left out, with a worker per core; anything else is the address of a scheduler, or
-            its scheduler file. None: no workers.
+        dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything else is
+            the address of a scheduler, or its scheduler file. None: no workers.
         insecure: accept an address without TLS that other machines can reach.
 
     Raises:
-        SettingsError: Dask is not installed, there is no Slurm here, or the address is refused.
+        SettingsError: Dask is not installed, or the address is refused.
         RunError: no scheduler answers.
     """
     if dask is None:
@@ -59,16 +56,13 @@ def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskW
         # HTTP servers of what is started here have no TLS, and serve nothing
         closed = {f"distributed.{name}.http.routes": list[str]() for name in ("scheduler", "worker")}
         stack.enter_context(config.set(closed))
-        own = re.fullmatch(r"(local|slurm)(?::([1-9][0-9]{0,3}))?", dask)
-        if own is None:
-            target = _address(dask, insecure)
-        elif own[1] == "slurm":
-            target = _start_slurm(stack, int(own[2] or 1))
-        else:
+        if own := re.fullmatch("local(?::([1-9][0-9]{0,3}))?", dask):
             # a worker that dies is started again, and Dask would give it up for good if that takes longer
             # than 15 s, as on a busy machine
             stack.enter_context(config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}))
-            target = _start_local(stack, int(own[2] or os.cpu_count() or 1))
+            target = _start_local(stack, int(own[1] or os.cpu_count() or 1))
+        else:
+            target = _address(dask, insecure)
         client: Any = Client.__new__(Client)
         try:
             client.__init__(target, timeout=CONNECT)
@@ -93,7 +87,9 @@ def write_credentials(folder: Path) -> None:
     Raises:
         FileExistsError: the folder is there already.
     """
-    security = _new_credentials()
+    from distributed.security import Security
+
+    security: Any = Security.temporary()  # pyright: ignore[reportUnknownMemberType]
     configs = {role: security.get_tls_config_for_role(role) for role in ("scheduler", "worker", "client")}
     tls: dict[str, Any] = {role: {key: c[key] for key in ("cert", "key")} for role, c in configs.items()}
     tls["ca-file"] = configs["client"]["ca_file"]
@@ -103,14 +99,9 @@ def write_credentials(folder: Path) -> None:
     (folder / "distributed.yaml").write_text(yaml.safe_dump({"distributed": {"comm": comm} | closed}))
 
 
-def _new_credentials() -> Any:
-    from distributed.security import Security
-
-    return Security.temporary()  # pyright: ignore[reportUnknownMemberType]
-
-
 def _start_local(stack: ExitStack, count: int) -> Any:
     from distributed import LocalCluster
+    from distributed.security import Security
 
     with _signals_blocked(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the port of the HTTP server that serves nothing
@@ -119,7 +110,7 @@ def _start_local(stack: ExitStack, count: int) -> Any:
             threads_per_worker=1,
             memory_limit=0,  # unlimited
             host="127.0.0.1",
-            security=_new_credentials(),
+            security=Security.temporary(),  # pyright: ignore[reportUnknownMemberType]
             dashboard_address=None,  # pyright: ignore[reportArgumentType]  # documented: none
             silence_logs=logging.CRITICAL,
         )
@@ -141,35 +132,6 @@ def _signals_blocked() -> Generator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _start_slurm(stack: ExitStack, jobs: int) -> Any:
-    if shutil.which("sbatch") is None:
-        raise SettingsError("there is no sbatch here", where="--dask slurm", hint="run on a Slurm machine")
-    from dask import config
-    from dask_jobqueue.slurm import SLURMCluster
-    from distributed.security import Security
-
-    folder = tempfile.mkdtemp(prefix=".hydroid-dask-", dir=Path.cwd())  # only this user can read it
-    stack.callback(shutil.rmtree, folder, ignore_errors=True)
-    credentials = _new_credentials()
-    keys = [f"tls_{role}_{kind}" for role in ("scheduler", "worker", "client") for kind in ("cert", "key")]
-    files = {name: f"{folder}/{name}.pem" for name in ("tls_ca_file", *keys)}
-    for name, file in files.items():
-        Path(file).write_text(getattr(credentials, name))
-    cores = config.get("jobqueue.slurm.cores") or 4  # Dask's configuration has the site's defaults
-    cluster: Any = SLURMCluster(
-        cores=cores,
-        processes=cores,
-        memory=config.get("jobqueue.slurm.memory") or "4GiB",
-        log_directory="runs/slurm",
-        security=Security(require_encryption=True, **files),
-        scheduler_options={"dashboard": False, "dashboard_address": ":0"},
-        worker_extra_args=["--no-dashboard"],
-    )
-    stack.callback(_close, cluster)
-    cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that ends is replaced
-    return cluster
-
-
 def _address(given: str, insecure: bool) -> str:
     """The address that is given itself or by a scheduler file, if code may be sent there."""
     from distributed.comm.addressing import get_address_host, parse_address
@@ -178,11 +140,11 @@ def _address(given: str, insecure: bool) -> str:
     try:
         if Path(given).is_file():
             address = str(json.loads(Path(given).read_text())["address"])
-        elif given.startswith(("local:", "slurm:")):
+        elif given.startswith("local:"):
             raise ValueError(given)  # not the host of that name
         scheme, host = parse_address(address)[0], get_address_host(address)
     except (OSError, ValueError, TypeError, KeyError):
-        hint = "give local[:N], slurm[:N], tls://HOST:PORT, or a scheduler file"
+        hint = "give local[:N], tls://HOST:PORT, or a scheduler file"
         raise SettingsError("is no Dask scheduler", where=where, hint=hint) from None
     with suppress(ValueError):
         insecure |= ipaddress.ip_address(host).is_loopback

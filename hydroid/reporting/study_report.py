@@ -5,17 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.reporting.table import Table
-from hydroid.studies.study import Row, StudyRuns
+from hydroid.studies.study import Row
 
 
-def cell_table(runs: StudyRuns) -> Table:
+def cell_table(runs: Sequence[Row]) -> Table:
     """Return the median of each measure over the seeds of each cell, with the lowest and the highest."""
-    errors = ("rms error", "mean absolute error", *(f"check {name}" for name in runs.study.checks))
-    header = ("cell", "runs", *(f"{n} [deg]" if n in errors[:2] else n for n in errors), "simulations")
+    measures = {"rms error": " [deg]", "mean absolute error": " [deg]", "simulations": ""}
+    header = ("cell", "runs", *(name + unit for name, unit in measures.items()))
     rows: list[tuple[str | int, ...]] = []
-    for cell in runs.cells:
-        good = [row.values for row in runs.rows if row.cell == cell and not row.failed]
-        values = ([one[name] for one in good] for name in (*errors, "simulations"))
+    for cell in dict.fromkeys(row.cell for row in runs):
+        good = [row.values for row in runs if row.cell == cell and not row.failed]
+        values = ([one[name] for one in good] for name in measures)
         rows.append((cell, len(good), *map(_median, values)))
     return Table("Median over the seeds [lowest, highest]", header, tuple(rows))
 

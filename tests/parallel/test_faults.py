@@ -183,46 +183,6 @@ def test_a_lost_scheduler_is_one_error(site: Site):
             workers(rows, "squares", NINE, 2)
 
 
-SBATCH = """#!/bin/sh
-# stands in for Slurm's: runs the job at once, in a session of its own
-cp "$1" "{folder}/job.sh"
-setsid sh -c 'echo $$ >> "{folder}/jobs"; exec bash "{folder}/job.sh"' >> "{folder}/job.log" 2>&1 &
-echo "Submitted batch job $!"
-"""
-
-
-def test_slurm_jobs_become_workers_with_credentials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    for name, text in (("sbatch", SBATCH.format(folder=tmp_path)), ("scancel", "#!/bin/sh\n")):
-        (tmp_path / name).write_text(text)
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
-    monkeypatch.chdir(tmp_path)
-    job = {"cores": 2, "memory": "1GiB", "walltime": "00:10:00", "queue": "debug"}
-    configuration = {f"jobqueue.slurm.{key}": value for key, value in job.items()}
-    try:
-        with dask.config.set(configuration), open_workers("slurm") as workers:
-            assert workers is not None
-            np.testing.assert_array_equal(workers(Rows(), "squares", NINE, 2), NINE**2)
-            wait_for(lambda: workers.count == 2)
-            address = workers.client.scheduler_info()["address"]
-            assert address.startswith("tls://")
-            (private,) = tmp_path.glob(".hydroid-dask-*")
-            assert private.stat().st_mode & 0o077 == 0
-            with pytest.raises(OSError, match=r"[Tt]imed out|TLS|SSL"):
-                distributed.Client(address, security=distributed.Security.temporary(), timeout=2.0)
-        assert not private.exists()
-    finally:
-        for pid in (tmp_path / "jobs").read_text().split():
-            with suppress(ProcessLookupError):
-                os.killpg(int(pid), signal.SIGKILL)
-    script = (tmp_path / "job.sh").read_text()
-    for line in ("-p debug", "-t 00:10:00", "--mem=1G", "--cpus-per-task=2"):
-        assert f"#SBATCH {line}" in script
-    assert "--nthreads 1" in script
-    assert f"--tls-key {private}" in script
-
-
 QUICK = ["--algorithm", "ga", "--set", "search.ga.population=6", "--set", "refinement.iterations=1"]
 
 

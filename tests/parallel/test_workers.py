@@ -121,12 +121,9 @@ def test_an_address_that_is_none_or_that_others_reach_is_refused(
         opened(address, insecure=insecure)
 
 
-def test_no_workers_no_slurm_and_no_dask(monkeypatch: pytest.MonkeyPatch):
+def test_no_workers_and_no_dask(monkeypatch: pytest.MonkeyPatch):
     with open_workers(None) as nothing:
         assert nothing is None
-    monkeypatch.setenv("PATH", "")
-    with pytest.raises(SettingsError, match="no sbatch"):
-        opened("slurm")
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SettingsError, match=r"pip install 'hydroid\[cluster\]'"):
         opened("local")

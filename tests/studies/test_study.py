@@ -12,7 +12,7 @@ from hydroid import read_logs
 from hydroid.errors import HydroidError, RunError
 from hydroid.reporting.study_report import cell_table
 from hydroid.settings.study import cell_settings, load_study
-from hydroid.studies import execution
+from hydroid.studies import study as execution
 from hydroid.studies.study import make_tasks
 
 
@@ -28,7 +28,7 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
     caplog.set_level("INFO", "hydroid")
     file = written(tmp_path)
     first, before = run(file, tmp_path), stored(tmp_path)
-    assert len(first.rows) == len(before) == 4
+    assert len(first) == len(before) == 4
     assert "found" not in caplog.text
     next((tmp_path / "runs").glob("*.json")).unlink()
     performed: list[tuple[str, int]] = []
@@ -43,7 +43,7 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
     assert len(performed) == 1
     assert "3 of 4 runs found, goes on" in caplog.text
     assert stored(tmp_path) == before
-    both = zip(first.rows, again.rows, strict=True)
+    both = zip(first, again, strict=True)
     assert all(a.values[n] == b.values[n] for a, b in both for n in a.values if n != "seconds")
     # another study shares the runs that both have; the unused search's settings decide nothing
     other = {"alone": {"one": {"objective.norm": "inf", "search.nsga2.population": 10}}}
@@ -57,7 +57,7 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     """A checkout that is moved keeps its runs: paths decide nothing."""
     file = written(tmp_path)
     cells = cell_settings(load_study(file), file)
-    (task, *_) = make_tasks(cells, [1], read_logs([tmp_path / "short.csv"], cells["mean"]), {})
+    (task, *_) = make_tasks(cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"]))
     arm = task.settings.arm
     moved = replace(arm, file=arm.file.model_copy(update={"pair": tmp_path / "other.xml"}))
     other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
@@ -76,20 +76,14 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(execution, "perform", failing)
     runs = run(written(tmp_path), tmp_path)
-    assert [(row.cell, row.seed, row.failed) for row in runs.rows if row.failed] == [
+    assert [(row.cell, row.seed, row.failed) for row in runs if row.failed] == [
         ("mean", 1, "MemoryError: for now"),
         ("mean", 2, "every candidate diverged"),
     ]
     assert [row[:2] for row in cell_table(runs).rows] == [("largest", 2), ("mean", 0)]
     assert len(stored(tmp_path)) == 3  # what may pass is tried again
     monkeypatch.setattr(execution, "perform", perform)
-    assert [row.failed for row in run(written(tmp_path), tmp_path).rows].count("") == 3
-
-
-def test_a_check_of_the_fitted_log_is_its_own_error(tmp_path: Path):
-    for row in run(written(tmp_path, checks={"again": {"log": "short.csv"}}, seeds=1), tmp_path).rows:
-        assert row.values["mean absolute error"] <= row.values["rms error"] <= row.values["largest error"]
-        assert row.values["check again"] == pytest.approx(row.values["mean absolute error"])
+    assert [row.failed for row in run(written(tmp_path), tmp_path)].count("") == 3
 
 
 @pytest.mark.parametrize(
@@ -102,7 +96,6 @@ def test_a_check_of_the_fitted_log_is_its_own_error(tmp_path: Path):
         ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),
         ({"logs": []}, r"names no log"),
         ({"logs": ["gone.csv"]}, r"gone.csv"),
-        ({"checks": {"other": {"log": "gone.csv"}}}, r"gone.csv"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, change: dict[str, Any], message: str):

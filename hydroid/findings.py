@@ -143,7 +143,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "no output angle": ("output joint {0} has no angle column", "map it in log.joints, or take another"),
     "absent joints": ("holds nothing of joint{s} {names}", ""),
     "missing column": (
-        "the {part} lacks {missing}",
+        "the file lacks {missing}",
         "it has {columns}: name its columns in {settings} (`hydroid convert` guesses them); a joint that it "
         "lacks is null there",
     ),
@@ -165,10 +165,6 @@ WORDS: dict[str, tuple[str, str]] = {
     "outside": (
         _OUTSIDE,
         "correct the cells, or unit, scale and offset of {column} in log.{quantity}, or the joint's range",
-    ),
-    "slightly outside": (
-        _OUTSIDE,
-        "it is used as it is: correct the joint's range, or log.{quantity} of {column}, if it is wrong",
     ),
     "outside in another range": (_OUTSIDE, _RANGE),
     "outside in another unit": (_OUTSIDE, "if angles are in {other}, set log.angle.unit: {other}"),
@@ -219,10 +215,6 @@ WORDS: dict[str, tuple[str, str]] = {
         "command of joint{s} {names}, whose angle is compared, is constant",
         "such a log alone says little: fit it together with others",
     ),
-    "early": (
-        "command of joint{s} {names} looks {lag:.2f} s early against the angle",
-        "set log.delay_s: {delay:.2f} if the machine has that transport delay",
-    ),
     "late": (
         "angle of joint{s} {names} moves {lag:.2f} s before the command, as no machine does",
         "the log's clocks differ: mend the log, or set log.delay_s: {delay:.2f}",
@@ -243,15 +235,6 @@ WORDS: dict[str, tuple[str, str]] = {
     "no rest": (
         "begins with a command{after}",
         "the first sample is the start pose: begin a log with a second of rest",
-    ),
-    # all logs together
-    "directions differ": (
-        "joint {0} moves against its command in {turned} of {logs} logs",
-        "the sign of the command or the angle differs between the logs: correct it in these logs",
-    ),
-    "open valve curve": (
-        "no command [%] of {gaps}: nothing is known about the valve curve there",
-        "add logs with such commands, or keep the parameters of the curve fixed",
     ),
 }
 """statement and hint by kind; a hint may be empty"""

@@ -21,13 +21,15 @@ _UNITS = (
     ("voltage", 1.0, "V volt volts"),
     ("voltage", 1e-3, "mV"),
     ("current", 1e-3, "mA"),
+    ("length", 1.0, "m meter metre"),
+    ("length", 1e-2, "cm"),
     ("length", 1e-3, "mm"),
     ("area", 1e-6, "mm²"),
     ("volume", 1e-6, "cm³"),
     ("stiffness", 1e3, "N/mm"),
     ("flow", 1e-3 / 60, "l/min"),
     ("other", 1.0, "mbar psi N kN Nm m/s deg/s rad/s °/s rpm °C kg"),
-    ("ambiguous", 1.0, "1 - none a amp m cm mrad hz"),
+    ("ambiguous", 1.0, "1 - none a amp mrad hz"),
 )
 """quantity, factor to SI (of a command to %), spellings; an ambiguous one counts only in a row of units"""
 

@@ -48,13 +48,6 @@ class LogCheck(NamedTuple):
         }
 
 
-class Checked(NamedTuple):
-    """Several files, and the findings about all usable ones together."""
-
-    logs: "list[LogCheck]"
-    findings: "Sequence[LogFinding]"
-
-
 @command
 def check(
     logs: "LogSources",
@@ -62,18 +55,17 @@ def check(
     config: "ConfigSource" = "fit-mech",
     set: "SettingChanges" = None,
     repair: bool = False,
-) -> Result[Checked]:
-    """List the faults of logs, anything unusual in them, and the commands that none of them has.
+) -> "Result[list[LogCheck]]":
+    """List the faults of logs, and anything unusual in them.
 
     A finding shared by several logs is listed once. The exit status is 2 if a log is unusable.
 
     Example: hydroid check LOG.csv
 
-        checked = hydroid.check(["a.csv", "b.csv"]).result
-        print(*checked.logs[0].findings, *checked.findings, sep="\\n")
+        print(*hydroid.check(["a.csv", "b.csv"]).result[0].findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    from hydroid.log import check_log, driven_joints, grouped, motion_findings, survey
+    from hydroid.log import check_log, driven_joints, grouped, motion_findings
 
     arm, outputs, checks = settings.arm, settings.outputs, list[LogCheck]()
     for path in map(Path, as_list(logs)):
@@ -83,8 +75,7 @@ def check(
         moved = {joint: motion.travel for joint, motion in (driven_joints(log) if log else {}).items()}
         checks.append(LogCheck(path, log, [*faults, *(motion_findings(log) if log else ())], moved))
     usable = [(one, one.log) for one in checks if one.log]
-    together = survey([log for _, log in usable])
-    findings = [*(finding for one in checks for finding in one.findings), *together]
+    findings = [finding for one in checks for finding in one.findings]
     findings.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
     lines = [f"{level}: {line}" for level, line in grouped(findings)]
     for one, log in usable:
@@ -92,10 +83,8 @@ def check(
         moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in one.moved_deg.items())
         size = f"{len(log.time)} samples, {log.duration:.2f} s"
         lines.append(f"{one.path}: {size}, driven joints: {driven}" + (moved and f"; moved: {moved}"))
-    content = {"logs": [one.plain() for one in checks], "findings": plain_findings(together)}
-    return Result(
-        lines, content, Checked(checks, together), exit_status=0 if len(usable) == len(checks) else 2
-    )
+    content = {"logs": [one.plain() for one in checks]}
+    return Result(lines, content, checks, exit_status=0 if len(usable) == len(checks) else 2)
 
 
 def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:

@@ -5,7 +5,7 @@ from hydroid.log.guess import ColumnGuess, guess_columns
 from hydroid.log.log import Log
 from hydroid.log.motion import JointMotion, driven_joints, motion_of
 from hydroid.log.read import check_log, open_table, read_log
-from hydroid.log.survey import motion_findings, survey
+from hydroid.log.survey import motion_findings
 from hydroid.log.table import Table
 from hydroid.log.write import write_log, write_logs
 
@@ -23,7 +23,6 @@ __all__ = [
     "motion_of",
     "open_table",
     "read_log",
-    "survey",
     "write_log",
     "write_logs",
 ]

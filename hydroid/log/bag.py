@@ -8,7 +8,7 @@ column has the name that the settings give it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from hydroid.errors import LogError
 from hydroid.log.log import Floats
 from hydroid.log.repair import hold
-from hydroid.log.table import Recording, Signal, Table, in_rows, optional_package, readable
+from hydroid.log.table import Recording, Signal, Table, optional_package, readable
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,20 +42,16 @@ class BagTable(Table):
             hint = "record them together, with one clock"
             raise LogError("the channels have no common time", where=self.source, hint=hint)
         rows = int((end - start) / (1e9 * self.period) + 1e-6) + 1
-        grid = np.arange(rows, dtype=np.float64) * self.period
-        series = {time: grid}
+        columns = {time: np.arange(rows, dtype=np.float64) * self.period}
         for name, times in at.items():
             values = np.array([self.channels[name][key] for key in times.tolist()])
-            series[name] = _resampled((times - start) / 1e9, values, grid, held=held[name])
+            columns[name] = _resampled((times - start) / 1e9, values, columns[time], held=held[name])
         topics = {name.partition(".")[0] for name in held}
-        said = (
-            (topics, f"resampled to {self.period:g} s"),
-            (topics & self.unstamped, "no header stamp, so the time of recording counts"),
-            ({name for name in held if held[name] and at[name][0] > start}, "0 until the first message"),
-        )
-        remarks = tuple(f"{', '.join(sorted(columns))}: {what}" for columns, what in said if columns)
-        values = np.stack([series[signal.name] for signal in signals], axis=1)
-        return in_rows(self, signals, values, remarks=remarks)
+        remarks = [f"{', '.join(sorted(topics))}: resampled to {self.period:g} s"]
+        if unstamped := ", ".join(sorted(topics & self.unstamped)):
+            remarks.append(f"{unstamped}: no header stamp, so the time of recording counts")
+        table = Table(source=self.source, layout=self.layout, names=self.names, columns=columns)
+        return replace(table, remarks=tuple(remarks)).read(signals)
 
 
 def open_bag(path: Path, time: str, period: float) -> BagTable:
@@ -83,7 +79,7 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
         raise LogError("holds no channel of numbers", where=str(path))
     return BagTable(
         source=str(path),
-        layout={".bag": "ROS 1 bag", ".mcap": "MCAP"}.get(path.suffix, "ROS 2 bag"),
+        layout="bag",
         names=(time, *channels),
         channels=channels,
         unstamped=unstamped,

@@ -1,4 +1,4 @@
-"""The cells of a line of a CSV file: how it is split, and which cells hold numbers or times of day."""
+"""The cells of a line of text: how it is split, and which cells hold numbers or times of day."""
 
 import csv
 import re
@@ -55,8 +55,9 @@ def seconds(cells: Sequence[str]) -> Floats:
     has passed midnight.
     """
     ticks = [clock(cell) for cell in cells]
+    there = np.array([tick is not None for tick in ticks])
     times = np.array([tick for tick in ticks if tick is not None], np.int64)
     midnights = np.cumsum(np.diff(times, prepend=times[0]) < -43_200 * 10**9)
     result = np.full(len(cells), np.nan)
-    result[[tick is not None for tick in ticks]] = (times - times[0] + 86_400 * 10**9 * midnights) / 1e9
+    result[there] = (times - times[0] + 86_400 * 10**9 * midnights) / 1e9
     return result

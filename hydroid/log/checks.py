@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hydroid.log.clues import KINDS, column_unit, likely_range
-from hydroid.log.finding import LogFinding, together
+from hydroid.log.finding import LogFinding
 from hydroid.log.log import Floats
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording, Signal
@@ -23,23 +23,21 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
     return [
         *_holes(recording, settings.repair_s),
         *_time(recording, settings, repaired),
-        *together(_outside(recording)),
-        *_jumps(recording),
-        *together(_stated_units(recording)),
+        *_values(recording),
+        *_stated_units(recording),
     ]
 
 
 def _holes(recording: Recording, longest: float) -> Iterator[LogFinding]:
     """Rows of too few or too many cells, and cells without a number."""
-    torn = np.flatnonzero(recording.ragged)
-    if len(torn):
-        yield recording.finding("error", "torn row", torn, cells=str(len(recording.table.names)))
+    if recording.torn.any():
+        cells = str(len(recording.table.names))
+        yield recording.finding("error", "torn row", np.flatnonzero(recording.torn), cells=cells)
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
-        rows = np.flatnonzero(np.isnan(values) & ~recording.ragged)
+        rows = np.flatnonzero(np.isnan(values) & ~recording.torn)
         if len(rows):
-            text = recording.table.text(int(recording.lines[rows[0]]), signal.name)
-            empty = "the cell is empty" if recording.table.header else "no value is there"
-            what = f"{text[:30]!r} is not a number" if text else empty
+            text = recording.text(int(rows[0]), signal)
+            what = f"{text[:30]!r} is not a number" if text else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
 
@@ -78,31 +76,26 @@ def _time(recording: Recording, settings: LogSettings, repaired: bool) -> Iterat
         yield recording.finding("warning", "jitter", rows[1:][uneven], signal, **numbers)
 
 
-def _outside(recording: Recording) -> Iterator[LogFinding]:
-    """Values outside their limits; if they are many, another range, unit or sign may explain them."""
+def _values(recording: Recording) -> Iterator[LogFinding]:
+    """Values outside their limits, which another range, unit or sign may explain if they are many.
+
+    A joint without limits is checked by its speed: none turns by 180 deg within one sample.
+    """
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
-        rounding = 1e-6 if signal.kind == "command" else 0.0
-        beyond = np.fmax(signal.low - values, values - signal.high)
-        rows = np.flatnonzero(beyond > rounding)
+        rows = np.flatnonzero((values < signal.low - 1e-6) | (values > signal.high + 1e-6))
         if len(rows):
             many = len(rows) > 0.05 * (values != 0).sum()
             kind, remedy = _explained(signal, values) if many else ("outside", {})
-            slight = np.nanmax(beyond) <= signal.slack
             unit = {"command": "%", "angle": "deg", "pressure": "bar"}[signal.kind]
             numbers = {"value": values[rows[0]], "low": signal.low, "high": signal.high}
-            numbers = {name: number / UNITS[unit].factor for name, number in numbers.items()}
-            yield recording.finding(
-                "warning" if slight else "error",
-                "slightly outside" if slight else kind,
-                rows,
-                signal,
-                signal.joint,
-                quantity=signal.kind,
-                unit=unit,
-                column=signal.name,
-                **numbers,
-                **remedy,
-            )
+            shown = {name: number / UNITS[unit].factor for name, number in numbers.items()}
+            names = {"quantity": signal.kind, "unit": unit, "column": signal.name}
+            yield recording.finding("error", kind, rows, signal, signal.joint, **names, **shown, **remedy)
+        if signal.kind == "angle" and not np.isfinite(signal.high):
+            there = np.flatnonzero(~np.isnan(values))
+            steps = np.rad2deg(np.diff(values[there]))
+            if len(far := np.flatnonzero(np.abs(steps) > 180)):
+                yield recording.finding("error", "jump", there[1:][far], signal, step=steps[far[0]])
 
 
 def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
@@ -120,16 +113,6 @@ def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
             if np.nanmin(changed) >= signal.low and np.nanmax(changed) <= signal.high:
                 return kind, remedy
     return "outside", {}
-
-
-def _jumps(recording: Recording) -> Iterator[LogFinding]:
-    """Check a joint without a range by its speed: no arm turns by 180 deg within one sample."""
-    for signal, values in zip(recording.signals, recording.values.T, strict=True):
-        if signal.kind == "angle" and not np.isfinite(signal.high):
-            rows = np.flatnonzero(~np.isnan(values))
-            steps = np.rad2deg(np.diff(values[rows]))
-            if len(far := np.flatnonzero(np.abs(steps) > 180)):
-                yield recording.finding("error", "jump", rows[1:][far], signal, step=steps[far[0]])
 
 
 def _stated_units(recording: Recording) -> Iterator[LogFinding]:

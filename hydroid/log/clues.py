@@ -17,7 +17,8 @@ WORDS: dict[Kind, str] = {
     "other": "flow pump pressure press p pa pb tank supply current",
     "command": """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out
     output spool demand volt voltage stell drive""",
-    "angle": "q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll",
+    "angle": """q angle angles ang theta phi pos position positions winkel encoder deg rad pitch yaw roll
+    length stroke""",
 }
 """words that tell the kind of a column; the last one in its name counts"""
 DERIVED = """velocity vel speed qd dq qdot acc acceleration torque force load effort temp temperature error
@@ -26,6 +27,7 @@ fault status count index sample date"""
 KINDS: dict[str, Kind] = {
     "time": "time",
     "angle": "angle",
+    "length": "angle",
     "command": "command",
     "voltage": "command",
     "current": "command",
@@ -37,6 +39,7 @@ SAME = (
     "bucket tool gripper",
     "shoulder boom",
     "elbow stick",
+    "telescope extension slide",
 )
 """names that machines have for the same joint"""
 OPPOSITE = (
@@ -131,11 +134,15 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:
-    """Return the number [from 1] of the joint that a column's name holds the name of; None: of none."""
-    there = {*words(name)} - {"joint"}
-    exact = [{*words(joint)} for joint in joints]
+    """Return the number [from 1] of the only joint whose name a column's name holds; None: of none.
+
+    Words of three letters and more may be cut short: `tele1_cmd` is the telescope's.
+    """
+    there = {*words(name)} - {"joint", "link"}
+    exact = [{*words(joint)} - {"joint", "link"} for joint in joints]
     alike = [own.union(*(group.split() for group in SAME if own & {*group.split()})) for own in exact]
-    for named in (exact, alike):
+    short = [{w[:n] for w in own for n in range(3, len(w))} for own in alike]
+    for named in (exact, alike, short):
         hits = [k for k, mine in enumerate(named, 1) if mine & there]
         if len(hits) == 1:
             return hits[0]

@@ -13,30 +13,31 @@ from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
-MARGIN_DEG = 1.0
-"""distance by which angles may lie outside the joint's range: sensors are noisy at the stops. Up to 2 % of
-the range they are used with a warning"""
-
 
 def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
     """Return the signals that the settings ask for, time first; joint ranges [rad], shape (J, 2)."""
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
-    margin = np.deg2rad(MARGIN_DEG)
     for kind in get_args(Kind):
         for joint, (low, high) in enumerate(ranges.tolist(), 1):
             if columns := settings.columns(kind, joint):
-                unit = UNITS[columns.unit.lower()].factor
+                margin = angle_margin(low, high)
                 limits = {
-                    "command": (-100.0 if len(columns.column) == 1 else 0.0, 100.0, 0.0),
-                    "angle": (low - margin, high + margin, max(0.0, 0.02 * (high - low) - margin)),
-                    "pressure": (-5e5, 2e8, 0.0),  # sensors have an offset, hoses burst
+                    "command": (-100.0 if len(columns.column) == 1 else 0.0, 100.0),
+                    "angle": (low - margin, high + margin),
+                    "pressure": (-5e5, 2e8),  # sensors have an offset, hoses burst
                 }[kind]
+                unit = UNITS[columns.unit.lower()].factor
                 gain, offset = columns.scale * unit, columns.offset * unit
                 signals += [
                     Signal(name, kind, joint, part, gain, offset, *limits)
                     for part, name in enumerate(columns.column)
                 ]
     return signals
+
+
+def angle_margin(low: float, high: float) -> float:
+    """Return how far angles may lie outside a range [rad]: sensors are noisy at stops, and ranges rough."""
+    return max(float(np.deg2rad(1.0)), 0.02 * (high - low))
 
 
 def match_signals(
@@ -65,7 +66,6 @@ def match_signals(
         error(
             "missing column",
             missing[0].name,
-            part="header" if table.header else "file",
             missing=listed([f"{s.name!r} ({s}{guess.get(s.name, '')})" for s in missing], 2),
             columns=listed([name for name in table.names if name], 6),
             settings=", ".join(dict.fromkeys(f"log.{signal.kind}" for signal in missing)),

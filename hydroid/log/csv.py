@@ -11,67 +11,27 @@ line below the names is left out only if it holds no number: any other fault the
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.cells import clock, holds_number, number, seconds, split
-from hydroid.log.table import Recording, Signal, Table
+from hydroid.log.cells import holds_number, number, split
+from hydroid.log.table import Table
 from hydroid.units import bare, unit_of
 
-MAX_BYTES = 2**28
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "spaces"}
 IS_CSV = "a log is a CSV file with a header, one row a sample"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CsvTable(Table):
-    """All lines of a file; `below` are the indices of those that hold data."""
-
-    lines: Sequence[str]
-    separator: str
-    below: Sequence[int]
-
-    def text(self, row: int, column: str) -> str:
-        """Return the cell of a line [1-based] as it stands in the file."""
-        cells, at = split(self.lines[row - 1], self.separator), self.names.index(column)
-        return cells[at] if at < len(cells) else ""
-
-    def read(self, signals: Sequence[Signal]) -> Recording:
-        """Read columns, as `Table` says."""
-        names, width = [signal.name for signal in signals], len(self.names)
-        lines, remark = [self.lines[k] for k in self.below], f"read as {self.layout}"
-        if self.separator != "," and any("," in line for line in lines):
-            lines, remark = [line.replace(",", ".") for line in lines], f"{remark}, with decimal commas"
-        wanted = [self.names.index(name) for name in names]
-        rows, ragged = list[list[str]](), np.zeros(len(lines), bool)
-        for k, line in enumerate(lines):
-            cells = split(line, self.separator)
-            ragged[k] = len(cells) < width or any(cells[width:])
-            rows.append([""] * len(wanted) if ragged[k] else [cells[c] for c in wanted])
-        remarks, clocks = [remark] if remark != "read as CSV in UTF-8 separated by commas" else [], set[str]()
-        values = np.full((len(rows), len(names)), np.nan)
-        for column, name in enumerate(names):
-            texts = [row[column] for row in rows]
-            if clock(next(filter(None, texts), "")) is None:
-                values[:, column] = [number(text) for text in texts]
-            else:
-                values[:, column] = seconds(texts)
-                clocks.add(name)
-                remarks.append(f"{name} holds times of day, taken as seconds from the first")
-        at = np.array(self.below, np.int64) + 1
-        return Recording(self, tuple(signals), values, at, ragged, frozenset(clocks), tuple(remarks))
-
-
-def open_csv(path: Path) -> CsvTable:
-    """Read a file and find its table.
+def open_csv(path: Path, data: bytes) -> Table:
+    """Find the table in a file's bytes.
 
     Raises:
-        LogError: it cannot be read, is not text, or has no header.
+        LogError: it is not text, or has no header.
     """
-    text, encoding = _decode(path)
+    text, encoding = _decode(path, data)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if long := next((k for k, line in enumerate(lines, 1) if len(line) > 100_000), 0):  # csv has such a limit
         raise LogError("is longer than 100000 characters", where=f"{path}, line {long}", hint=IS_CSV)
@@ -83,58 +43,52 @@ def open_csv(path: Path) -> CsvTable:
     header, left_out = _header(rows)
     names = rows[header]
     if all(number(name.replace(",", ".")) is not None for name in names if name):
+        what, where = "has no header: this line holds numbers", f"{path}, line {header + 1}"
         hint = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError(
-            "has no header: this line holds numbers", where=f"{path}, line {header + 1}", hint=hint
-        )
-    of_units = [k for k in left_out if _are_units(rows[k])]
-    pairs = [pair for k in of_units for pair in zip(names, map(bare, rows[k]), strict=True)]
-    units = {name: unit for name, unit in pairs if name and unit}
-    remarks = (
-        [f"line {of_units[0] + 1} holds units ({', '.join(dict.fromkeys(units.values()))})"] if units else []
-    )
-    remarks += [f"line {k + 1} is text and left out" for k in left_out if k not in of_units]
+        raise LogError(what, where=where, hint=hint)
+    remarks, units = list[str](), dict[str, str]()
     if content[0] < header:
-        remarks.insert(0, f"the names are in line {header + 1}; what stands above is left out")
-    return CsvTable(
+        remarks.append(f"the names are in line {header + 1}; what stands above is left out")
+    for k in left_out:
+        said = "is text and left out"
+        if _are_units(rows[k]):
+            units |= {name: unit for name, unit in zip(names, map(bare, rows[k]), strict=True) if unit}
+            said = f"holds units ({', '.join(dict.fromkeys(units.values()))})"
+        remarks.append(f"line {k + 1} {said}")
+    layout = f"CSV in {encoding} separated by {SEPARATORS[separator]}"
+    below = [k for k in content if k > header and k not in left_out and _is_content(lines[k], separator)]
+    commas = separator != "," and any("," in lines[k] for k in below)
+    if commas or layout != "CSV in UTF-8 separated by commas":
+        remarks.append(f"read as {layout}{', with decimal commas' if commas else ''}")
+    width = len(names)
+    cells = [split(lines[k].replace(",", ".") if commas else lines[k], separator) for k in below]
+    torn = np.array([len(row) < width or any(row[width:]) for row in cells], bool)
+    cells = [[""] * width if bad else row for row, bad in zip(cells, torn, strict=True)]
+    columns: dict[str, Any] = {
+        name: np.array([row[c] for row in cells], dtype=object) for c, name in enumerate(names)
+    }
+    return Table(
         source=str(path),
-        layout=f"CSV in {encoding} separated by {SEPARATORS[separator]}",
+        layout=layout,
         names=tuple(names),
+        columns=columns,
         header=header + 1,
         units=units,
         remarks=tuple(remarks),
-        lines=lines,
-        separator=separator,
-        below=[k for k in content if k > header and k not in left_out and _is_content(lines[k], separator)],
+        lines=np.array(below, np.int64) + 1,
+        torn=torn,
     )
 
 
-def read_start(path: Path, size: int = MAX_BYTES + 1) -> bytes:
-    """Return the first bytes of a file.
-
-    Raises:
-        LogError: it cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            return file.read(size)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise LogError(f"cannot be read ({reason})", where=str(path)) from None
-
-
-def _decode(path: Path) -> tuple[str, str]:
+def _decode(path: Path, data: bytes) -> tuple[str, str]:
     """Return a file's text and encoding."""
-    data, hint = read_start(path), "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
-    if len(data) > MAX_BYTES:
-        what = f"is larger than {MAX_BYTES >> 20} MiB"
-        raise LogError(what, where=str(path), hint="cut it into several logs")
     wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
         with suppress(UnicodeDecodeError):
             text = data.decode(encoding)
             if "\0" not in text:
                 return text, encoding.upper().removesuffix("-SIG")
+    hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
     raise LogError("is not a text file", where=str(path), hint=hint)
 
 

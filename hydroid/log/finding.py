@@ -1,11 +1,11 @@
 """A finding of a log: what is wrong or worth knowing, and its place in the file."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hydroid.errors import LogError
-from hydroid.findings import Finding, Level
+from hydroid.findings import WORDS, Finding, Level
 
 
 @dataclass(frozen=True)
@@ -46,25 +46,18 @@ def log_finding(
     return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, line, column)
 
 
-def together(findings: Iterable[LogFinding]) -> list[LogFinding]:
-    """Make one finding, the first with the subjects of all, of those of a kind that have the same hint."""
-    first = dict[tuple[str, str], LogFinding]()
-    for finding in findings:
-        known = first.setdefault((finding.kind, finding.hint), finding)
-        subjects = tuple(dict.fromkeys(known.subjects + finding.subjects))
-        first[finding.kind, finding.hint] = replace(known, subjects=subjects)
-    return [*first.values()]
-
-
 def grouped(findings: Sequence[LogFinding]) -> list[tuple[Level, str]]:
-    """Return findings as lines with their levels, one that several logs share once."""
+    """Return findings as lines with their levels: what several joints or logs share stands once."""
     groups: dict[tuple[str, ...], list[LogFinding]] = {}
     for finding in findings:
-        key = (finding.level, finding.kind, finding.column, str(finding.numbers.get("what", "")))
-        groups.setdefault(key, []).append(finding)
+        listed = "{names}" in WORDS[finding.kind][0]  # its sentence has room for several subjects
+        about = finding.hint if listed else f"{finding.column} {finding.numbers.get('what', '')}"
+        groups.setdefault((finding.level, finding.kind, about), []).append(finding)
     lines = list[tuple[Level, str]]()
-    for first, *more in groups.values():
-        logs = [Path(log).name for log in dict.fromkeys(f.source for f in more) if log != first.source]
+    for group in groups.values():
+        subjects = tuple(dict.fromkeys(subject for finding in group for subject in finding.subjects))
+        first = replace(group[0], subjects=subjects)
+        logs = [Path(log).name for log in dict.fromkeys(f.source for f in group) if log != first.source]
         names = ", ".join(logs[:3]) + (", ..." if len(logs) > 3 else "")
         also = f" (and in {len(logs)} more log{'s' * (len(logs) > 1)}: {names})" if logs else ""
         lines.append((first.level, f"{first}{also}"))

@@ -1,10 +1,11 @@
 """A table of unknown columns -> a `log` section that maps them, with a reason for each guess.
 
-The unit of a column, or else the words of its name, tell what it is. The joint of a column is the one whose
-name or number its own name holds, or else the next in order.
+The unit of a column, or else the words of its name, tell what it is. Its joint is the one whose name or
+number its own name holds. Where no column of a kind has a joint they are given to the joints in order; beside
+columns that have one, a column without is left out and named.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from hydroid.log.clues import column_unit, direction, joint_of, kind_of, likely_
 from hydroid.log.log import Floats
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
+from hydroid.words import listed
 
 
 class ColumnGuess(NamedTuple):
@@ -42,8 +44,14 @@ class _Column(NamedTuple):
     def why(self) -> str:
         return "by its unit" if self.unit else "by its name"
 
+    @property
+    def slides(self) -> bool:
+        return bool(self.unit) and UNITS[self.unit].quantity == "length"
 
-def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
+
+def guess_columns(
+    table: Table, joints: Sequence[str], *, links: Sequence[str] = (), slides: Sequence[int] = ()
+) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
         guess = guess_columns(open_table(Path("log.csv")), ["swing", "boom", "stick", "bucket"])
@@ -51,6 +59,8 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
     Args:
         table: an opened log.
         joints: names of the arm's joints, in order.
+        links: names of the links that they move, in order, which columns may have instead.
+        slides: joints (numbers, from 1) that slide: their positions are in m.
 
     Raises:
         LogError: no column looks like a time.
@@ -66,23 +76,30 @@ def guess_columns(table: Table, joints: Sequence[str]) -> ColumnGuess:
     step *= UNITS[unit].factor
     said = "dates or times of day" if time.clock else unit
     reasons = [f"{time.name}: time in {said}, {time.why}, every {step:.3g} s"]
-    angles, commands = (
-        _by_joint([c for c in columns if c.kind == kind], joints, reasons) for kind in ("angle", "command")
-    )
-    unitless = [np.nanmax(np.abs(column.values)) for column, *_ in angles.values() if column.unit == ""]
-    default = "rad" if unitless and max(unitless) <= 6.3 else "deg"
+    names = [f"joint {k}" if name == f"joint{k}" else name for k, name in enumerate(joints, 1)]
+    known = (joints, links)
     entries, used = dict[int, dict[str, Any]](), {time.name}
-    for joint in sorted({*angles, *commands}):
-        entry = entries[joint] = {"command": None, "angle": None}
-        name = f"joint {joint}" if joints[joint - 1] == f"joint{joint}" else joints[joint - 1]
-        if pair := commands.get(joint):
+    by_kind = {
+        kind: _by_joint([c for c in columns if c.kind == kind], known, slides, names, reasons)
+        for kind in ("command", "angle")
+    }
+    angles = [pair[0] for joint, pair in by_kind["angle"].items() if joint not in slides]
+    unitless = [float(np.nanmax(np.abs(column.values))) for column in angles if not column.unit]
+    default = "rad" if unitless and max(unitless) <= 6.3 else "deg"
+    for joint in sorted({*by_kind["angle"], *by_kind["command"]}):
+        entry: dict[str, Any] = {"command": None, "angle": None}
+        entries[joint], name = entry, names[joint - 1]
+        if pair := by_kind["command"].get(joint):
             entry["command"], said = _command(pair)
             reasons.append(f"{said} of {name}, {pair[0].why}")
-        for column in angles.get(joint, []):
-            angle_unit = column.unit or default
-            entry["angle"] = {"column": column.name, "unit": angle_unit}
-            reasons.append(f"{column.name}: angle in {angle_unit} of {name}, {column.why}")
-        used |= {column.name for column in (*commands.get(joint, ()), *angles.get(joint, ()))}
+        for column in by_kind["angle"].get(joint, []):
+            slide = joint in slides
+            given = column.unit or (_length_unit(column.values) if slide else default)
+            entry["angle"] = {"column": column.name, "unit": given}
+            reasons.append(
+                f"{column.name}: {'position' if slide else 'angle'} in {given} of {name}, {column.why}"
+            )
+        used |= {column.name for pairs in by_kind.values() for column in pairs.get(joint, ())}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
     periods = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
     log |= {"period_s": min(periods, key=lambda period: abs(np.log(period / step))), "joints": entries}
@@ -96,16 +113,16 @@ def _columns(table: Table) -> list[_Column]:
     """
     given = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
     kinds = {name: kind for name, unit in given.items() if (kind := kind_of(name, unit)) != "other"}
-    units = {name: unit.name if unit else "" for name, unit in given.items()}
 
-    def read(names: Sequence[str]) -> list[_Column]:
+    def read(names: Sequence[str]) -> Iterator[_Column]:
         recording = table.read([Signal(n, "command" if kinds[n] == "command" else "angle") for n in names])
-        read = zip(names, recording.values.T, strict=True)
-        return [_Column(n, kinds[n], units[n], values, n in recording.clocks) for n, values in read]
+        for name, values in zip(names, recording.values.T, strict=True):
+            unit = given[name]
+            yield _Column(name, kinds[name], unit.name if unit else "", values, name in recording.clocks)
 
     columns = list[_Column]()
     try:
-        columns = read([*kinds]) if kinds else []
+        columns = [*read([*kinds])] if kinds else []
     except LogError:  # text, or different lengths or clocks
         for name in kinds:
             with suppress(LogError):
@@ -122,27 +139,54 @@ def _rises(values: Floats) -> bool:
 
 
 def _by_joint(
-    columns: Sequence[_Column], joints: Sequence[str], reasons: list[str]
+    columns: Sequence[_Column],
+    known: tuple[Sequence[str], Sequence[str]],
+    slides: Sequence[int],
+    names: Sequence[str],
+    reasons: list[str],
 ) -> dict[int, list[_Column]]:
-    """Give each column a joint: one column, or two for the directions; tell what is uncertain."""
-    groups, named = dict[Any, list[_Column]](), dict[int, list[_Column]]()
+    """Give each joint its column, or two for the directions; say what is uncertain or left out."""
+    groups, given = dict[Any, list[_Column]](), dict[int, list[_Column]]()
     for column in columns:
         sign, others = direction(column.name)
         groups.setdefault(others if sign and column.kind == "command" else column.name, []).append(column)
-    groups = {key: sorted(pair, key=lambda c: -direction(c.name)[0])[:2] for key, pair in groups.items()}
+    pairs = [sorted(pair, key=lambda c: -direction(c.name)[0])[:2] for pair in groups.values()]
     from_zero = any(number_in(column.name) == 0 for column in columns)
-    for pair in groups.values():
+    left, kind = list[list[_Column]](), columns[0].kind if columns else ""
+
+    def fits(joint: int, column: _Column) -> bool:
+        """Return whether a position's unit is one of the joint, and the joint has no column yet."""
+        measures = column.kind == "command" or not column.unit or column.slides == (joint in slides)
+        return measures and 0 < joint <= len(names) and joint not in given
+
+    for pair in pairs:
         number = number_in(pair[0].name)
-        joint = joint_of(pair[0].name, joints) or (None if number is None else number + from_zero)
-        if joint and joint <= len(joints):
-            named.setdefault(joint, pair)
-    if named and from_zero:
+        joint = next(filter(None, (joint_of(pair[0].name, of) for of in known)), None)
+        joint = joint or (None if number is None else number + from_zero)
+        if joint and fits(joint, pair[0]):
+            given[joint] = pair
+        else:
+            left.append(pair)
+    if given and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
-    if columns and not named:  # a column without a joint, beside others with one, is something else
-        names = ", ".join(column.name for column in columns)
-        reasons.append(f"the joints of {names} are given by their order: check them")
-        named = dict(enumerate([*groups.values()][: len(joints)], 1))
-    return named
+    if left and not given:
+        for pair in left:
+            if joint := next((k for k in range(1, len(names) + 1) if fits(k, pair[0])), 0):
+                given[joint] = pair
+        said = listed([f"{pair[0].name} of {names[joint - 1]}" for joint, pair in given.items()], 12)
+        reasons.append(f"{kind}s by their order: check them: {said}")
+        left = [pair for pair in left if pair not in given.values()]
+    without = [name for k, name in enumerate(names, 1) if k not in given]
+    if left:
+        spare = listed([column.name for pair in left for column in pair], 12)
+        whose = f"whose {kind} is it: {' or '.join(without)}?" if without else "every joint has one already"
+        reasons.append(f"left out, though like a joint's {kind}: {spare}; {whose}")
+    return given
+
+
+def _length_unit(values: Floats) -> str:
+    """Return the unit of a slide's position: no telescope is 50 m long."""
+    return "mm" if np.nanmax(np.abs(values)) > 50 else "m"
 
 
 def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:

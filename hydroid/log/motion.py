@@ -1,24 +1,12 @@
-"""How a joint moves in a log: how far and fast, which way, how long after its command, and above which one.
-
-The lag: for each one the joint's velocity is regressed on the command at that lag, the angle and a constant,
-q̇(t) ≈ k u(t − lag) + s q(t) + c. The angle stands for springs and gravity's gradient, which turn a slow
-velocity ahead of its command. All are smoothed by one Gaussian, which shifts nothing. Samples at which a
-joint stands at the end of its travel, pushed further, do not count. The lag of the smallest residual is
-certain if it lies inside the range of lags and is clearly better than any lag of the opposite sign and than
-the lags of a plain actuator: valve, oil and inertia alone delay the motion by a few hundredths of a second.
-"""
+"""How a joint moves in a log: how far and fast, which way, how long after its command, above which one."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.log.log import Floats, Log
 
-LAGS = (-0.5, 1.5)  # lags that clocks and transport delays may have [s]
-PLAIN = 0.1  # longest lag that needs no transport delay [s]
-ACAUSAL = -0.02  # lags below this are more than noise [s]
 QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
 LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
@@ -71,33 +59,22 @@ class JointMotion:
 
     @cached_property
     def likely_lag(self) -> float:
-        """At which its speed correlates best with its command [s], at least 0.
-
-        Unlike `lag` this answers always, also in a log of one movement: good enough for a first guess.
-        """
-        command, speed = self._logged, self._quick[2]
-        lags = range(min(round(0.8 / self.log.period), len(speed) // 2))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            pairs = ((command[: len(command) - late], speed[late:]) for late in lags)
-            correlation = np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
-        return int(np.argmax(correlation)) * self.log.period
+        """At which its speed correlates best with its command [s], at least 0."""
+        lags, correlation = self._correlation
+        return float(lags[np.where(lags >= 0, correlation, -1).argmax()])
 
     @cached_property
-    def lag(self) -> float | None:
-        """Of the motion behind its command [s]; None where the log does not tell."""
-        lags, residual, sign = self._regressed
-        best = int(residual.argmin())
-        # motion ahead of its command takes stronger evidence
-        allowed = 0.5 if lags[best] > ACAUSAL else 0.25
-        plain = np.abs(lags - PLAIN / 2) < (PLAIN + self.log.period) / 2
-        rivals = residual[(sign != sign[best]) | (plain & ~plain[best])]
-        clear = residual[best] <= allowed and residual[best] < 0.5 * rivals.min(initial=np.inf)
-        return float(lags[best]) if clear and 0 < best < len(lags) - 1 else None
+    def ahead(self) -> float:
+        """How long it moves before its command [s], as no machine does; 0 where the log does not tell.
 
-    @property
-    def shifted(self) -> bool:
-        """Whether its lag is none that an actuator has by itself."""
-        return self.lag is not None and not ACAUSAL <= self.lag <= PLAIN + self.log.period / 2
+        The speed must follow the later command clearly, and any command before it clearly less.
+        """
+        lags, correlation = self._correlation
+        left, best = 1 - correlation**2, int(correlation.argmax())
+        clear = (
+            self.log.duration > 5 and correlation[best] > 0.8 and left[best] < 0.75 * left[lags >= 0].min()
+        )
+        return -float(lags[best]) if clear and best and lags[best] < -0.02 else 0.0
 
     @cached_property
     def dead_band(self) -> float:
@@ -118,10 +95,13 @@ class JointMotion:
         By a command that is larger than most of those that move it: a joint also stands while its command is
         in the dead band.
         """
-        command, speed = np.abs(self._quick[0]), np.abs(self._quick[2])
-        moving = speed > 0.1 * speed.max()
-        enough = np.median(command[moving]) if moving.any() else np.inf
-        return float((self._at_stop & (command > 0.99 * enough)).sum() * self.log.period)
+        command, angle, speed = self._quick
+        zone, push = 0.02 * np.ptp(angle), command * np.sign(command @ speed)
+        ends = ((angle > angle.max() - zone) & (push > 0)) | ((angle < angle.min() + zone) & (push < 0))
+        moving = np.abs(speed) > 0.1 * np.abs(speed).max()
+        enough = np.median(np.abs(command[moving])) if moving.any() else np.inf
+        standing = ends & (np.abs(speed) < 0.03 * np.abs(speed).max()) & (np.abs(command) > 0.99 * enough)
+        return float(standing.sum() * self.log.period)
 
     @property
     def _logged(self) -> Floats:
@@ -150,41 +130,16 @@ class JointMotion:
         return command, angle, speed
 
     @cached_property
-    def _at_stop(self) -> NDArray[np.bool_]:
-        """Where it stands at an end of its travel while it is pushed further, shape (T,)."""
-        command, angle, speed = self._quick
-        zone = 0.02 * np.ptp(angle)
-        push = command * np.sign(command @ speed)
-        ends = ((angle > angle.max() - zone) & (push > 0)) | ((angle < angle.min() + zone) & (push < 0))
-        standing = ends & (np.abs(speed) < 0.03 * np.abs(speed).max())
-        stopped = np.zeros_like(standing)
-        margin = round(2 * QUICK / self.log.period)
-        for begin, end in np.flatnonzero(np.diff(standing, prepend=False, append=False)).reshape(-1, 2):
-            if (end - begin) * self.log.period >= 0.2:
-                stopped[max(begin - margin, 0) : end + margin] = True
-        return stopped
-
-    @cached_property
-    def _regressed(self) -> tuple[Floats, Floats, Floats]:
-        """Lags [s], the share of the speed's variance that each leaves, and the sign of the command's effect.
-
-        A log that is too short, or in which nothing changes, leaves all of it.
-        """
-        first, last = (round(lag / self.log.period) for lag in LAGS)
-        lags: Floats = np.arange(first, last + 1, dtype=np.float64) * self.log.period
-        (command, angle, speed), used = self._quick, slice(last, len(self._logged) + first)
-        counts = (~self._at_stop[used]).astype(float)
-        if counts.sum() < last or not np.ptp(self._logged) * np.ptp(self.log.angle[:, self.joint - 1]) > 0:
-            return lags, np.ones(len(lags)), np.zeros(len(lags))
-        basis = np.linalg.qr(counts[:, None] * np.stack([np.ones(len(counts)), angle[used]], axis=1))[0]
-        wanted = counts * speed[used]
-        wanted = wanted - basis @ (basis.T @ wanted)
-        power = np.correlate(command**2, counts, "valid")
-        own = power - sum(np.correlate(command, column, "valid") ** 2 for column in basis.T)
-        product, total = np.correlate(command, wanted, "valid"), wanted @ wanted
-        enough = (own > 1e-9 * power) & (total > 0)
-        explained: Floats = np.divide(product**2, own * total, out=np.zeros_like(product), where=enough)
-        return lags, (1 - explained)[::-1], np.sign(product)[::-1]
+    def _correlation(self) -> tuple[Floats, Floats]:
+        """Lags from -0.5 to 0.8 s, and the correlation of the speed with the command at each, as a size."""
+        command, speed = self._logged, self._quick[2]
+        most = len(speed) // 2
+        lags = np.arange(max(round(-0.5 / self.log.period), -most), min(round(0.8 / self.log.period), most))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            there = ((k, slice(max(k, 0), len(speed) + min(k, 0))) for k in lags.tolist())
+            pairs = ((np.roll(command, k)[part], speed[part]) for k, part in there)
+            correlation = np.nan_to_num(np.abs([np.corrcoef(*pair)[0, 1] for pair in pairs]))
+        return (lags * self.log.period).astype(np.float64), correlation
 
 
 @lru_cache(maxsize=64)

@@ -12,7 +12,7 @@ from hydroid.log.arrays import open_mat, open_parquet
 from hydroid.log.bag import open_bag
 from hydroid.log.checks import check_recording
 from hydroid.log.columns import map_signals, match_signals
-from hydroid.log.csv import open_csv, read_start
+from hydroid.log.csv import open_csv
 from hydroid.log.finding import LogFinding, log_finding
 from hydroid.log.log import Floats, Log
 from hydroid.log.repair import fill, resample, sample_period, unwrap
@@ -33,16 +33,20 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     Raises:
         LogError: it cannot be read, or needs a package that is not installed.
     """
-    folder = "\0" not in str(path) and (path / "metadata.yaml").exists()
-    start = b"" if folder else read_start(path, 600)
-    if folder or start.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
+    try:
+        folder = (path / "metadata.yaml").is_file()
+        data = b"#ROSBAG V" if folder else path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise LogError(f"cannot be read ({reason})", where=str(path)) from None
+    if data.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
         return open_bag(path, settings.time.column, settings.period_s)
-    if start.startswith(b"PAR1"):
+    if data.startswith(b"PAR1"):
         return open_parquet(path)
-    hdf5 = b"\x89HDF\r\n\x1a\n" in (start[:8], start[512:520])
-    if hdf5 or start.startswith(b"MATLAB 5.0 MAT-file") or path.suffix.lower() == ".mat":
+    hdf5 = b"\x89HDF\r\n\x1a\n" in (data[:8], data[512:520])
+    if hdf5 or data.startswith(b"MATLAB 5.0 MAT-file") or path.suffix.lower() == ".mat":
         return open_mat(path, hdf5=hdf5)
-    return open_csv(path)
+    return open_csv(path, data)
 
 
 def read_log(path: Path, settings: LogSettings, ranges: Floats, **how: Any) -> tuple[Log, list[LogFinding]]:
@@ -87,19 +91,19 @@ def check_log(
     try:
         signals = map_signals(settings, ranges)
         table = open_table(path, settings)
+        measured = {signal.joint for signal in signals if signal.kind == "angle"}
         for joint in sorted({*compared, *settings.joints}):
             if joint > len(ranges):
                 joints = str(len(ranges))
                 findings.append(log_finding("error", "no such joint", source, [joint], joints=joints))
-            elif joint in compared and ("angle", joint) not in {(s.kind, s.joint) for s in signals}:
+            elif joint in compared and joint not in measured:
                 findings.append(log_finding("error", "no output angle", source, [joint]))
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
         signals = match_signals(table, signals, {*compared, *settings.joints}, findings)
         if signals and signals[0].kind == "time":
             recording = unwrap(_in_si(table.read(signals)), findings)
-            remarks = (*table.remarks, *recording.remarks)
-            findings += [log_finding("note", "layout", source, what=remark) for remark in remarks]
+            findings += [log_finding("note", "layout", source, what=remark) for remark in recording.remarks]
             if repair:
                 recording = fill(recording, settings.repair_s, findings)
             findings += check_recording(recording, settings, repaired=repair)

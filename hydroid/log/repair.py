@@ -47,18 +47,17 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     recording = recording.take(np.flatnonzero(timed))
     time, period, values = recording.time, sample_period(recording.time), recording.values.copy()
     reach = longest * (1 + 1e-9) + period
-    for column, signal in enumerate(recording.signals[1:], 1):
-        whole = ~np.isnan(values[:, column])
-        there, holes = np.flatnonzero(whole), np.flatnonzero(~whole)
+    for signal, column in zip(recording.signals[1:], values.T[1:], strict=True):
+        there, holes = np.flatnonzero(~np.isnan(column)), np.flatnonzero(np.isnan(column))
         after = np.searchsorted(there, holes)
         inside = (after > 0) & (after < len(there))
         holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
         near = time[after] - time[before] <= reach
         holes, before = holes[near], before[near]
         if signal.kind == "command":
-            values[holes, column] = values[before, column]
+            column[holes] = column[before]
         elif len(holes):
-            values[holes, column] = np.interp(time[holes], time[there], values[there, column])
+            column[holes] = np.interp(time[holes], time[there], column[there])
     filled = np.isnan(recording.values) & ~np.isnan(values)
     steps = np.diff(time, append=time[-1:])
     short = (steps > GAP * period) & (steps <= reach)

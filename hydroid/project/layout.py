@@ -9,7 +9,7 @@ import numpy as np
 
 from hydroid.errors import LogError, SettingsError
 from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
-from hydroid.log.columns import MARGIN_DEG
+from hydroid.log.columns import angle_margin
 from hydroid.settings.arm import Arm
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
@@ -112,7 +112,8 @@ def turned(command: dict[str, Any]) -> dict[str, Any]:
 def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
     angle, own = np.degrees(log.angle[:, joint - 1]), arm.joints[joint - 1]
     low, high, limits = float(angle.min()), float(angle.max()), own.range
-    if own.continuous or (low >= limits[0] - MARGIN_DEG and high <= limits[1] + MARGIN_DEG):
+    margin = np.degrees(angle_margin(*np.radians(limits)))
+    if own.continuous or (low >= limits[0] - margin and high <= limits[1] + margin):
         return []
     return [
         f"{arm.joint_names[joint - 1]}: the angles in the log run from {low:.1f} to {high:.1f} deg, but the "

@@ -78,12 +78,9 @@ def boom(duties: list[float], *, stop: float = 60.0, seconds: float = 4.0) -> Ta
     return {"time_s": period * np.arange(len(command)), **still, "u2_pct": command, "q2_deg": moving}
 
 
-def shifted(by: int) -> list[Table]:
-    """The rig's log with its angles later by a number of samples."""
-    return of(
-        "q",
-        lambda q: np.r_[np.full(max(by, 0), q[0]), q, np.full(max(-by, 0), q[-1])][max(-by, 0) :][: len(q)],
-    )
+def shifted(by: int, table: Table) -> list[Table]:
+    """A log with its angles later by a number of samples."""
+    return of("q", lambda q: np.roll(np.pad(q, 100, "edge"), by)[100:-100], table)
 
 
 def without(*rows: int) -> list[Table]:
@@ -137,17 +134,9 @@ WRONG = (
         lambda: of("u2", np.negative),
     ),
     Wrong(
-        "one of three logs wired the other way",
-        "warning: joint 2 moves against its command in 1 of 3 logs",
-        lambda: [*of("u2", np.negative), rig(), rig("rig_shoulder_2")],
-    ),
-    Wrong(
-        "a command that is logged 0.3 s early",
-        "note: looks 0.33 s early against the angle; set log.delay_s: 0.33",
-        lambda: shifted(30),
-    ),
-    Wrong(
-        "clocks that differ by 0.2 s", "warning: before the command, as no machine does", lambda: shifted(-20)
+        "clocks that differ by 0.3 s",
+        "warning: before the command, as no machine does",
+        lambda: shifted(-35, boom([60, -60, 100, -100])),
     ),
     Wrong(
         "0.4 s without a sample",
@@ -191,16 +180,6 @@ WRONG = (
         lambda: [boom([60, -60, 100, -100], seconds=8)],
     ),
     Wrong(
-        "constant command levels with gaps",
-        "note: between 40 and 60, between 60 and 80",
-        lambda: [boom([40, 60, 80, -40, -60, -80])],
-    ),
-    Wrong(
-        "commands in one direction only",
-        "note: no command [%] of joint 2 above 50, below 0",
-        lambda: [boom([30, 40, 50])],
-    ),
-    Wrong(
         "no rest before the first command", "note: begins with a command", lambda: of("", lambda v: v[100:])
     ),
 )
@@ -228,12 +207,11 @@ def test_it_is_said_and_the_page_shows_it(wrong: Wrong, tmp_path: Path) -> None:
 
 def findings(folder: Path, *tables: dict) -> list[tuple[str, str]]:
     result = hydroid.check(save(Wrong("", "", lambda: [*tables]), folder), config=SETTINGS).result
-    every = [f for log in result.logs for f in log.findings] + result.findings
-    return [(finding.level, finding.kind) for finding in every]
+    return [(finding.level, finding.kind) for log in result for finding in log.findings]
 
 
-def test_a_good_log_has_no_finding_but_its_gaps(tmp_path: Path) -> None:
-    assert findings(tmp_path, rig(rows=7500)) == [("note", "open valve curve")]
+def test_a_good_log_has_no_finding(tmp_path: Path) -> None:
+    assert findings(tmp_path, rig(rows=7500)) == []
 
 
 @pytest.mark.parametrize("duties", [[60, -60, 100, -100], [100, 100, -80, -80], [90], [-90, -90]])
@@ -246,7 +224,7 @@ def test_a_stop_is_neither_a_delay_nor_another_sign(duties: list[float], stop: f
 
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (path,) = save(Wrong("", "", lambda: [boom([50])]), tmp_path)
-    (log,) = hydroid.check([path], config=SETTINGS).result.logs
+    (log,) = hydroid.check([path], config=SETTINGS).result
     angle = log.log.angle[:, 1]
     assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
 

@@ -26,7 +26,7 @@ START = {
 SETTINGS = {
     "parameters": {name: p | {"each": [1, 2, 3, 4, 5, 6]} for name, p in START.items()},
     "outputs": [1, 2, 3, 4, 5, 6],
-    "objective": {"norm": 2, "segments": {"equal": 1}},
+    "objective": {"norm": 2, "segments": 1},
     "search.algorithm": "multistart",
     "search.multistart": {"starts": 1, "horizons": [5.0, 20.0], "iterations": 30, "gain_tolerance": 1e-3},
     "refinement": {"iterations": 40, "gain_tolerance": 1e-4},

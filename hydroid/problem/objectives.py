@@ -9,7 +9,7 @@ has no unit and means the same for short and long segments. A sum without 1/N wo
 factor N^(-1/p) per segment.
 
 A segment is a pair of sample indices [first, end). Segments cover the record without overlap, and none is
-empty. Cuts at turning points divide it into single strokes of the joint.
+empty.
 """
 
 import numpy as np
@@ -17,13 +17,9 @@ from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array
-from hydroid.settings.problem import ObjectiveSettings, SegmentSettings
+from hydroid.settings.problem import ObjectiveSettings
 
 Int = NDArray[np.int64]
-
-SWING = 0.05
-"""smallest prominence of a turning point, as a part of the output's range"""
-_WHERE = "objective.segments"
 
 
 def norm(error: Array, p: float | str) -> Array:
@@ -84,79 +80,17 @@ def segment_objectives(error: Array, measured: Array, bounds: Int, settings: Obj
     return objectives
 
 
-def segment_bounds(measured: Array, period: float, settings: SegmentSettings) -> Int:
-    """Cut a record of measured angles, shape (T,), at a sample period [s] into segments.
+def segment_bounds(samples: int, segments: int) -> Int:
+    """Cut a record of so many samples into segments of equal length.
 
     Returns:
         [first, end) of each segment in samples, shape (S, 2): increasing, gapless, from 0 to T.
 
     Raises:
-        SettingsError: more segments than the record has samples or turning points, or a cut outside it.
+        SettingsError: more segments than samples.
     """
-    samples = len(measured)
-    if settings.equal is not None:
-        cuts = np.arange(1, settings.equal) * samples // settings.equal
-    elif settings.turning_points is not None:
-        cuts = _turning_cuts(measured, settings.turning_points)
-    else:
-        cuts = np.rint(np.minimum(np.array(settings.times) / period, samples))
-    edges = np.concatenate(([0], cuts, [samples]))
-    if (np.diff(edges) < 1).any():
-        raise SettingsError(
-            f"{len(edges) - 1} segments do not fit into {samples} samples ({samples * period:g} s)",
-            where=_WHERE,
-            hint="each segment needs a sample of its own, and each cut lies inside the record",
-        )
-    return np.stack((edges[:-1], edges[1:]), axis=1).astype(np.int64)
-
-
-def _turning_cuts(measured: Array, segments: int) -> Int:
-    """Samples of the `segments` - 1 most prominent turning points, in order of time."""
-    least = SWING * float(np.ptp(measured))
-    extremes = _extremes(measured, least)
-    count = len(extremes) - 2
-    if count < segments - 1:
-        raise SettingsError(
-            f"{segments} segments need {segments - 1} turning points, the measured output has {count} "
-            f"whose swing exceeds {SWING:g} of its range",
-            where=f"{_WHERE}.turning_points",
-            hint=f"at most {count + 1} segments",
-        )
-    while (surplus := len(extremes) - 2 - (segments - 1)) > 0:
-        smallest = int(np.argmin(np.abs(np.diff(measured[extremes]))))
-        extremes = np.delete(extremes, _swing(extremes, smallest)[-surplus:])
-    # within a quarter, the plateaus around a peak and its trough do not overlap: they differ by `least`
-    return np.array([_middle(measured, k, least / 4) for k in extremes[1:-1]], dtype=np.int64)
-
-
-def _extremes(y: Array, least: float) -> Int:
-    """Samples of alternating peaks and troughs, ends included, each `least` away from its neighbours.
-
-    The smallest swing is removed until all are large enough. Noise, quantisation and plateaus make small
-    swings only, so no filter is needed, and none shifts a peak.
-    """
-    direction = np.sign(np.diff(y))
-    moving = np.flatnonzero(direction)
-    at = moving[1:][direction[moving[1:]] != direction[moving[:-1]]]
-    at = np.concatenate(([0], at, [len(y) - 1]))
-    while len(at) > 2:
-        swings = np.abs(np.diff(y[at]))
-        k = int(np.argmin(swings))
-        if swings[k] >= least:
-            break
-        at = np.delete(at, _swing(at, k))
-    return at
-
-
-def _swing(at: Int, k: int) -> list[int]:
-    """What is removed with swing k: its peak and trough, or only an end of the record."""
-    if k == 0:
-        return [0]
-    return [k + 1] if k == len(at) - 2 else [k, k + 1]
-
-
-def _middle(y: Array, k: int, tolerance: float) -> int:
-    """Middle of the stretch around sample k that stays within `tolerance` of it: of a plateau, its centre."""
-    outside = np.flatnonzero(np.abs(y - y[k]) > tolerance)
-    after = int(np.searchsorted(outside, k))
-    return int(outside[after - 1] + outside[after]) // 2
+    if segments > samples:
+        what = f"{segments} segments do not fit into {samples} samples"
+        raise SettingsError(what, where="objective.segments", hint="each segment needs a sample of its own")
+    edges = np.arange(segments + 1, dtype=np.int64) * samples // segments
+    return np.stack((edges[:-1], edges[1:]), axis=1)

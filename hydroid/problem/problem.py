@@ -198,8 +198,8 @@ class Problem:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""
         if channel.quantity != "angle":
             return np.array([[channel.rows.start, channel.rows.stop]])
-        period, segments = self.logs[channel.log].period, self.settings.objective.segments
-        return segment_bounds(channel.measured, period, segments) + channel.rows.start
+        bounds = segment_bounds(len(channel.measured), self.settings.objective.segments)
+        return bounds + channel.rows.start
 
 
 def compared_pressures(log: Log, settings: FitSettings) -> list[int]:

@@ -22,15 +22,9 @@ _PLAIN = {
     "expected ',' or '}'": "a mapping {a: 1} is not closed with '}'",
 }
 """what the YAML reader stumbled over, by a part of its message"""
-_WORDS = {"": None, "~": None} | {
-    spelt: value
-    for word, value in {"null": None, "true": True, "false": False}.items()
-    for spelt in (word, word.title(), word.upper())
-}
+_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")  # longer ones are beyond any float
-_NUMBER = re.compile(
-    r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
-)
+_NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE)
 
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
@@ -110,8 +104,8 @@ def _scalar(node: yaml.ScalarNode, where: str) -> Any:
         raise SettingsError("a text contains characters that cannot be printed", where=where)
     if node.style is not None:  # quoted, or a block of text
         return text
-    if text in _WORDS:
-        return _WORDS[text]
+    if text.lower() in _WORDS:
+        return _WORDS[text.lower()]
     if _INTEGER.fullmatch(text):
         return int(text)
-    return float(re.sub(r"\.(?=[iInN])", "", text)) if _NUMBER.fullmatch(text) else text
+    return float(re.sub(r"\.(?=[in])", "", text.lower())) if _NUMBER.fullmatch(text) else text

@@ -45,6 +45,4 @@ class DesignSettings(Settings):
             raise ValueError("dwell_s must be [shortest, longest], not longer than duration_s")
         if self.rest_s + self.dwell_s[0] > self.duration_s:
             raise ValueError("rest_s leaves no time for a command within duration_s")
-        if self.joints is not None and len(set(self.joints)) < len(self.joints):
-            raise ValueError("joints: a joint is listed twice")
         return self

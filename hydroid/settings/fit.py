@@ -22,7 +22,7 @@ from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, make_parameter, nominal_value
-from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SegmentSettings
+from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
 from hydroid.settings.simulation import SimulationSettings
 
@@ -100,8 +100,6 @@ class FitSettings(Settings):
 
     @model_validator(mode="after")
     def _of_the_stage(self) -> "FitSettings":
-        if len(set(self.outputs)) < len(self.outputs):
-            raise ValueError("outputs: a joint is listed twice")
         if self.joint_refinement and self.simulation.model == "ladder":
             raise ValueError("joint_refinement: refines one model; set simulation.model to it")
         for name, own in self.parameters.items():
@@ -184,5 +182,4 @@ class FitSettings(Settings):
 
     def in_one_segment(self) -> "FitSettings":
         """Return the settings with one segment per channel."""
-        objective = self.objective.model_copy(update={"segments": SegmentSettings(equal=1)})
-        return self.model_copy(update={"objective": objective})
+        return self.model_copy(update={"objective": self.objective.model_copy(update={"segments": 1})})

@@ -19,24 +19,12 @@ from hydroid.errors import SettingsError
 from hydroid.settings.document import Lines, read_document, read_yaml
 
 _PLAIN = {
-    "bool": "must be true or false",
     "dict": "must be a mapping of settings",
-    "finite_number": "must be a finite number",
-    "float": "must be a number",
-    "int": "must be a whole number",
     "list": "must be a list in brackets, [a, b]",
     "model": "must be a mapping of settings",
-    "string_type": "must be text",
     "tuple": "must be a list in brackets, [a, b]",
-    "literal_error": "must be {expected}",
-    "too_long": "must have at most {max_length} items",
-    "too_short": "must have at least {min_length} items",
-    "greater_than_equal": "must be at least {ge:g}",
-    "greater_than": "must be above {gt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "less_than": "must be below {lt:g}",
 }
-"""what a fault means, by the start of pydantic's name for it, with the limits in its context"""
+"""what a fault means in YAML, by the start of pydantic's name for it; its own words say the others"""
 
 
 class Settings(BaseModel):
@@ -170,9 +158,8 @@ def _explained(fault: Any, kind: type[Settings]) -> tuple[str, str]:
         near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
         choice = f"; did you mean {near[0]!r}?" if near else f"; allowed here: {', '.join(allowed)}"
         return key, f"unknown setting {_shown(key)}{choice if allowed else ''}"
-    words = next((words for start, words in _PLAIN.items() if fault["type"].startswith(start)), None)
-    message = str(fault["msg"]).removeprefix("Value error, ")
-    problem = words.format(**fault.get("ctx", {})) if words else message[:1].lower() + message[1:]
+    words = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must")
+    problem = _PLAIN.get(fault["type"].partition("_")[0], words[:1].lower() + words[1:])
     if isinstance(fault["input"], dict):  # a check of several settings names the one that is wrong
         name, colon, rest = problem.partition(": ")
         inner = name if colon and name.replace(".", "").isidentifier() else ""

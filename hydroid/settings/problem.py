@@ -124,12 +124,8 @@ class PriorSettings(Settings):
             raise ValueError(
                 "give either of: parameter, [parameters] or {parameter: factor}, or ratio: [a, b]"
             )
-        if isinstance(self.of, tuple) and len(set(self.of)) < len(self.of):
-            raise ValueError("of: a parameter is listed twice")
-        if not self.factors or not any(self.factors.values()):
+        if not any(self.factors.values()):
             raise ValueError("names no parameter")
-        if self.ratio is not None and self.ratio[0] == self.ratio[1]:
-            raise ValueError("ratio: needs two different parameters")
         return self
 
     @property
@@ -152,28 +148,6 @@ def _name_infinity(value: Any) -> Any:
 Order = Annotated[Literal[1, 2, "inf"], BeforeValidator(_name_infinity)]
 
 
-class SegmentSettings(Settings):
-    """How a log is cut into segments, one objective per segment: give exactly one of these."""
-
-    equal: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """number of segments of equal length"""
-    turning_points: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """number of segments, cut at the most prominent peaks and troughs of the measured output"""
-    times: tuple[Annotated[float, Field(gt=0)], ...] | None = None
-    """inner cuts, increasing, from the start of the log [s]"""
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> "SegmentSettings":
-        given = [name for name in ("equal", "turning_points", "times") if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"give exactly one of equal, turning_points, times, not {' and '.join(given) or 'none'}"
-            )
-        if self.times is not None and self.times != tuple(sorted({*self.times})):
-            raise ValueError("times must increase")
-        return self
-
-
 class ObjectiveSettings(Settings):
     """Norm of the output error, equations (18) and (19), and the segments of equation (21)."""
 
@@ -181,7 +155,8 @@ class ObjectiveSettings(Settings):
     """p of the norm: 1, 2 or inf (the article's choice, table 5)"""
     relative: bool = False
     """divide by the norm of the measured output of the same segment, equation (19)"""
-    segments: SegmentSettings = SegmentSettings(equal=8)
+    segments: Annotated[int, Field(ge=1, le=10_000)] = 8
+    """number of segments of equal length, one objective each"""
     weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
     pressure_weight: NotNegative = 0.0

@@ -36,7 +36,7 @@ class Fragile(Problem):
 
 def make(kind=Fragile, **changes) -> Problem:
     small = {f"search.{algorithm}": {"population": 10, "generations": 5} for algorithm in ("ga", "nsga2")}
-    small |= {"objective.segments": {"equal": 3}}
+    small |= {"objective.segments": 3}
     settings = load_settings("article-mech", small | changes)
     log = simulate_log(settings, step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0]), TRUTH, "truth")
     return kind(settings, [log])

@@ -27,7 +27,7 @@ def make(noise_deg: float = 0.0, **changes) -> Problem:
     rows |= {"D": {"quantity": "damping", "fixed": 100.0}}
     rows |= {"M3": {"quantity": "mass", "link": "link3", "bounds": [10.0, 40.0], "start": 22.0}}
     small = {"parameters": rows, "outputs": [2, 3], "joint_refinement": False}
-    small |= {"objective.segments": {"equal": 1}, "search.algorithm": "multistart"}
+    small |= {"objective.segments": 1, "search.algorithm": "multistart"}
     small |= {"search.multistart": {"starts": 1, "horizons": [1.0]}}
     settings = load_settings("fit-hyd", small | changes)
     return Problem(settings, [steps_of(settings, TRUTH, LEVELS, noise_deg)])

@@ -24,7 +24,7 @@ def make(factor: float = 10.0, noise_deg: float = 0.0, **changes) -> Problem:
         | ({"quantity": WHAT[name[0]], "joints": [int(name[1])]} if name != "M3" else {})
         for name, value in TRUTH.items()
     }
-    small = {"outputs": [2, 3], "objective.segments": {"equal": 1}, "search.algorithm": "multistart"}
+    small = {"outputs": [2, 3], "objective.segments": 1, "search.algorithm": "multistart"}
     small |= {"parameters": parameters, "search.multistart.starts": 2}
     settings = load_settings("fit-mech", small | changes)
     return Problem(settings, [steps_of(settings, TRUTH, LEVELS, noise_deg)])

@@ -225,7 +225,7 @@ def configs() -> tuple[bytes, ...]:
         },
         "log": {"joints": {4: {"command": {"scale": 0.5}}, 7: None}, "delay_s": 0.1},
         "priors": {"gain": {"of": {"K": 1}, "value": 0.4, "sd": 0.1}},
-        "objective": {"norm": 2, "weights": {2: 3.0}, "segments": {"times": [0.2, 0.5]}},
+        "objective": {"norm": 2, "weights": {2: 3.0}, "segments": 3},
         "search": {"algorithm": "ga", "seed": 7},
         "refinement": None,
     }

@@ -30,7 +30,7 @@ class Linear:
         self.unit = unit
         one = ParameterSettings(quantity="gain", bounds=(0.1, 1.0))
         self.settings = FitSettings(
-            parameters=dict.fromkeys(names, one), objective={"segments": {"equal": 1}} | objective
+            parameters=dict.fromkeys(names, one), objective={"segments": 1} | objective
         )
         statements = {k: PriorSettings(**v) for k, v in (known or {}).items()}
         self.priors = Priors(statements, self.parameters)

@@ -40,7 +40,7 @@ def make_problem(
 ) -> Problem:
     """A problem with everything a report looks at, and no model behind it."""
     problem = object.__new__(Problem)
-    how = {"segments": {"equal": segments}} | objective
+    how = {"segments": segments} | objective
     fixed = fixed or {}
     own = {
         name: ParameterSettings(

@@ -52,7 +52,7 @@ class Study:
     def __init__(self, folder: Path, **changes) -> None:
         sizes = {"ga": 10, "nsga2": 8}
         small = {f"search.{a}": {"population": n, "generations": 6} for a, n in sizes.items()}
-        self.settings = load_settings("article-mech", small | {"objective.segments": {"equal": 3}} | changes)
+        self.settings = load_settings("article-mech", small | {"objective.segments": 3} | changes)
         log = step_log(self.settings.arm.pose("study"), [60.0, -80.0, 30.0, 0.0, -40.0])
         self.log = simulate_log(self.settings, log, TRUTH, "truth")
         self.path = folder / "log.csv"

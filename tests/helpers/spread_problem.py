@@ -10,7 +10,7 @@ from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 
-PASSIVE = {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.segments": {"equal": 3}}
+PASSIVE = {"outputs": [2, 3], "simulation.other_joints": "passive", "objective.segments": 3}
 
 
 def arguments(config: str = "article-mech", **changes: Any) -> tuple[FitSettings, list[Log]]:

@@ -26,7 +26,7 @@ PRESSURE = {"log.pressure": {"column": ["pA{joint}", "pB{joint}"], "unit": "MPa"
 
 @pytest.fixture(scope="module")
 def hydraulic():
-    changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": {"equal": 3}}
+    changes = FIXED | PRESSURE | {"objective.pressure_weight": 0.1, "objective.segments": 3}
     settings = load_settings("article-hyd", changes)
     log = step_log(settings.arm.pose("rig"), [50.0, -60.0, 40.0])
     return settings, simulate_log(settings, log, HYDRAULIC, "truth")
@@ -77,7 +77,7 @@ def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
 
 
 def mechanical(**changes):
-    settings = load_settings("article-mech", {"objective.segments": {"equal": 2}} | changes)
+    settings = load_settings("article-mech", {"objective.segments": 2} | changes)
     log = step_log(settings.arm.pose("study"), [60.0, -80.0, 30.0])
     return settings, log, TRUTH
 

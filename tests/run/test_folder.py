@@ -27,7 +27,7 @@ SMALL = {
     "search.ga.population": 6,
     "search.ga.generations": 3,
     "refinement": None,
-    "objective.segments": {"equal": 2},
+    "objective.segments": 2,
 }
 
 

@@ -55,8 +55,8 @@ def test_bounds_follow_from_the_prior():
     ("entry", "words"),
     [
         ({"within": 2, "sd": 1.0}, "not both"),
-        ({"within": 1.0}, "must be above 1"),
-        ({"sd": 0.0}, "must be above 0"),
+        ({"within": 1.0}, "must be greater than 1"),
+        ({"sd": 0.0}, "must be greater than 0"),
         ({"nominal": 3.0}, "needs bounds"),
         ({"bounds": [10, 20], "nominal": 30}, "nominal 30 lies outside the bounds"),
         ({"bounds": [10, 20], "start": 30}, "start 30 lies outside the bounds"),

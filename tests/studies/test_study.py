@@ -90,7 +90,7 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
     ("change", "message"),
     [
         ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml, line \d+: .*objective.nrm.*'norm'"),
-        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be at least 4"),
+        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be greater than or equal to 4"),
         ({"axes": {"objective.norm": []}}, r"axes give 0 cells"),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
         ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),

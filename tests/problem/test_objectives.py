@@ -1,6 +1,5 @@
 """Norms, segments and objectives by their laws."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -28,7 +28,6 @@ class Bench:
         settings: of the fit.
         joint: its number, from 1.
         angle: at which it is tested [rad].
-        travel: smallest and largest angle of interest [rad].
         period: between samples [s].
         scenario: the joint alone.
     """
@@ -36,7 +35,6 @@ class Bench:
     settings: FitSettings
     joint: int
     angle: float
-    travel: tuple[float, float]
     period: float
     scenario: Scenario
 
@@ -48,15 +46,14 @@ class Bench:
             float(np.sign(actuator.moment_arm(self.angle))) if isinstance(actuator, LinearActuator) else 1.0
         )
 
-    def weigh(self, candidates: Candidates, angles: Array) -> tuple[Array, Array]:
-        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at angles, shape (n, A) each."""
-        torque, inertia = np.empty((2, len(candidates), len(angles)))
+    def weigh(self, candidates: Candidates) -> tuple[Array, Array]:
+        """Return gravity's torque [N·m] and the joint's inertia [kg·m²] at its angle, shape (n,) each."""
+        torque, inertia = np.empty((2, len(candidates)))
         arm, values = SteppedArm(self.scenario.arm.model), self.scenario.values(candidates)
         with quiet_mujoco():
-            for row, column in np.ndindex(torque.shape):
-                arm.start(values, row, angles[[column]])
-                torque[row, column] = arm.data.qfrc_bias[0]
-                inertia[row, column] = arm.data.M[0]
+            for row in range(len(candidates)):
+                arm.start(values, row, np.array([self.angle]))
+                torque[row], inertia[row] = arm.data.qfrc_bias[0], arm.data.M[0]
         return torque, inertia
 
     def drive(self, candidates: Candidates, command: float, start: float, samples: int) -> Array:
@@ -145,10 +142,9 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm, pose, period = settings.arm, logs[0].start, logs[0].period
     angles = np.concatenate([log.angle[:, joint - 1] for log in logs])
     middle = float(np.radians(round(np.degrees((angles.min() + angles.max()) / 2))))
-    half = max(float(np.ptp(angles)) / 2, float(np.radians(5.0)))  # its logs may hardly move it
     rest = Log(
         "a test movement", np.array([0.0, period]), np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
     )
     alone = settings.simulation.model_copy(update={"other_joints": "locked"})
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
-    return Bench(settings, joint, middle, (middle - half, middle + half), period, scenario)
+    return Bench(settings, joint, middle, period, scenario)

@@ -10,7 +10,7 @@ from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.speeds import speed_tests
-from hydroid.posterior.statics import Column, Measured, gain_model, gravity, oil
+from hydroid.posterior.statics import Column, gain_model, gravity, oil
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates
@@ -50,40 +50,41 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     positive = np.array([column.positive for column in columns])
     known = uncertainty.posterior.propagate(values, positive, concerned)
     ends = [(finite(low), finite(high)) for low, high in known.interval]
-    points: dict[str, list[int]] = {}
+    parts: dict[str, list[int]] = {}
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-        points.setdefault(columns[i].name, []).append(i)
-    for part, own in points.items():
-        own = sorted(own, key=lambda i: columns[i].at)
-        first, name, value = columns[own[0]], f"joint{joint}_{part}", known.value[own].tolist()
+        parts.setdefault(columns[i].name, []).append(i)
+    for part, own in parts.items():
         if known.given[own].all():
             continue
+        commands, first, name = [columns[i].command for i in own], columns[own[0]], f"joint{joint}_{part}"
         what: dict[str, Any] = {"label": first.label, "joint": joint, "unit": first.unit}
-        if first.along:
-            what |= {"along": first.along, "at": tuple(columns[i].at for i in own)}
-            interval = tuple(ends[i] for i in own)
-            result.curves[name] = CurveEstimate(**what, value=tuple(value), interval=interval)
+        if first.command is None:
+            value, sd = float(known.value[own[0]]), finite(known.sd[own[0]])
+            result.scalars[name] = QuantityEstimate(**what, value=value, sd=sd, interval=ends[own[0]])
         else:
-            sd = finite(known.sd[own[0]])
-            result.scalars[name] = QuantityEstimate(**what, value=value[0], sd=sd, interval=ends[own[0]])
+            points = sorted(zip(commands, known.value[own].tolist(), (ends[i] for i in own), strict=True))
+            what |= dict(zip(("at", "value", "interval"), zip(*points, strict=True), strict=True))
+            result.curves[name] = CurveEstimate(**what, along="command [%]")
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], list[tuple[Column, Array]]]:
     """Return what computes the quantities of one joint; test movements are planned at the estimate."""
-    angles = np.append(np.linspace(*bench.travel, 9), bench.angle)
-    tests: list[Callable[[Candidates], Measured]] = []
-    if bench.settings.stage == "hyd":
-        torque = float(bench.weigh(estimate, angles[-1:])[0][0, 0])
+    if bench.settings.stage == "mech":
+        tests = []
+    else:
+        torque = float(bench.weigh(estimate)[0][0])
         signs = ("positive", "negative")
         words = ("raising", "lowering") if torque * bench.sense > 0 else ("lowering", "raising")
         words = words if abs(torque) >= 1.0 else signs  # below 1 N·m no direction is called raising
-        for sign, ending, word in zip((1.0, -1.0), signs, words, strict=True):
-            tests.append(speed_tests(bench, estimate, sign, ending, word))
-    further = gain_model if bench.settings.stage == "mech" else oil
+        tests = [
+            speed_tests(bench, estimate, sign, f"_{ending}", f", {word}")
+            for sign, ending, word in zip((1.0, -1.0), signs, words, strict=True)
+        ]
+    further = oil if tests else gain_model
 
     def measure(candidates: Candidates) -> list[tuple[Column, Array]]:
-        torque, inertia = bench.weigh(candidates, angles)
+        torque, inertia = bench.weigh(candidates)
         moved = [row for test in tests for row in test(candidates)]
-        return [*moved, *further(bench, candidates, inertia[:, -1]), *gravity(angles, torque)]
+        return [*moved, *further(bench, candidates, inertia), gravity(bench, torque)]
 
     return measure

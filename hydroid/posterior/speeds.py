@@ -27,8 +27,7 @@ def speed_tests(
         bench: the joint.
         estimate: one candidate.
         sign: of the commands.
-        ending: of the names.
-        word: at the end of the labels.
+        ending, word: at the end of names and labels.
     """
     steps = {u: movement(bench, sign * u).through_pose(estimate) for u in COMMANDS}
     rest = movement(bench, 0.0)
@@ -47,12 +46,12 @@ def speed_tests(
 
     def measure(candidates: Candidates) -> Measured:
         def row(name: str, label: str, unit: str, value: Array) -> tuple[Column, Array]:
-            return Column(f"{name}_{ending}", f"{label}, {word}", unit), value
+            return Column(name + ending, label + word, unit), value
 
         runs = {u: step.speeds(candidates) for u, step in steps.items()}
         speed = {u: steps[u].end(run) for u, run in runs.items()}
         for u, value in speed.items():
-            point = Column("speed", "speed", "deg/s", False, "command [%]", sign * u)
+            point = Column("speed", "speed", "deg/s", False, sign * u)
             yield point, sign * bench.sense * value
         for u in (50.0, 100.0):
             yield row(f"speed_{u:.0f}", f"speed at {u:.0f} % command", "deg/s", speed[u])

@@ -13,18 +13,17 @@ from hydroid.simulation import Candidates
 
 
 class Column(NamedTuple):
-    """One quantity of a joint, or one point of a curve.
+    """One quantity of a joint, or one point of a curve against the command.
 
     name: plain ASCII. label: the same in words. positive: it cannot be negative, and its interval is
-    multiplicative. along, at: of a curve: what it is drawn against, with its unit, and where this point is.
+    multiplicative. command: of a curve: where this point is [%].
     """
 
     name: str
     label: str
     unit: str
     positive: bool = True
-    along: str = ""
-    at: float = 0.0
+    command: float | None = None
 
 
 Measured: TypeAlias = Iterator[tuple[Column, Array]]
@@ -32,13 +31,10 @@ Measured: TypeAlias = Iterator[tuple[Column, Array]]
 NaN where one is undefined"""
 
 
-def gravity(angles: Array, torque: Array) -> Measured:
-    """Gravity's torque on the joint, (n, A), at angles of its travel and, last, at its pose."""
-    curve = Column("gravity_torque", "gravity torque", "N·m", False, "angle [deg]")
-    for angle, values in zip(np.degrees(angles[:-1]).tolist(), torque.T, strict=False):
-        yield curve._replace(at=angle), values
-    label = f"gravity torque at {np.degrees(angles[-1]):.0f} deg"
-    yield Column("gravity_torque_at_pose", label, "N·m", False), torque[:, -1]
+def gravity(bench: Bench, torque: Array) -> tuple[Column, Array]:
+    """Gravity's torque on the joint at its angle, (n,)."""
+    label = f"gravity torque at {np.degrees(bench.angle):.0f} deg"
+    return Column("gravity_torque_at_pose", label, "N·m", False), torque
 
 
 def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
@@ -52,7 +48,7 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
         yield Column("dead_band", "dead band, friction/K", "%"), friction / gain
         for u in (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0):
             torque = np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0)
-            yield Column("speed", "speed", "deg/s", False, "command [%]", u), np.degrees(torque / damping)
+            yield Column("speed", "speed", "deg/s", False, u), np.degrees(torque / damping)
 
 
 def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:

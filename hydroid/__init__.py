@@ -11,7 +11,9 @@ Each command of `hydroid --help` is one function here: its arguments come first,
 and its result prints itself in a notebook. Every name is imported when it is first used.
 """
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -47,21 +49,12 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULES = {
-    "commands.fit": "FitResult fit",
-    "commands.inputs": "load_settings",
-    "commands.logs": "read_logs",
-    "commands.quantity": "QuantityResult",
-    "commands.stages": "fit_mech fit_hyd",
-    "errors": "HydroidError",
-    "identified_model": "IdentifiedModel identified load_identified start_values",
-    "log": "Log write_log",
-    "parallel.cluster": "open_workers",
-    "plant": "Plant load_plant",
-}
-_ALONE = "analyse check convert design init quantity report simulate study suggest validate view"
-_HOMES = {name: f"commands.{name}" for name in _ALONE.split()} | {
-    name: module for module, names in _MODULES.items() for name in names.split()
+# the imports above, which only type checkers perform, are the one list of names
+_HOMES = {
+    alias.name: node.module
+    for node in ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
+    if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("hydroid.")
+    for alias in node.names
 }
 
 __all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll]
@@ -70,7 +63,7 @@ __all__ = ["__version__", *_HOMES]  # pyright: ignore[reportUnsupportedDunderAll
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'hydroid' has no attribute {name!r}")
-    value = getattr(import_module(f"hydroid.{_HOMES[name]}"), name)
+    value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

@@ -43,10 +43,6 @@ class SettingsError(HydroidError):
     """A setting that does not exist or is not allowed, in a YAML file or an override."""
 
 
-class MeshError(HydroidError):
-    """A mesh from which no mass properties can be computed."""
-
-
 class ModelError(HydroidError):
     """An MJCF model that does not fit the arm's settings."""
 

@@ -1,6 +1,5 @@
 """What a model predicts for a log: commands in; angles, pressures and flows out."""
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -63,27 +62,6 @@ def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], sou
         RunError: the simulation diverged.
     """
     return predict_log(identified(settings, values, source), log)
-
-
-def trace_csv(model: IdentifiedModel, log: Log) -> str:
-    """Return a CSV of the driven joints' actuators, in bar, L/min, mm and N (N·m of a rotary actuator)."""
-    settings, bindings = model.settings, Bindings(model.settings)
-    outputs = [int(j) for j in np.flatnonzero(log.driven)]
-    simulation = make_simulation(load_model(settings.arm), log, outputs, settings)
-    observed = simulation.trace(bindings.candidates(model.theta[None]))
-    names, columns = ["time_s"], [log.time]
-    for k, joint in enumerate(simulation.joints + 1):
-        units = {"pA": "bar", "pB": "bar", "qA": "Lmin", "qB": "Lmin", "spool": "mm", "force": "N"}
-        names += [f"{what}{joint}_{unit}" for what, unit in units.items()]
-        columns += [
-            *(observed.pressure[:, k].T / 1e5),
-            *(observed.flow[:, k].T * 6e4),
-            observed.spool[:, k] * 1e3,
-            observed.force[:, k],
-        ]
-    text, header = io.StringIO(), ",".join(names)
-    np.savetxt(text, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments="")
-    return text.getvalue()
 
 
 def _respond(

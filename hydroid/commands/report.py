@@ -9,7 +9,7 @@ from hydroid.commands.options import command
 from hydroid.commands.result import Result, rows, written
 
 if TYPE_CHECKING:
-    from hydroid.run.collection import Runs
+    from hydroid.run.record import Record
 
 
 @command
@@ -20,7 +20,7 @@ def report(
     without: Sequence[str] = (),
     figures: bool = False,
     out: "Source" = "runs/report",
-) -> "Result[Runs | None]":
+) -> "Result[tuple[Record, ...]]":
     """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
 
     Nothing is simulated, and no log is needed: a run stores all that its report shows, which is written again
@@ -29,7 +29,7 @@ def report(
     Example: hydroid report runs/mech runs/hyd
 
         hydroid.report(["runs/mech", "runs/hyd"])
-        print(hydroid.report("runs/array/seed-*", merge=True).result.best.folder)
+        print(hydroid.report("runs/array/seed-*", merge=True).content["best"])
 
     Args:
         runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
@@ -47,18 +47,18 @@ def report(
         from hydroid.reporting.fit_report import draw
 
         files = [str(draw(run, without or (), figures=figures)) for run in as_list(runs)]
-        return Result(files, {"files": files}, None)
+        return Result(files, {"files": files}, ())
     from hydroid.reporting.validation_report import merged_tables
     from hydroid.run.collection import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], Path(out))
-    tables, best = merged_tables(collected), collected.best
+    tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)
     line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
     keys = ["name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag"]
     content = {
         "out": str(out),
         "best": best.folder,
-        "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected.runs},
+        "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected},
         "parameters": rows(tables["spread"], *keys),
     }
     return Result([tables["spread"], line, *written(tables, out)], content, collected)

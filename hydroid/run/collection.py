@@ -4,54 +4,25 @@ import glob
 import logging
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from hydroid.errors import HydroidError, RunError
-from hydroid.parameters import Array, ParameterSet
 from hydroid.run.folder import RunFolder
 from hydroid.run.identity import difference
 from hydroid.run.record import Record, load_record
-from hydroid.settings.fit import FitSettings
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """Runs that differ in their seeds only, in the order of these."""
-
-    runs: tuple[Record, ...]
-
-    @property
-    def settings(self) -> FitSettings:
-        """Of all runs but for their seeds."""
-        return self.runs[0].settings
-
-    @property
-    def parameters(self) -> ParameterSet:
-        """Of all runs."""
-        return self.settings.parameter_set()
-
-    @property
-    def theta(self) -> Array:
-        """The final estimates, shape (N, P)."""
-        return np.array([self.parameters.vector(run.summary.values, run.folder) for run in self.runs])
-
-    @property
-    def best(self) -> Record:
-        """The run with the smallest rms output error."""
-        return min(self.runs, key=lambda run: run.rms_deg)
-
-
-def read_runs(names: Sequence[str], out: Path) -> Runs:
+def read_runs(names: Sequence[str], out: Path) -> tuple[Record, ...]:
     """Read finished runs that differ in nothing but their seeds; those that cannot be used are left out.
 
     Args:
         names: run folders, or patterns of them, in any order.
         out: the folder for what is to be written about them.
+
+    Returns:
+        One run for each seed, in the order of the seeds.
 
     Raises:
         RunError: no run is left, runs differ in more than their seeds, or `out` is a run itself.
@@ -69,18 +40,18 @@ def read_runs(names: Sequence[str], out: Path) -> Runs:
     if not runs:
         hint = "resume those that were stopped"
         raise RunError("no finished run is there", where=" ".join(names), hint=hint)
-    first, *others = sorted(runs, key=lambda run: (run.seed, run.folder))
-    once, differing = {first.seed: first}, 0
-    for run in others:
-        if text := difference(run.identity, first.identity, but="search.seed"):
-            _log.warning("%s: %s", run.folder, text)
-            differing += 1
-        elif (kept := once.setdefault(run.seed, run)) is not run:
-            _log.warning("left out: %s: has seed %d, as %s has", run.folder, run.seed, kept.folder)
-    if differing:
-        what = f"{differing} of {len(runs)} runs differ from {first.folder} in more than the seed"
+    runs.sort(key=lambda run: (run.seed, run.folder))
+    others = {run.folder: difference(run.identity, runs[0].identity, but="search.seed") for run in runs}
+    if differing := {folder: text for folder, text in others.items() if text}:
+        for folder, text in differing.items():
+            _log.warning("%s: %s", folder, text)
+        what = f"{len(differing)} of {len(runs)} runs differ from {runs[0].folder} in more than the seed"
         raise RunError(what, hint="collect them apart")
-    return Runs(tuple(once.values()))
+    once: dict[int, Record] = {}
+    for run in runs:
+        if (kept := once.setdefault(run.seed, run)) is not run:
+            _log.warning("left out: %s: has seed %d, as %s has", run.folder, run.seed, kept.folder)
+    return tuple(once.values())
 
 
 def _read(path: str) -> Record:

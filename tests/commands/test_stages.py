@@ -100,10 +100,7 @@ def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path:
     assert all(held[name] == value for name, value in VALUES.items() if name != "D")
     rms = [found["estimates"][name]["rms_deg"] for name in ("best", "refined", "joint")]
     assert rms == sorted(rms, reverse=True)
-    hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "s.csv", "--trace", "t.csv")
-    header, *rows = (tmp_path / "t.csv").read_text().splitlines()
-    assert header == "time_s,pA2_bar,pB2_bar,qA2_Lmin,qB2_Lmin,spool2_mm,force2_N"
-    assert len(rows) == 1000
+    hydroid_cli("simulate", short, "--fit", "run/estimate.yaml", "--out", "s.csv")
     (row,) = json.loads(hydroid_cli("validate", "s.csv", "--fit", "run", "--json", "--out", "v").out)[
         "results"
     ]

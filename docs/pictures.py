@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from screenshots import browser, connected
 
-from hydroid import load_identified, load_settings, read_logs, view
+from hydroid import load_identified, load_settings, read_logs
 from hydroid.viewer.film import Stage
 from hydroid.viewer.motion import simulated_motion
 
@@ -27,8 +27,6 @@ COLORS = 64
 SHOTS = {
     "report": ("hyd/report.html", "", (1000, 1240), "light"),
     "report_phone": ("hyd/report.html", "", (400, 1000), "dark"),
-    "report_parameters": ("hyd/report.html", "Parameters", (1000, 610), "light"),
-    "report_actuator": ("actuator/actuator.html", "From the command to the torque", (1000, 970), "light"),
     "report_motion": ("nsga2/report.html", "The arm in motion", (1000, 600), "light"),
 }
 """page, title of the section (the page's beginning without one), width and height [px], and look"""
@@ -46,12 +44,12 @@ def moving(demo: Path) -> None:
     pictures: list[Image.Image] = []
     times = np.arange(*SPAN, 1 / RATE)
     for words, motion in motions.items():
-        with Stage(motion, SIZE, panel=False) as stage:
+        with Stage(motion, SIZE) as stage:
             for k, time in enumerate(times):
                 if len(pictures) <= k:
                     pictures.append(Image.new("RGB", (len(motions) * SIZE[0], SIZE[1])))
                 left = list(motions).index(words) * SIZE[0]
-                pictures[k].paste(Image.fromarray(stage.machine(float(time))), (left, 0))
+                pictures[k].paste(Image.fromarray(stage.picture(float(time))), (left, 0))
                 draw = ImageDraw.Draw(pictures[k])
                 draw.text((left + 10, 8), words, "#101010", ImageFont.load_default(17))
                 error = f"error {motion.error:.2g}° rms, {time:.1f} s"
@@ -63,7 +61,6 @@ def moving(demo: Path) -> None:
 
 async def shots(demo: Path) -> None:
     """Take pictures of parts of reports."""
-    view(demo / "hyd", actuator=2, out=demo / "actuator")
     with browser() as profile:
         tab = await connected(profile)
         for name, (page, title, (width, height), look) in SHOTS.items():

@@ -30,9 +30,6 @@ KINDS = {
     "fit-mech": ("fit-mech", LOG, "--set", "refinement.iterations=12"),
     "fit-hyd": ("fit-hyd", LOG, "--mech", "fit-mech"),
     "validate": ("validate", OTHER, LOG, "--fit", "fit-hyd", "--fit", "fit-mech"),
-    "identifiability": ("analyse", LOG, "--fit", "fit-mech", "--profile", "K,D"),
-    "sensitivity": ("analyse", LOG, "--fit", "fit-hyd", "--sensitivity"),
-    "actuator": ("view", "--actuator", "2", "--fit", "fit-hyd"),
 }
 """the command that makes each report; names of other kinds stand for their folders"""
 WIDTHS = (400, 1400)

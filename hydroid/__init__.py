@@ -1,11 +1,11 @@
 """hydroid: physical parameters of a hydraulic manipulator from its logs, on MuJoCo.
 
     fitted = hydroid.fit_hyd("a.csv", config="my-fit.yaml", out="runs/a")
-    print(fitted.best.summary.values)
+    print(fitted.to_frame(), fitted.validate("b.csv"))
 
-    plant = hydroid.load_plant("runs/a")
+    plant = fitted.plant()
     plant.reset()
-    angle = plant.step(command)
+    angle = plant.step({"boom": 50})
 
 Each command of `hydroid --help` is one function here: its arguments come first, its options are keywords,
 and its result prints itself in a notebook. Every name is imported when it is first used.

@@ -93,6 +93,7 @@ WORDS: dict[str, tuple[str, str]] = {
         "left out.",
         "",
     ),
+    "fit again": ("Make this fit again.", ""),
     "look for terms": (
         "Find what the model lacks, and what to measure next.",
         "`suggest` tries the most promising terms and prints the command for the best.",

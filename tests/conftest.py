@@ -2,7 +2,7 @@
 
 # ruff: noqa: E402  # MuJoCo asks for OpenGL when it is imported
 
-from hydroid.viewer.opengl import choose_platform
+from hydroid.viewer import choose_platform
 
 choose_platform()
 

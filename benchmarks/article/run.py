@@ -15,13 +15,13 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
+import pandas
 from figures import draw
 from measures import DETERMINED_AT_DEG
 from page import page
 from studies import Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.reporting.study_report import runs_table
 from hydroid.studies.study import processes
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,8 @@ def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
         made = [plan.run(folder, executor) for plan in plans]
     for runs in made:
         if runs.rows:
-            (results / f"{runs.plan.name}_runs.csv").write_text(runs_table(runs.rows).csv(), encoding="utf-8")
+            rows = [{"cell": r.cell, "seed": r.seed, "failed": r.failed, **r.values} for r in runs.rows]
+            pandas.DataFrame(rows).to_csv(results / f"{runs.plan.name}_runs.csv", index=False)
         for figure in runs.plan.study.figures:
             draw(runs, figure, results / f"{figure.item.replace(' ', '_')}.svg")
     if not chosen:

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 
 import hydroid
 from hydroid.commands.console import log_lines, show, show_error
-from hydroid.commands.options import COMMAND_LINES
+from hydroid.commands.options import COMMAND_LINES, NAMED
 from hydroid.commands.progress import listen, shown, stopped
 from hydroid.errors import HydroidError
 
@@ -45,6 +45,17 @@ GROUPS = {
 }
 """every command with a summary, by the heading of its group"""
 COMMANDS = [name for commands in GROUPS.values() for name in commands]
+OUT = {
+    "fit-mech": NAMED,
+    "fit-hyd": NAMED,
+    "validate": "runs/validate",
+    "analyse": "runs/analyse",
+    "report": "runs/report",
+    "suggest": "runs/suggest",
+    "design": "runs/design",
+    "simulate": "runs/simulated.csv",
+}
+"""where a command writes without --out; in Python nothing is written then"""
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 PRINTING = {
@@ -83,6 +94,7 @@ def click_command(command: str) -> "TyperCommand":
 
     def run(json: bool, quiet: bool, verbose: bool, **given: Any) -> None:
         with log_lines(verbose=verbose, quiet=quiet), shown(not (quiet or json)):
+            given |= {"out": given["out"] or OUT[command]} if command in OUT else {}
             result = function(**given)
         if json or not quiet:
             show(result, as_json=json, verbose=verbose)

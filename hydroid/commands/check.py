@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from hydroid.commands.inputs import ConfigSource, SettingChanges, as_list, load_settings
+from hydroid.commands.logs import check_file, named, plain_findings
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
 
@@ -22,30 +21,13 @@ class LogCheck(NamedTuple):
         path: the file.
         log: None if it is unusable.
         findings: all of them, errors first.
-        moved_deg: range over which each driven joint moved, by its number.
+        moved_deg: range over which each driven joint moved, by its name.
     """
 
     path: Path
     log: "Log | None"
     findings: "Sequence[LogFinding]"
-    moved_deg: Mapping[int, float]
-
-    @property
-    def driven(self) -> list[int]:
-        """Joints with a command, numbered from 1."""
-        return [] if self.log is None else (np.flatnonzero(self.log.driven) + 1).tolist()
-
-    def plain(self) -> dict[str, Any]:
-        """Return what JSON holds."""
-        return {
-            "log": str(self.path),
-            "usable": self.log is not None,
-            "samples": self.log and len(self.log.time),
-            "duration_s": self.log and float(self.log.duration),
-            "driven_joints": self.driven,
-            "moved_deg": {str(joint): deg for joint, deg in self.moved_deg.items()},
-            "findings": plain_findings(self.findings),
-        }
+    moved_deg: Mapping[str, float]
 
 
 @command
@@ -65,29 +47,30 @@ def check(
         print(*hydroid.check(["a.csv", "b.csv"]).result[0].findings, sep="\\n")
     """
     settings = load_settings(config, set)
-    from hydroid.log import check_log, driven_joints, grouped, motion_findings
+    from hydroid.log import driven_joints, grouped, motion_findings
 
-    arm, outputs, checks = settings.arm, settings.outputs, list[LogCheck]()
+    names, checks = settings.arm.joint_names, list[LogCheck]()
     for path in map(Path, as_list(logs)):
-        log, faults = check_log(
-            path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair
-        )
-        moved = {joint: motion.travel for joint, motion in (driven_joints(log) if log else {}).items()}
-        checks.append(LogCheck(path, log, [*faults, *(motion_findings(log) if log else ())], moved))
-    usable = [(one, one.log) for one in checks if one.log]
+        log, faults = check_file(path, settings, repair=repair)
+        moved, found = {}, list(faults)
+        if log is not None:
+            moved = {names[joint - 1]: motion.travel for joint, motion in driven_joints(log).items()}
+            found += named(motion_findings(log), names)
+        checks.append(LogCheck(path, log, found, moved))
     findings = [finding for one in checks for finding in one.findings]
     findings.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
     lines = [f"{level}: {line}" for level, line in grouped(findings)]
-    for one, log in usable:
-        driven = ", ".join(map(str, one.driven)) or "none"
-        moved = ", ".join(f"joint {joint} by {deg:.3g} deg" for joint, deg in one.moved_deg.items())
-        size = f"{len(log.time)} samples, {log.duration:.2f} s"
-        lines.append(f"{one.path}: {size}, driven joints: {driven}" + (moved and f"; moved: {moved}"))
-    content = {"logs": [one.plain() for one in checks]}
-    return Result(lines, content, checks, exit_status=0 if len(usable) == len(checks) else 2)
-
-
-def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:
-    """Return findings as JSON holds them."""
-    keys = ("level", "kind", "what", "where", "hint")
-    return [{key: getattr(finding, key) for key in keys} for finding in findings]
+    content: dict[str, Any] = {"logs": []}
+    for one in checks:
+        size = {"samples": one.log and len(one.log.time), "duration_s": one.log and float(one.log.duration)}
+        driven = [] if one.log is None else [n for n, d in zip(names, one.log.driven, strict=True) if d]
+        content["logs"].append(
+            {"log": str(one.path), "usable": one.log is not None, **size, "driven_joints": driven}
+            | {"moved_deg": dict(one.moved_deg), "findings": plain_findings(one.findings)}
+        )
+        if one.log is not None:
+            moved = ", ".join(f"{name} by {deg:.3g} deg" for name, deg in one.moved_deg.items()) or "nothing"
+            length = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
+            lines.append(f"{one.path}: {length}; driven and moved: {moved}")
+    exit_status = 0 if all(one.log for one in checks) else 2
+    return Result(lines, content, checks, exit_status=exit_status)

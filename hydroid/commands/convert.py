@@ -1,25 +1,15 @@
 """`hydroid convert`: a log of any format as the plain CSV that every command reads without settings."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hydroid.commands.check import plain_findings
-from hydroid.commands.inputs import (
-    ConfigSource,
-    SettingChanges,
-    Source,
-    load_settings,
-    refuse_overwriting,
-    setting_changes,
-)
+from hydroid.commands.inputs import ConfigSource, SettingChanges, Source, load_settings, refuse_overwriting
+from hydroid.commands.logs import plain_findings
 from hydroid.commands.options import command
 from hydroid.commands.result import Result
-from hydroid.errors import SettingsError
-from hydroid.settings.load import replace_setting, validate
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
@@ -55,30 +45,30 @@ def convert(
         log (LOG): CSV, .mat, Parquet, ROS bag or MCAP.
         out (OUT.csv): The CSV to write.
         config (YAML): Settings that map the columns (`log`): a file, or the name of a shipped config
-            [default: the columns are guessed, and each guess is printed; --set corrects them].
+            [default: the columns are guessed, and each guess is printed].
+        set (KEY=VALUE): Replace a setting of --config.
 
     Raises:
         LogError: the log cannot be used.
-        SettingsError: `out` would overwrite the log, or a change that is not allowed.
+        SettingsError: `out` would overwrite the log, or a setting that is not allowed.
         RunError: `out` cannot be written.
     """
-    from hydroid.log import read_log, write_log
+    from hydroid.log import guess_columns, open_table, read_log, write_log
 
-    path, target, changes = Path(log), Path(out), setting_changes(set)
-    refuse_overwriting(path, target)
-    guess = None
-    if config is not None:
-        settings = load_settings(config, changes)
+    path, guess = Path(log), None
+    refuse_overwriting(path, out)
+    if config is not None or set:
+        settings = load_settings(config or "fit-mech", set)
         layout, ranges = settings.log, settings.arm.ranges
     else:
-        guess, layout = _guessed(path, changes)
+        most = [f"joint{number}" for number in range(1, 13)]  # more joints than an arm has
+        guess = guess_columns(open_table(path, LogSettings()), most)
+        layout = LogSettings.model_validate(guess.log)
         ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
     read, findings = read_log(path, layout, ranges, repair=repair)
-    write_log(target, read, _plain_layout(read), exact=True)
-    lines = [
-        *(_guess_lines(guess) if guess else ()),
-        *(f"{finding.level}: {finding}" for finding in findings),
-    ]
+    write_log(Path(out), read, _plain_layout(read), exact=True)
+    unused = [f"not used: {', '.join(guess.unused)}"] if guess and guess.unused else []
+    lines = [*(guess.reasons if guess else ()), *unused, *(f"{f.level}: {f}" for f in findings)]
     size = f"{len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
     content = {
         "out": str(out),
@@ -90,29 +80,6 @@ def convert(
         "reasons": [*guess.reasons] if guess else [],
     }
     return Result([*lines, f"{out}: {size}"], content, Converted(replace(read, source=str(out)), guess))
-
-
-def _guessed(path: Path, changes: Mapping[str, Any]) -> "tuple[ColumnGuess, LogSettings]":
-    """Guess the columns of a log, and correct the guess by `changes`."""
-    from hydroid.log import guess_columns, open_table
-
-    # more joints than an arm has
-    guess = guess_columns(open_table(path, LogSettings()), [f"joint{number}" for number in range(1, 13)])
-    section = {"log": guess.log | {"joints": {str(n): {**own} for n, own in guess.log["joints"].items()}}}
-    for key, value in changes.items():
-        if not key.startswith("log."):
-            raise SettingsError("is no setting of `log`", where=f"--set {key}", hint="give it with --config")
-        replace_setting(section, key, value)
-    layout = validate(section["log"], LogSettings, "the guessed columns", overridden=[*changes])
-    return guess._replace(log=section["log"]), layout
-
-
-def _guess_lines(guess: "ColumnGuess") -> list[str]:
-    import yaml
-
-    flow: Any = {"default_flow_style": True, "width": 1e9, "sort_keys": False, "allow_unicode": True}
-    unused = [f"not used: {', '.join(guess.unused)}"] if guess.unused else []
-    return [*guess.reasons, *unused, f"as settings: log: {yaml.safe_dump(guess.log, **flow).strip()}"]
 
 
 def _plain_layout(log: "Log") -> LogSettings:

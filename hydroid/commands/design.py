@@ -1,7 +1,7 @@
 """`hydroid design`: the next experiment."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -14,11 +14,22 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, rows, written
+from hydroid.commands.result import Result, written
+from hydroid.findings import Finding
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
     from hydroid.commands.logs import LogSources
+
+COLUMNS = {
+    "parameter": "name",
+    "estimate": "estimate",
+    "before_percent": "before [%]",
+    "random_percent": "random [%]",
+    "designed_percent": "designed [%]",
+    "flag": "flag",
+}
+"""of the table of predicted standard deviations, by their keys in JSON"""
 
 
 @command
@@ -26,7 +37,7 @@ def design(
     logs: "LogSources" = (),
     *,
     fit: "ModelSource",
-    out: "Source | None" = "runs/design",
+    out: "Source | None" = None,
     duration: float | None = None,
     joints: str | list[str] | None = None,
     seed: int = 1,
@@ -50,7 +61,7 @@ def design(
 
     Args:
         duration (S): Length of the experiment [s].
-        joints (2,3): Joints to drive [default: the compared joints].
+        joints (2,3): Joints to drive, by number or name [default: the compared joints].
 
     Raises:
         SettingsError: limits that no experiment keeps.
@@ -61,18 +72,31 @@ def design(
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
-    from hydroid.reporting.design_report import design_table
+    from hydroid.posterior.flags import flag_of
+    from hydroid.reporting.table import Table
 
     settings, commands = model.settings, None if out is None else str(Path(out) / "commands.csv")
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
-    precision = design_table(settings.design, result, model.values)
-    files = written({"design": precision}, out)
+    stages = (result.known.deviations, result.random_deviations, result.after.deviations)
+    rows: list[dict[str, Any]] = [
+        {"parameter": name, "estimate": model.values[name]}
+        | {"before_percent": 100 * before, "random_percent": 100 * random, "designed_percent": 100 * after}
+        | {"gain": random / after, "flag": flag_of(after).value}
+        for name, before, random, after in zip(
+            result.names, *(deviations.tolist() for deviations in stages), strict=True
+        )
+    ]
+    note = (
+        f"Noise: {settings.design.noise_deg:g} deg. before: every parameter ±100 % unless logs say more. "
+        f"random: median of {len(result.random)} experiments of the same length and limits. "
+    )
+    safety = Finding("run the experiment", "note").hint
+    table = Table.of("Predicted relative standard deviations", COLUMNS, rows, note + safety)
+    files = written({"design": table}, out)
     if out is not None:
         write_log(Path(out) / "commands.csv", result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
         files.insert(0, str(commands))
-    keys = ["parameter", "estimate", "before_percent", "random_percent", "designed_percent", "gain", "flag"]
-    content = {"commands": commands, "precision": rows(precision, *keys)}
-    return Result([precision, *files], content, result)
+    return Result([table, *files], {"commands": commands, "precision": rows}, result)

@@ -5,20 +5,25 @@ import shlex
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from hydroid.commands.inputs import Source
 from hydroid.commands.logs import read_logs
 from hydroid.commands.result import Printed
 from hydroid.errors import RunError, SettingsError, Stopped
-from hydroid.estimate import FitSummary
+from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.logs import LogSources
+    import pandas
+
+    from hydroid.commands.logs import LogSource, LogSources
+    from hydroid.commands.result import Result
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
+    from hydroid.plant import Plant
     from hydroid.problem.problem import Problem, Spread
     from hydroid.reporting.table import Table
     from hydroid.run.folder import RunFolder
@@ -28,16 +33,17 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitResult(Printed):
-    """A finished fit.
+    """A finished fit; every command takes it as `fit`, and `load_plant` as its source.
 
     Attributes:
         problem: the logs and the model.
         fit: estimates, uncertainty, history.
         folder: the run folder; None where nothing was written.
         summary: the final estimate with its uncertainty, as in `estimate.yaml`.
-        model: at the final estimate; every command takes it as `fit`.
+        model: at the final estimate.
         predictions: what its estimates make of its logs.
         baselines: fitted to the same logs, by joint and name.
+        runs: of several seeds all results, of which this is the best.
     """
 
     problem: "Problem"
@@ -47,12 +53,67 @@ class FitResult(Printed):
     model: IdentifiedModel
     predictions: "tuple[Prediction, ...]"
     baselines: "Baselines"
+    runs: "tuple[FitResult, ...]" = ()
+
+    def plant(self, **how: Any) -> "Plant":
+        """Return the identified arm to be stepped; the keywords are those of `Plant`."""
+        from hydroid.plant import Plant
+
+        return Plant(self.model, **how)
+
+    def predict(self, log: "LogSource") -> "Prediction":
+        """Predict a log from its commands and its first angles.
+
+        Raises:
+            LogError: the log cannot be used. RunError: the simulation diverged.
+        """
+        from hydroid.fitting.validation import predicted
+
+        (read,) = read_logs(log, self.model.settings)
+        return predicted(self.model, read, None)
+
+    def validate(self, logs: "LogSources", out: Source | None = None) -> "Result[list[Prediction]]":
+        """Return the verdict on each joint by logs that were not fitted; a page of it is written to `out`.
+
+        Raises:
+            LogError, RunError: as of `hydroid.validate`.
+        """
+        from hydroid.commands.validate import validate
+
+        return validate(logs, fit=self, out=out)
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """Return the parameters, one row each: value, unit, sd, interval, flag, ..."""
+        import pandas
+
+        rows = {name: one.model_dump() for name, one in self.summary.estimate.items()}
+        return pandas.DataFrame.from_dict(rows, orient="index")
+
+    def report(self, out: Source | None = None) -> Path:
+        """Write the report and its tables to a folder, by default the run folder; return the page.
+
+        Raises:
+            RunError: the folder cannot be written, or there is none.
+        """
+        from hydroid.reporting.fit_report import fit_page
+        from hydroid.reporting.page_file import write_page
+        from hydroid.run.identity import identity
+        from hydroid.run.record import Record, fit_result
+
+        folder = out or self.folder
+        if folder is None:
+            raise RunError("this fit has no folder", hint="name one: report('runs/a')")
+        made_by = identity(self.problem.settings, self.problem.logs)
+        result = fit_result(self.fit, self.predictions, self.baselines)
+        record = Record(str(folder), made_by, self.model.settings, self.summary, result, {})
+        write_page(page := fit_page(record), Path(folder))
+        return Path(folder) / f"{page.name}.html"
 
 
 def fit(
     settings: FitSettings,
     logs: "LogSources",
-    out: str | Path | None = None,
+    out: Source | None = None,
     *,
     resume: bool = False,
     progress: "Watcher | None" = None,
@@ -111,15 +172,15 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, judge
     from hydroid.reporting.fit_report import next_step
-    from hydroid.reporting.parameters_report import parameter_table
-    from hydroid.reporting.uncertainty_report import warnings
+    from hydroid.reporting.parameters_report import parameter_table, warnings
     from hydroid.reporting.verdict_table import verdict_table
 
     settings = problem.settings.of_estimate(fit.final)
     predictions, baselines = fitted(problem.varied(settings), fit), baselines_of(settings, problem.logs)
     verdict = judge(settings, predictions, baselines)
     summary = summarise(problem, fit).model_copy(update={"verdict": verdict})
-    model = IdentifiedModel(settings, fit.best.theta, str(folder or "the fit"), summary)
+    source = "the fit" if folder is None else str(folder / NAME)
+    model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [verdict_table({fit.final: verdict}), *warnings(summary)]
     if folder is not None:
         logs = " ".join(shlex.quote(log.source) for log in problem.logs)
@@ -129,9 +190,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
         ]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
-    return FitResult(
-        lines, content, problem, fit, folder, summary, model, predictions, baselines, details=details
-    )
+    own = (problem, fit, folder, summary, model, predictions, baselines)
+    return FitResult(lines, content, *own, details=details)
 
 
 def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Union
 
 from hydroid.assets import find_config
 from hydroid.errors import SettingsError
@@ -12,9 +12,12 @@ from hydroid.progress import NOTE
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
+if TYPE_CHECKING:
+    from hydroid.commands.fit import FitResult
+
 Source = str | Path
 ConfigSource = str | Path | FitSettings
-ModelSource = str | Path | IdentifiedModel
+ModelSource = Union[str, Path, IdentifiedModel, "FitResult"]
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
@@ -58,15 +61,15 @@ def open_model(
     *,
     nominal: bool = False,
 ) -> IdentifiedModel:
-    """Return a model as it is, or read it from a run folder, a saved plant or a YAML file of values.
+    """Return the model of a result, or read it from a run folder, a saved plant or a YAML file of values.
 
     Where `nominal`, parameters without a value have nominal ones, which only stage 2 has; a note names them.
 
     Raises:
         RunError, SettingsError: as of `load_identified`.
     """
-    if isinstance(fit, IdentifiedModel):
-        return fit
+    if fit is not None and not isinstance(fit, str | Path):
+        return fit if isinstance(fit, IdentifiedModel) else fit.model
     if isinstance(config, FitSettings):
         raise SettingsError("settings that are read make a model with `identified`", where="config")
     default = {"default": "fit-hyd"} if nominal else {}

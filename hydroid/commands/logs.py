@@ -1,14 +1,15 @@
 """Logs that commands read: files, or logs that were read before, of an arm alone or of the arms of a pair."""
 
 import logging
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydroid.commands.inputs import ModelSource, as_list
+from hydroid.commands.inputs import as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
@@ -41,22 +42,62 @@ def read_logs(
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
-    from hydroid.log import Log, grouped, read_log
+    from hydroid.log import Log, grouped
 
     read: list[Log] = []
     findings: list[LogFinding] = []
-    needed = {"outputs": settings.outputs if angles else None, "backward": settings.arm.backward}
     for source in as_list(logs):
         if isinstance(source, Log):
             read.append(source)
             continue
-        log, more = read_log(Path(source), settings.log, settings.arm.ranges, **needed, repair=repair)
+        log, more = check_file(Path(source), settings, repair=repair, angles=angles)
+        if log is None:
+            raise more[0].error()
         findings += more
         pose = np.where(log.measured, log.angle, settings.arm.pose(settings.start_pose))
         read.append(replace(log, angle=pose))
     for level, line in grouped(findings):
         _log.log(logging.WARNING if level == "warning" else NOTE, "%s: %s", level, line)
     return read
+
+
+def check_file(
+    path: Path, settings: FitSettings, *, repair: bool, angles: bool = True
+) -> "tuple[Log | None, list[LogFinding]]":
+    """Read a log as the settings map it; None if it cannot be used. Findings call joints by their names."""
+    from hydroid.log import check_log
+
+    arm, outputs = settings.arm, settings.outputs if angles else None
+    log, findings = check_log(
+        path, settings.log, arm.ranges, outputs=outputs, backward=arm.backward, repair=repair
+    )
+    return log, named(findings, arm.joint_names)
+
+
+def named(findings: "Sequence[LogFinding]", names: Sequence[str]) -> "list[LogFinding]":
+    """Return findings that call joints by their names."""
+    by_number = {str(number): name for number, name in enumerate(names, start=1)}
+
+    def name(text: Any) -> Any:
+        """Name a joint's number, and those that follow the word joint in what a finding states."""
+        if not isinstance(text, str):
+            return text
+        return re.sub(r"(?<=joint )\d+", lambda found: by_number.get(found[0], found[0]), text)
+
+    return [
+        replace(
+            finding,
+            subjects=tuple(by_number.get(one, name(one)) for one in finding.subjects),
+            numbers={key: name(value) for key, value in finding.numbers.items()},
+        )
+        for finding in findings
+    ]
+
+
+def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:
+    """Return findings as JSON holds them."""
+    keys = ("level", "kind", "what", "where", "hint")
+    return [{key: getattr(finding, key) for key in keys} for finding in findings]
 
 
 def read_arms(
@@ -102,7 +143,7 @@ def read_arms(
     return {side: logs.get(side, logs[moving[0]]) for side in moving}
 
 
-def run_logs(run: ModelSource) -> list[Path]:
+def run_logs(run: str | Path | IdentifiedModel) -> list[Path]:
     """Return the logs that a run folder was fitted to.
 
     Raises:

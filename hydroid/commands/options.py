@@ -17,12 +17,16 @@ P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
 
+NAMED = "runs/LOG-STAGE-ALGORITHM"
+"""run folder named after its log, stage and algorithm"""
+
 SHARED = """
     logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP [default: those of the
         run that is judged or resumed].
     fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a
         YAML file of values by name.
-    out (DIR): Folder for the report, tables and figures.
+    out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
+        written].
     config (YAML): Settings: a file, or the name of a shipped config [default: config.yaml in the folder of
         the estimate, or else fit-mech; fit-hyd for stage 2].
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.

@@ -102,7 +102,7 @@ class FitProgress(Progress):
     """
 
     def __init__(self, settings: "FitSettings", label: str) -> None:
-        search = settings.search
+        search, self._joints = settings.search, settings.arm.joint_names
         names = {"ga": "GA", "nsga2": "NSGA-II", "multistart": "multi-start"}
         super().__init__(label)
         what = "start" if search.algorithm == "multistart" else "population"
@@ -120,9 +120,11 @@ class FitProgress(Progress):
         best_text = f"best {best * self._scale:.4g}{self._unit}"
         self(self._step, number, self._total, f"{best_text}, {rate:.0f} simulations/s")
 
-    def refining(self, simulated: int, rms: float) -> None:
-        """Take the number of simulations of the refinement, and the rms error [rad] so far."""
-        self("refinement, simulations", simulated, None, f"rms error {math.degrees(rms):.4g} deg")
+    def refining(self, name: str, simulated: int, rms: float) -> None:
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
+        for number, joint in enumerate(self._joints, start=1):
+            name = name.replace(f"joint {number} ", f"{joint} ")
+        self(f"{name}: simulations", simulated, None, f"rms error {math.degrees(rms):.3g} deg")
 
 
 def _new_bar() -> Any:

@@ -1,12 +1,11 @@
 """`hydroid report`: the reports of finished runs, drawn anew."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hydroid.commands.inputs import Source, as_list
 from hydroid.commands.options import command
-from hydroid.commands.result import Result, rows, written
+from hydroid.commands.result import Result, written
 
 if TYPE_CHECKING:
     from hydroid.run.record import Record
@@ -19,7 +18,7 @@ def report(
     merge: bool = False,
     without: Sequence[str] = (),
     figures: bool = False,
-    out: "Source" = "runs/report",
+    out: "Source | None" = None,
 ) -> "Result[tuple[Record, ...]]":
     """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
 
@@ -51,14 +50,14 @@ def report(
     from hydroid.reporting.validation_report import merged_tables
     from hydroid.run.collection import read_runs
 
-    collected = read_runs([str(run) for run in as_list(runs)], Path(out))
+    collected = read_runs([str(run) for run in as_list(runs)], out)
     tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)
     line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
-    keys = ["name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag"]
+    spread = tables["spread"]
     content = {
-        "out": str(out),
+        "out": out and str(out),
         "best": best.folder,
         "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected},
-        "parameters": rows(tables["spread"], *keys),
+        "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],
     }
-    return Result([tables["spread"], line, *written(tables, out)], content, collected)
+    return Result([spread, line, *written(tables, out)], content, collected)

@@ -69,11 +69,6 @@ def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> lis
     return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
 
 
-def rows(table: "Table", *keys: str) -> list[dict[str, Any]]:
-    """Return a table's rows by key."""
-    return [dict(zip(keys, row.values(), strict=True)) for row in table.records()]
-
-
 def _html(line: "Table | str") -> str:
     if isinstance(line, str):
         return f"<p>{escape(line)}</p>"

@@ -37,7 +37,7 @@ def simulate(
     commands: "Source | Log",
     *,
     fit: "ModelSource",
-    out: "Source | None" = Path("runs/simulated.csv"),
+    out: "Source | None" = None,
     pose: str | None = None,
     noise_deg: float = 0.0,
     seed: int = 0,
@@ -56,7 +56,7 @@ def simulate(
 
     Args:
         commands (COMMANDS.csv): A log of commands. Its angles before the first command give the start pose.
-        out (LOG.csv): The log to write.
+        out (LOG.csv): The log to write [default of the command line: runs/simulated.csv].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
     Raises:

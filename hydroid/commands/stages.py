@@ -1,16 +1,16 @@
 """`hydroid fit-mech` and `hydroid fit-hyd`: both stages, from files to run folders, one seed or several."""
 
 from contextlib import nullcontext
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hydroid.commands.fit import FitResult, fit
-from hydroid.commands.inputs import ConfigSource, SettingChanges, Source, as_list, setting_changes
+from hydroid.commands.inputs import ConfigSource, SettingChanges, Source, setting_changes
 from hydroid.commands.logs import read_logs, run_logs
-from hydroid.commands.options import command, taking
+from hydroid.commands.options import NAMED, command, taking
 from hydroid.commands.progress import FitProgress
-from hydroid.commands.result import Printed, written
+from hydroid.commands.result import written
 from hydroid.commands.stage_one import load_stage, with_mechanics
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import read_values
@@ -19,9 +19,6 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
 
-NAMED = "runs/LOG-STAGE-ALGORITHM"
-"""run folder named after its log, stage and algorithm"""
-
 
 @dataclass(frozen=True)
 class FitOptions:
@@ -29,7 +26,7 @@ class FitOptions:
 
     logs: "LogSources" = ()
     _: KW_ONLY
-    out: "Source | None" = NAMED
+    out: "Source | None" = None
     algorithm: str | None = None
     seed: int | None = None
     runs: int = 1
@@ -112,25 +109,12 @@ class HydOptions(FitOptions):
 
     def with_stage_one(self, changes: dict[str, Any]) -> dict[str, Any]:
         """Return changes of settings with those that the estimate of stage 1 makes."""
-        logs = [Path(getattr(log, "source", log)).name for log in as_list(self.logs)]
-        return with_mechanics(self.mech, self.config or "fit-hyd", changes, logs)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FitRuns(Printed):
-    """The runs of `fit_mech` or `fit_hyd`, one for each seed."""
-
-    results: tuple[FitResult, ...]
-
-    @property
-    def best(self) -> FitResult:
-        """The result with the smallest rms error."""
-        return min(self.results, key=lambda result: result.fit.best.rms)
+        return with_mechanics(self.mech, self.config or "fit-hyd", changes)
 
 
 @command
 @taking(FitOptions)
-def fit_mech(options: FitOptions) -> FitRuns:
+def fit_mech(options: FitOptions) -> FitResult:
     """Estimate gain, damping, stiffness and link masses from logs (stage 1).
 
     Writes a run folder with report.html, estimate.yaml, tables, figures and the fitted arm. Then test the
@@ -139,10 +123,11 @@ def fit_mech(options: FitOptions) -> FitRuns:
     Example: hydroid fit-mech LOG.csv --out runs/mech
 
         fitted = hydroid.fit_mech("a.csv", out="runs/mech", algorithm="ga")
-        print(fitted.best.summary.values)
+        print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder; with --runs the folder of all of them.
+        out (DIR): Run folder; with --runs the folder of all of them [default of the command line:
+            runs/LOG-STAGE-ALGORITHM].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -152,7 +137,7 @@ def fit_mech(options: FitOptions) -> FitRuns:
 
 @command
 @taking(HydOptions)
-def fit_hyd(options: HydOptions) -> FitRuns:
+def fit_hyd(options: HydOptions) -> FitResult:
     """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage 1.
 
     By default it estimates piston areas, valve openings, onsets, delay and damping. The config can free more,
@@ -161,12 +146,12 @@ def fit_hyd(options: HydOptions) -> FitRuns:
     Example: hydroid fit-hyd LOG.csv --mech runs/mech --out runs/hyd
 
         fitted = hydroid.fit_hyd("a.csv", mech="runs/mech", out="runs/hyd")
-        print(fitted.best.summary.values)
+        print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder; with --runs the folder of all of them.
-        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The run folder also gives the
-            arm and the log layout, unless --config sets them.
+        out (DIR): Run folder; with --runs the folder of all of them [default of the command line:
+            runs/LOG-STAGE-ALGORITHM].
+        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values.
         both_stages: At the end, refine the parameters of both stages together.
 
     Raises:
@@ -175,8 +160,8 @@ def fit_hyd(options: HydOptions) -> FitRuns:
     return _fit(options)
 
 
-def _fit(options: FitOptions) -> FitRuns:
-    """Fit over one seed or several."""
+def _fit(options: FitOptions) -> FitResult:
+    """Fit over one seed or several; return the best."""
     settings = options.settings() if options.logs else options.stored()
     logs, out, runs = options.logs or run_logs(options.out or ""), options.out, options.runs
     read = read_logs(logs, settings, repair=options.repair)
@@ -191,16 +176,15 @@ def _fit(options: FitOptions) -> FitRuns:
             with FitProgress(seeded, name) as watcher:
                 done = fit(seeded, read, folder, resume=options.resume, progress=watcher, workers=workers)
                 results.append(done)
-    first, several = results[0], tuple(results)
-    if runs == 1:
-        return FitRuns(first.lines, first.content, several, details=first.details)
-    content = {"out": out and str(out), "runs": [result.plain() for result in results]}
-    if out is None:
-        return FitRuns(first.lines, content, several)
-    from hydroid.reporting.validation_report import merged_tables
-    from hydroid.run.collection import read_runs
-
-    tables = merged_tables(read_runs([str(result.folder) for result in results], Path(out)))
     best = min(results, key=lambda result: result.fit.best.rms)
-    lines = [f"The best of {runs} runs:", *best.lines, *written(tables, out)]
-    return FitRuns(lines, content, several, details=[tables["spread"]])
+    if runs == 1:
+        return best
+    content = {"out": out and str(out), "runs": [result.plain() for result in results]}
+    several, lines, details = tuple(results), [f"The best of {runs} runs:", *best.lines], best.details
+    if out is not None:
+        from hydroid.reporting.validation_report import merged_tables
+        from hydroid.run.collection import read_runs
+
+        tables = merged_tables(read_runs([str(result.folder) for result in results], Path(out)))
+        lines, details = [*lines, *written(tables, out)], [tables["spread"]]
+    return replace(best, lines=lines, content=content, runs=several, details=details)

@@ -1,8 +1,11 @@
 """`hydroid study`: settings compared over many seeds."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from hydroid.commands.inputs import Source
 from hydroid.commands.logs import read_logs
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 def study(
     file: "Source",
     *,
-    out: "Source | None" = "runs/study",
+    out: "Source" = "runs/study",
     processes: int = 0,
     dask: str | None = None,
     dask_insecure: bool = False,
@@ -44,11 +47,11 @@ def study(
         SettingsError: a key or value of the file that is not allowed.
         RunError: the folder cannot be written or is in use, or a process died.
     """
-    path, folder = Path(file), Path(out or "runs/study")
+    path, folder = Path(file), Path(out)
     load_study(path)  # a wrong file is refused before anything heavy is imported
     from hydroid.estimate import finite
     from hydroid.parallel.cluster import open_workers
-    from hydroid.reporting.study_report import cell_table, runs_table
+    from hydroid.reporting.table import Table
     from hydroid.run.lock import locked
     from hydroid.studies.study import processes as open_processes
     from hydroid.studies.study import run_study
@@ -62,12 +65,27 @@ def study(
             count = len(list(folder.glob("runs/*.json")))
             kept = f"{folder} holds {count} runs that have ended; the same command goes on"
             raise Stopped(kept) from None
-    cells, failed = cell_table(runs), [row for row in runs if row.failed]
-    failures = [f"failed: {row.cell}, seed {row.seed}: {row.failed}" for row in failed]
-    lines = [cells, *failures, *written({"cells": cells, "runs": runs_table(runs)}, folder)]
     each = [
         {"cell": row.cell, "seed": row.seed, "failed": row.failed or None}
         | {name: finite(value) for name, value in row.values.items()}
         for row in runs
     ]
+    measures, cells = ("rms error", "mean absolute error", "simulations"), list[dict[str, Any]]()
+    for cell in dict.fromkeys(row.cell for row in runs):
+        good = [row.values for row in runs if row.cell == cell and not row.failed]
+        medians = {name: _median([values[name] for values in good]) for name in measures}
+        cells.append({"cell": cell, "runs": len(good)} | medians)
+    title = "Median over the seeds [lowest, highest], errors in deg"
+    columns = sorted({name for row in runs for name in row.values})
+    tables = {
+        "cells": Table.of(title, {name: name for name in ("cell", "runs", *measures)}, cells),
+        "runs": Table.of("Runs", {name: name for name in ("cell", "seed", "failed", *columns)}, each),
+    }
+    failures = [f"failed: {row.cell}, seed {row.seed}: {row.failed}" for row in runs if row.failed]
+    lines = [tables["cells"], *failures, *written(tables, folder)]
     return Result(lines, {"out": str(folder), "runs": each}, runs)
+
+
+def _median(values: Sequence[float]) -> str:
+    finite = [value for value in values if np.isfinite(value)]
+    return f"{np.median(finite):.3g} [{min(finite):.3g}, {max(finite):.3g}]" if finite else ""

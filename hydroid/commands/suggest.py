@@ -1,7 +1,7 @@
 """`hydroid suggest`: what the model lacks, and what would determine more."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source, open_model
 from hydroid.commands.logs import problem_of
@@ -14,7 +14,24 @@ from hydroid.identified_model import CONFIG
 if TYPE_CHECKING:
     from hydroid.advice.suggestions import Advice
     from hydroid.commands.logs import LogSources
-    from hydroid.reporting.table import Table
+
+TERMS = {
+    "name": "quantity",
+    "held": "held at",
+    "gain_percent": "promised [%]",
+    "freed": "freed",
+    "rms_deg": "rms [deg]",
+    "left_out_deg": "rms left out [deg]",
+    "verdict": "verdict",
+}
+ACTIONS = {
+    "action": "action",
+    "of": "of",
+    "parameter": "improves most",
+    "before_percent": "from ± [%]",
+    "after_percent": "to ± [%]",
+}
+"""columns of tables by their keys in JSON"""
 
 
 @command
@@ -22,7 +39,7 @@ def suggest(
     logs: "LogSources" = (),
     *,
     fit: "ModelSource",
-    out: "Source | None" = "runs/suggestions",
+    out: "Source | None" = None,
     config: "ConfigSource | None" = None,
     set: "SettingChanges" = None,
     repair: bool = False,
@@ -46,16 +63,33 @@ def suggest(
     """
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
-    from hydroid.advice.suggestions import advice
+    from hydroid.advice.suggestions import action_findings, advice, missing_findings, residual_findings
     from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.page import log_names
-    from hydroid.reporting.suggestion_report import suggestion_tables, suggestions
+    from hydroid.reporting.table import Table
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
         advised = advice(problem, uncertainty(problem, model.theta), run, progress)
-    tables = suggestion_tables(advised.content)
-    said = suggestions(problem.settings, advised, log_names(problem.logs))
-    lines: list[Table | str] = [*tables.values(), *(f"- {text}" for text in said)]
-    return Result([*lines, *written(tables, out)], advised.content, advised)
+    content, checks, read = advised.content, advised.residuals, log_names(problem.logs)
+    names = problem.settings.arm.joint_names
+    places = [f"{names[check.joint - 1]} in {read[check.log]}" for check in checks]
+    findings = [*missing_findings(content), *action_findings(content, problem.settings)]
+    findings += residual_findings(checks, places)
+    none = {"name": "none of them", "rms_deg": content["rms_deg"], "left_out_deg": content["left_out_deg"]}
+    note = (
+        f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
+        "it saves. left out: the error on parts of the logs, each predicted by a fit without it."
+    )
+    terms = [none, *(term | {"verdict": _verdict(term)} for term in content["terms"])]
+    tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS, terms, note)}
+    if actions := content["actions"]:
+        title = "Predicted effect of each action on standard deviations"
+        tables["next_actions"] = Table.of(title, ACTIONS, actions)
+    lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(tables, out)]
+    return Result(lines, content, advised)
+
+
+def _verdict(term: dict[str, Any]) -> str:
+    return "free it" if "command" in term else "leave it" if "freed" in term else "others first"

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydroid.commands.fit import FitResult
 from hydroid.commands.inputs import ModelSource, SettingChanges, Source, as_list, open_model
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
@@ -13,7 +14,6 @@ from hydroid.errors import SettingsError
 
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
-    from hydroid.estimate import JointVerdict
     from hydroid.fitting.validation import Prediction
     from hydroid.identified_model import IdentifiedModel
     from hydroid.log import Log
@@ -29,7 +29,7 @@ def validate(
     *,
     fit: "ModelSource | Sequence[ModelSource]",
     leave_one_out: bool = False,
-    out: "Source | None" = "runs/validation",
+    out: "Source | None" = None,
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[list[Prediction]]":
@@ -53,62 +53,59 @@ def validate(
         LogError: a log cannot be used.
         RunError: a simulation diverged, or the folder cannot be written.
     """
-    models = [open_model(model, None, set) for model in as_list(fit)]
-    if leave_one_out and len(models) > 1:
+    given = as_list(fit)
+    if leave_one_out and len(given) > 1:
         raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
+    models = [open_model(one, None, set) for one in given]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
+    from hydroid.fitting.validation import predicted
+    from hydroid.fitting.verdict import judge
     from hydroid.reporting.fit_report import draw
     from hydroid.reporting.page import unique
     from hydroid.reporting.validation_report import validation_page
     from hydroid.reporting.verdict_table import ordered, verdict_table
-    from hydroid.run.record import keep_validation
+    from hydroid.run.identity import log_hash, was_fitted
+    from hydroid.run.record import fitted_by, keep_validation
 
-    predicted, verdicts = dict[str, Any](), dict[str, Any]()
-    for model, own in zip(models, read, strict=True):
-        name = unique(model.name, predicted)
-        test = _left_out if leave_one_out else _predicted
-        predictions, verdicts[name] = test(model, own)
-        predicted[name] = [replace(one, fit=name) for one in predictions]
-        if out is not None and not leave_one_out and (run := keep_validation(model, predictions)):
-            draw(run)
+    results, verdicts = dict[str, Any](), dict[str, Any]()
+    for one, model, own in zip(given, models, read, strict=True):
+        name = unique(model.name, results)
+        if leave_one_out:
+            fitted, baselines, predictions = _left_out(model, own)
+        else:
+            if isinstance(one, FitResult):
+                fitted, baselines = one.predictions, one.baselines
+                hashes = {log_hash(log) for log in one.problem.logs}
+                seen = [log_hash(log) in hashes for log in own]
+            else:
+                fitted, baselines = fitted_by(model)
+                seen = [was_fitted(Path(model.source).parent, log) for log in own]
+            new = [None if known is None else not known for known in seen]
+            predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
+            if out is not None and (run := keep_validation(model, predictions)):
+                draw(run)
+        unseen = [prediction for prediction in predictions if prediction.unseen is not False]
+        verdicts[name] = judge(model.settings, fitted, baselines, unseen)
+        results[name] = [replace(prediction, fit=name) for prediction in predictions]
     fits, arm = ordered(verdicts), models[0].settings.arm
-    results = [one for name in fits for one in predicted[name]]
-    page = validation_page(results, fits, arm)
+    every = [prediction for name in fits for prediction in results[name]]
+    page = validation_page(every, fits, arm)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
-        "results": [row for one in results for row in one.plain(arm.joint_names)],
+        "results": [row for one in every for row in one.plain(arm.joint_names)],
     }
     best = next(iter(fits))
     few = fits if sum(map(len, fits.values())) <= MOST_ROWS else {best: fits[best]}
     details = [page.tables["verdict"], page.tables["errors"]]
-    return Result([verdict_table(few), *written(page, out)], content, results, page, details=details)
+    return Result([verdict_table(few), *written(page, out)], content, every, page, details=details)
 
 
-def _predicted(
-    model: "IdentifiedModel", logs: "Sequence[Log]"
-) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
-    """Return predictions of logs, and the verdict by those that the fit has not seen."""
-    from hydroid.fitting.validation import predicted
-    from hydroid.fitting.verdict import judge
-    from hydroid.run.identity import was_fitted
-    from hydroid.run.record import fitted_by
-
-    seen = [was_fitted(Path(model.source).parent, log) for log in logs]
-    predictions = [
-        predicted(model, log, None if s is None else not s) for log, s in zip(logs, seen, strict=True)
-    ]
-    unseen = [one for one in predictions if one.unseen is not False]
-    return predictions, judge(model.settings, *fitted_by(model), unseen)
-
-
-def _left_out(
-    model: "IdentifiedModel", logs: "Sequence[Log]"
-) -> "tuple[list[Prediction], tuple[JointVerdict, ...]]":
-    """Return the prediction of each log by a fit to the others, and the verdict; baselines know all logs."""
+def _left_out(model: "IdentifiedModel", logs: "Sequence[Log]") -> Any:
+    """Return what a fit makes of its logs, baselines that know all of them, and each predicted without it."""
     from hydroid.fitting.validation import predicted, without_one
-    from hydroid.fitting.verdict import baselines_of, judge
+    from hydroid.fitting.verdict import baselines_of
 
     folds = [without_one(model, logs, i) for i in range(len(logs))]
     predictions = [predicted(fold, log, unseen=True) for fold, log in zip(folds, logs, strict=True)]
     fitted = [predicted(model, log, unseen=False) for log in logs]
-    return predictions, judge(model.settings, fitted, baselines_of(model.settings, logs), predictions)
+    return fitted, baselines_of(model.settings, logs), predictions

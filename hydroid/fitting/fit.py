@@ -95,8 +95,8 @@ class Watcher(Protocol):
     def generation(self, row: Array) -> None:
         """Take a row of HISTORY."""
 
-    def refining(self, simulated: int, rms: float) -> None:
-        """Take the number of simulations of the refinement, and its rms error [rad] so far."""
+    def refining(self, name: str, simulated: int, rms: float) -> None:
+        """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
 
 
 class Silent(Watcher):

@@ -42,14 +42,18 @@ class Multistart:
     Args:
         problem: what is minimised.
         memo: counts the simulations.
-        progress: takes the number of simulations, and the rms error [rad] of the start under way.
+        progress: takes name, number of simulations and rms error [rad] of each least squares.
         checkpoints: of the refinements.
     """
 
     single = True
 
     def __init__(
-        self, problem: Problem, memo: Memo, progress: Callable[[int, float], None], checkpoints: Checkpoints
+        self,
+        problem: Problem,
+        memo: Memo,
+        progress: Callable[[str, int, float], None],
+        checkpoints: Checkpoints,
     ) -> None:
         self.settings = problem.settings.search.multistart
         self._problem, self._memo, self._progress, self._checkpoints = problem, memo, progress, checkpoints
@@ -117,7 +121,7 @@ class Multistart:
                 part,
                 theta,
                 self._descent,
-                lambda n, rms, before=before: self._progress(before + n, rms),
+                lambda what, n, rms, before=before: self._progress(what, before + n, rms),
                 self._checkpoints,
                 f"{name} part {number}",
             )

@@ -48,7 +48,7 @@ def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Callable[[str, int, float], None] | None = None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Descent:
@@ -63,7 +63,7 @@ def refine(
         problem: the problem.
         theta: where to start, shape (P,).
         settings: when to end.
-        progress: takes the number of simulations and the rms error [rad] so far.
+        progress: takes the name, the number of simulations and the rms error [rad] so far.
         checkpoints: where it continues from, and stores how far it is; a result is stored too.
         name: of this refinement among them.
 
@@ -90,7 +90,7 @@ def refine(
             now = replace(now, descent=step(now.descent, residuals, settings))
             if progress is not None:
                 error = problem.rms(now.descent.residual[None, : problem.measured.size])[0]
-                progress(now.descent.evaluations, float(error))
+                progress(name, now.descent.evaluations, float(error))
         keep(now.arrays)
     _log.info("refinement of %d parameters: %s", now.descent.point.size, now.descent)
     return now.descent

@@ -42,7 +42,7 @@ class Searched:
 def search(
     problem: Problem,
     watch: Callable[[Array], None],
-    progress: Callable[[int, float], None],
+    progress: Callable[[str, int, float], None],
     checkpoints: Checkpoints,
 ) -> Searched:
     """Search to the last generation, from the seed or from what `checkpoints` holds.
@@ -50,7 +50,7 @@ def search(
     Args:
         problem: what is minimised.
         watch: takes a row of HISTORY after every generation, but for those that a resumed run repeats.
-        progress: takes the simulations and the rms error [rad] of least squares within multi-start.
+        progress: takes name, simulations and rms error [rad] of least squares within multi-start.
         checkpoints: where the search is stored as "search".
 
     Raises:

@@ -77,13 +77,15 @@ def _judge(
     own, new = ([p for p in some if p.log.driven[joint - 1]] for some in (fitted, unseen))
     judged = new or own
     travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in judged), default=0.0)
-    tolerance = settings.tolerance_deg or float(np.degrees(SHARE * travel))
+    stated = settings.tolerance_deg
+    stated = stated.get(joint) if isinstance(stated, dict) else stated
+    tolerance = stated or float(np.degrees(SHARE * travel))
     errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
     by_rival = [
         {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
         for some in (own, new)
     ]
-    word = _word(errors, by_rival, tolerance, stated=settings.tolerance_deg is not None)
+    word = _word(errors, by_rival, tolerance, stated=stated is not None)
     ahead = {"the fit": [p.error(joint) for p in judged]}
     ahead |= {name: [one.errors([p.log]) for p in judged] for name, one in rivals.items()}
     return JointVerdict(

@@ -10,22 +10,23 @@ from hydroid.plant.plant import Plant
 
 
 def load_plant(
-    source: str | Path,
+    source: Any,
     *,
     overrides: Mapping[str, Any] | None = None,
-    joints: Sequence[int] | None = None,
+    joints: Sequence[int | str] | None = None,
     period: float | None = None,
     payload: float = 0.0,
 ) -> Plant:
     """Read a plant.
 
     Args:
-        source: a run folder, or a folder that `Plant.save` wrote; or settings of stage hyd, a path or a
-            shipped name such as "article-hyd". Parameters that these do not fix are then nominal: as the
-            hydraulics and the arm's file have them, and 0 for dampers and springs.
-        overrides: settings to replace, by dotted key.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit drove or
-            compared, or those of the saved plant.
+        source: the result of a fit, or an `IdentifiedModel`; a run folder, or a folder that `Plant.save`
+            wrote; or settings of stage hyd, a path or a shipped name such as "article-hyd". Parameters that
+            these do not fix are then nominal: as the hydraulics and the arm's file have them, and 0 for
+            dampers and springs.
+        overrides: settings to replace in what is read, by dotted key.
+        joints: numbers, from 1, or names of the joints that take commands; by default those that the fit
+            drove or compared, or those of the saved plant.
         period: how long one command is held [s].
         payload: mass in the gripper [kg].
 
@@ -33,7 +34,9 @@ def load_plant(
         RunError: the folder holds no estimate.
         SettingsError: what `Plant` refuses, a file that cannot be read, or nominal parameters of stage mech.
     """
-    if Path(source).is_dir():
+    if not isinstance(source, str | Path):
+        identified = getattr(source, "model", source)
+    elif Path(source).is_dir():
         identified = load_identified(source, overrides=overrides)
     else:
         identified = load_identified(None, source, overrides, nominal=True)

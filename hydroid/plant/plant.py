@@ -1,6 +1,6 @@
 """One candidate of a fit, stepped command by command."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -32,10 +32,10 @@ class Plant:
 
     Args:
         identified: settings and parameters.
-        joints: numbers, from 1, of the joints that take commands; by default those that the fit drove or
-            compared, and without a fit those that the settings compare. With `other_joints: passive` in the
-            settings all others move under their springs and dampers; otherwise they are locked where `reset`
-            puts them.
+        joints: numbers, from 1, or names of the joints that take commands; by default those that the fit
+            drove or compared, and without a fit those that the settings compare. With `other_joints: passive`
+            in the settings all others move under their springs and dampers; otherwise they are locked where
+            `reset` puts them.
         period: how long one command is held [s], a multiple of MuJoCo's step; by default the logs' period.
         payload: mass in the gripper [kg].
 
@@ -54,17 +54,21 @@ class Plant:
         self,
         identified: IdentifiedModel,
         *,
-        joints: Sequence[int] | None = None,
+        joints: Sequence[int | str] | None = None,
         period: float | None = None,
         payload: float = 0.0,
     ) -> None:
         settings = identified.settings
         arm = settings.arm
         fitted = () if identified.summary is None else identified.summary.joints
-        self.identified, self.joints = identified, tuple(sorted(set(joints or fitted or settings.outputs)))
-        self._active = np.isin(np.arange(1, 1 + len(arm.joints)), self.joints)
-        if np.sum(self._active) < len(self.joints):
-            raise SettingsError(f"the arm has joints 1 to {len(arm.joints)}", where=f"joints {self.joints}")
+        self.identified, numbers = identified, range(1, 1 + len(arm.joints))
+        wanted = set(joints or fitted or settings.outputs)
+        pairs = list(zip(numbers, arm.joint_names, strict=True))
+        self.joints = tuple(number for number, name in pairs if wanted & {number, name})
+        self._active = np.isin(numbers, self.joints)
+        if stray := wanted.difference(numbers, arm.joint_names):
+            what = f"the arm has joints 1 to {len(arm.joints)}: {', '.join(arm.joint_names)}"
+            raise SettingsError(what, where=f"joints {[*stray]}")
         moving = self._active | (settings.simulation.other_joints == "passive")
         self._moving = [name for name, moves in zip(arm.joint_names, moving, strict=True) if moves]
         self.timestep = settings.log.period_s / settings.simulation.steps
@@ -154,11 +158,12 @@ class Plant:
         self._taken = 0
         return self.angle
 
-    def step(self, command: ArrayLike) -> Array:
+    def step(self, command: ArrayLike | Mapping[str, float]) -> Array:
         """Hold a command for one period.
 
         Args:
-            command: [%], shape (J,), cut to [-100, 100]; of joints that take none it must be 0.
+            command: [%], shape (J,), or by the joints' names, others 0; cut to [-100, 100]. It must be 0 of
+                joints that take none.
 
         Returns:
             The joint angles [rad], shape (J,).
@@ -167,11 +172,16 @@ class Plant:
             ValueError: not J finite commands, or one for a joint that takes none.
             RunError: the simulation diverged.
         """
+        if isinstance(command, Mapping):
+            if stray := command.keys() - set(self.names):
+                raise ValueError(f"no joint {', '.join(stray)}; the arm has {', '.join(self.names)}")
+            command = [command.get(name, 0.0) for name in self.names]
         given = np.asarray(command, float)
         if given.shape != self._active.shape or not np.isfinite(given).all():
             raise ValueError(f"a command needs {len(self._active)} finite numbers [%], not {command}")
         if given[self._idle].any():
-            raise ValueError(f"only joints {self.joints} take commands: name the others in joints=")
+            names = ", ".join(self.names[joint - 1] for joint in self.joints)
+            raise ValueError(f"only {names} take commands: name the others in joints=")
         self.data.ctrl[:] = given[self._columns].clip(-100.0, 100.0)
         with quiet_mujoco():
             self._advance(self.data.ctrl)

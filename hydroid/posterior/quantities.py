@@ -50,13 +50,13 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     positive = np.array([column.positive for column in columns])
     known = uncertainty.posterior.propagate(values, positive, concerned)
     ends = [(finite(low), finite(high)) for low, high in known.interval]
-    parts: dict[str, list[int]] = {}
+    parts, named = dict[str, list[int]](), problem.settings.arm.joint_names[joint - 1]
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
         parts.setdefault(columns[i].name, []).append(i)
     for part, own in parts.items():
         if known.given[own].all():
             continue
-        commands, first, name = [columns[i].command for i in own], columns[own[0]], f"joint{joint}_{part}"
+        commands, first, name = [columns[i].command for i in own], columns[own[0]], f"{named}_{part}"
         what: dict[str, Any] = {"label": first.label, "joint": joint, "unit": first.unit}
         if first.command is None:
             value, sd = float(known.value[own[0]]), finite(known.sd[own[0]])

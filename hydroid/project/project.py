@@ -17,8 +17,7 @@ from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, arm_text
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.project.sizes import JointSize, joint_sizes
-from hydroid.reporting.arm_chart import arm_chart
-from hydroid.reporting.figure import rendered
+from hydroid.reporting.arm_chart import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
@@ -100,7 +99,7 @@ def write_project(
         if imported is not None:
             arm = _write_arm(stage, imported, title, arm.joint_names, sizes)
         caption = f"{arm.name}, near to 0: does it look and turn like your arm?"
-        write_atomic(stage / PICTURE, rendered(arm_chart(arm), caption)[0])
+        write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)

@@ -5,11 +5,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
 from hydroid.parameters import Array
-from hydroid.reporting.chart import SERIES, ZERO, Chart, Color, Mark, Panel, joined
+from hydroid.reporting.chart import SERIES
+from hydroid.reporting.figure import SHADES, legend, saved, style
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
 from hydroid.settings.linkage import LinearActuator
@@ -20,8 +23,8 @@ ACROSS = 0.7
 """part of an axis's direction that points out of the picture, from which on its sense of rotation is named"""
 
 
-def arm_chart(arm: Arm) -> Chart:
-    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest to it.
+def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
+    """Draw an arm with all joints at 0, or at the ends of their ranges that are nearest to it; PNG and SVG.
 
     Raises:
         ModelError: its model cannot be read.
@@ -32,56 +35,54 @@ def arm_chart(arm: Arm) -> Chart:
     mujoco.mj_forward(model, data)
     (poses,) = body_poses(model, angles[None])
     outlines = [Shape(shape.body, shape.placed(poses)) for shape in shapes(model)]
-    panels = [_view(arm, data, outlines, poses, name) for name in VIEWS]
-    lengths, moments = list[Mark](), [ZERO]
-    for joint, color in zip(arm.joints, _colors(arm), strict=True):
-        if isinstance(joint.actuator, LinearActuator):
-            angle = np.linspace(*joint.range, 181)
-            for marks, value in ((lengths, joint.actuator.length), (moments, joint.actuator.moment_arm)):
-                marks.append(Mark("line", angle, value(np.radians(angle)), color=color, label=joint.name))
-    if lengths:
-        x = "joint angle [deg]"
-        panels.append(Panel(x, "pivot to pivot [m]", tuple(lengths), "lengths of the cylinders"))
-        panels.append(Panel(x, "moment arm [m]", tuple(moments), "moment arms, 0 at a dead centre"))
-    return Chart(tuple(panels), columns=2)
+    linear = [one.actuator if isinstance(one.actuator, LinearActuator) else None for one in arm.joints]
+    cylinders = any(linear)
+    with style():
+        drawing = Figure((7.2, 7.5 if cylinders else 4.4), layout="constrained")
+        axes: Any = drawing.subplots(2 if cylinders else 1, 2, squeeze=False)
+        for one, name in zip(axes[0], VIEWS, strict=True):
+            _view(one, arm, data, outlines, poses, name)
+        for number, (joint, linkage) in enumerate(zip(arm.joints, linear, strict=True)):
+            if linkage is not None:
+                angle, look = np.linspace(*joint.range, 181), {"color": _color(number), "label": joint.name}
+                axes[1, 0].plot(angle, linkage.length(np.radians(angle)), **look)
+                axes[1, 1].plot(angle, linkage.moment_arm(np.radians(angle)), **look)
+        if cylinders:
+            x = "joint angle [deg]"
+            axes[1, 0].set(xlabel=x, ylabel="pivot to pivot [m]", title="lengths of the cylinders")
+            axes[1, 1].set(xlabel=x, ylabel="moment arm [m]", title="moment arms, 0 at a dead centre")
+            axes[1, 1].axhline(0.0, color="grey", lw=1)
+        legend(drawing)
+        return saved(drawing, title)
 
 
-def _view(arm: Arm, data: mujoco.MjData, outlines: Sequence[Shape], poses: Array, name: str) -> Panel:
+def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Array, name: str) -> None:
     """Draw links, joints' axes and pivots in one of the VIEWS; the outlines' corners are in the world."""
     elevation, upwards = VIEWS[name]
     *across, ahead = sight(90.0, elevation)
-    model, marks = data.model, list[Mark]()
-
-    def draw(kind: Any, at: Array, color: Color = "ink", **look: Any) -> None:
-        marks.append(Mark(kind, *(at @ np.transpose(across)).T, color=color, **look))
-
+    model, onto = data.model, np.transpose(across)
     moved_by = model.body_jntadr[model.body_weldid].tolist()
-    looks = {-1: ("grey", "")} | dict(enumerate(zip(_colors(arm), arm.joint_names, strict=True)))
-    for number, (color, label) in looks.items():
-        seen = [s.corners @ np.transpose(across) for s in outlines if moved_by[s.body] == number]
-        if seen:
-            around = joined(map(_outline, seen))
-            marks.append(Mark("area", *around, color=color, label=label, alpha=0.45))
-            marks.append(Mark("line", *around, color=color, width=1))
+    for shape in outlines:
+        joint = moved_by[shape.body]
+        color, label = ("grey", None) if joint < 0 else (_color(joint), arm.joint_names[joint])
+        axes.fill(*_outline(shape.corners @ onto).T, fc=color, ec=color, alpha=0.45, label=label)
     for child, joint in zip(model.jnt_bodyid.tolist(), arm.joints, strict=True):
         if isinstance(joint.actuator, LinearActuator) and joint.actuator.pivots is not None:
             bodies = [model.body_parentid[child], child]
             ends = placed(np.array(joint.actuator.pivots)[:, None], poses[bodies])[:, 0]
-            draw("line", ends, width=3)
-            draw("points", ends, width=4)
+            axes.plot(*(ends @ onto).T, "o-", color="black", lw=3, ms=4)
     size = 0.12 * float(np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1)
-    texts: list[str] = []
     for joint, at, axis in zip(arm.joints, data.xanchor, data.xaxis, strict=True):
         sense = "counter-clockwise" if axis @ ahead < 0 else "clockwise"
-        texts.append(f"{joint.name}: + turns {sense}" if abs(axis @ ahead) > ACROSS else joint.name)
-        draw("line", np.array([at - size * axis, at + size * axis]), width=1)
-        draw("points", at[None] + size * axis, look="diamond", width=6)
-    draw("text", data.xanchor, texts=tuple(texts))
-    return Panel("x [m]", upwards, tuple(marks), name, 260, equal=True)
+        text = f"{joint.name}: + turns {sense}" if abs(axis @ ahead) > ACROSS else joint.name
+        axes.plot(*(np.array([at - size * axis, at + size * axis]) @ onto).T, "D-", color="black", lw=1, ms=4)
+        axes.annotate(text, at @ onto, rotation=30, fontsize=7).set_in_layout(False)
+    axes.set(title=name, xlabel="x [m]", ylabel=upwards)
+    axes.set_aspect("equal", adjustable="datalim")
 
 
-def _colors(arm: Arm) -> list[Color]:
-    return [SERIES[i % len(SERIES)] for i in range(len(arm.joints))]
+def _color(joint: int) -> str:
+    return SHADES[SERIES[joint % len(SERIES)]]
 
 
 def _outline(points: Array) -> Array:

@@ -26,29 +26,24 @@ class Mark:
 
     Attributes:
         kind: `line` or `step` through (x, y), with gaps at NaN; `points`; `band` from y to `end`; `spans`,
-            from x to `end` over the whole height; `rule` at a value y,
-            or at a value x where y is empty; `area` inside polygons that NaN separates; `text` at points.
+            from x to `end` over the whole height; `rule` at a value y.
         x, y, end: as the kind says, shapes (n,).
         color: its name.
         label: in the legend; marks with one label are shown and hidden together. Empty: not in the legend.
         width: of a line, or the size of a point [px].
-        look: dash of a line, or shape of a point.
         off: it is hidden until the reader asks for it. Files leave it out.
         alpha: opacity.
-        texts: what a `text` says at each of its points.
     """
 
-    kind: Literal["line", "step", "points", "band", "spans", "rule", "area", "text"]
+    kind: Literal["line", "step", "points", "band", "spans", "rule"]
     x: Array = field(default_factory=_none)
     y: Array = field(default_factory=_none)
     end: Array = field(default_factory=_none)
     color: Color = "blue"
     label: str = ""
     width: float = 1.6
-    look: str = ""
     off: bool = False
     alpha: float = 1.0
-    texts: tuple[str, ...] = ()
 
     def thinned(self, bins: int) -> "Mark":
         """Return a curve by the lowest and the highest sample of each of at most `bins` parts.
@@ -77,9 +72,8 @@ class Panel:
         marks: in the order in which they are drawn.
         title: above the panel.
         height: in the page [px].
-        x_limits, y_limits: of the axes; None: around all that is drawn.
+        y_limits: of the axis; None: around all that is drawn.
         log_y: whether the y axis is logarithmic.
-        equal: whether a unit is as long on both axes.
     """
 
     x: str
@@ -87,15 +81,13 @@ class Panel:
     marks: tuple[Mark, ...]
     title: str = ""
     height: int = 220
-    x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
     log_y: bool = False
-    equal: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Panels that belong together.
+    """Panels that belong together, with one legend.
 
     Attributes:
         panels: row by row.
@@ -108,12 +100,6 @@ class Chart:
     columns: int = 1
     linked: bool = False
     bins: int = 1000
-
-    @property
-    def apart(self) -> bool:
-        """Whether each panel needs a legend of its own, because two have different labels."""
-        labels = [{m.label for m in p.marks if m.label} for p in self.panels]
-        return not self.linked and any(a - b and b - a for a in labels for b in labels)
 
     def thinned(self) -> "Chart":
         """Return the chart with what is drawn of its curves."""
@@ -135,12 +121,3 @@ def joined(curves: Iterable[Array]) -> tuple[Array, Array]:
 def finite(values: Array) -> Array:
     """Return values with NaN for infinite ones, which a line leaves out."""
     return np.where(np.isfinite(values), values, np.nan)
-
-
-def value_axis(values: Array) -> tuple[tuple[float, float] | None, bool]:
-    """Return limits and whether an axis is logarithmic: where positive values span more than a decade."""
-    known = values[np.isfinite(values)]
-    if not known.size or (known.min() > 0 and known.max() > 10 * known.min()):
-        return None, bool(known.size)
-    top = 1.05 * float(known.max()) if known.max() > 0 else 1.0
-    return (min(0.0, 1.05 * float(known.min())), top), False

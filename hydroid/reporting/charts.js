@@ -35,22 +35,18 @@
   function addMark(figure, mark, shown) {
     const paint = color(mark.color), alpha = mark.alpha;
     const x = numbers(mark.x), y = numbers(mark.y), end = numbers(mark.end);
-    const line = { line_color: paint, line_alpha: alpha, line_width: mark.width, line_dash: mark.look || "solid" };
+    const line = { line_color: paint, line_alpha: alpha, line_width: mark.width };
     let made = [];
     if (mark.kind === "line") made = [figure.line({ x, y, ...line })];
     else if (mark.kind === "step") made = [figure.step({ x, y, mode: "after", ...line })];
     else if (mark.kind === "points")
-      made = [figure.scatter({ x, y, marker: mark.look || "circle", size: mark.width, fill_color: paint,
+      made = [figure.scatter({ x, y, marker: "circle", size: mark.width, fill_color: paint,
         fill_alpha: alpha, line_color: color("paper") })];
     else if (mark.kind === "band")
       made = [figure.varea({ x, y1: y, y2: end, fill_color: paint, fill_alpha: alpha })];
-    else if (mark.kind === "area")
-      made = [figure.patch({ x, y, fill_color: paint, fill_alpha: alpha, line_color: null })];
-    else if (mark.kind === "text")
-      made = [figure.text({ x, y, text: mark.texts, text_color: paint, text_font_size: "12px", x_offset: 4, y_offset: -4, angle: Math.PI / 6 })];
     else {
       const models = mark.kind === "rule"
-        ? (y.length ? y : x).map((at) => new Bokeh.Span({ location: at, dimension: y.length ? "width" : "height", level: "underlay", ...line }))
+        ? y.map((at) => new Bokeh.Span({ location: at, dimension: "width", level: "underlay", ...line }))
         : x.map((low, i) => new Bokeh.BoxAnnotation({ left: low, right: end[i], fill_color: paint, fill_alpha: alpha, line_color: null, level: "underlay" }));
       models.forEach((model) => figure.add_layout(model));
       made = models;
@@ -76,15 +72,8 @@
   }
 
   function addPanel(panel, shared, shown, width) {
-    const xs = panel.x_limits ?? extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
+    const xs = extent(panel, "x", shown), ys = panel.y_limits ?? extent(panel, "y", shown);
     const x_range = shared ?? new Bokeh.Range1d({ start: xs[0], end: xs[1] });
-    if (panel.equal) { // a unit is as long on both axes
-      const scale = Math.max((xs[1] - xs[0]) / (width - 90), (ys[1] - ys[0]) / (panel.height - 60));
-      for (const [ends, size] of [[xs, width - 90], [ys, panel.height - 60]]) {
-        const room = (scale * size - (ends[1] - ends[0])) / 2;
-        ends[0] -= room; ends[1] += room;
-      }
-    }
     const y_range = new Bokeh.Range1d({ start: ys[0], end: ys[1] });
     const figure = Bokeh.Plotting.figure({
       output_backend: "svg", // sharp on paper too
@@ -114,7 +103,7 @@
       const one = addPanel(panel, shared, shown, each);
       if (chart.linked) {
         if (!shared) {
-          const all = chart.panels.map((p) => p.x_limits ?? extent(p, "x", shown));
+          const all = chart.panels.map((p) => extent(p, "x", shown));
           one.home = [Math.min(...all.map((e) => e[0])), Math.max(...all.map((e) => e[1]))];
           one.x_range.setv({ start: one.home[0], end: one.home[1] });
         }
@@ -131,11 +120,6 @@
         title.className = "title";
         title.textContent = one.panel.title;
       }
-      if (chart.apart) {
-        const keys = cell.appendChild(document.createElement("div"));
-        keys.className = "controls";
-        keys.append(...legend([one], shown));
-      }
       return cell.appendChild(element);
     });
     const width = elements[0].clientWidth;
@@ -146,7 +130,7 @@
     drawn.set(host, { document: bokeh, panels, shown, chart });
     host.classList.toggle("drawn-dark", dark.matches);
     host.querySelector(":scope > .controls").replaceChildren(
-      ...(chart.apart ? [] : legend(panels, shown)), ...(host.dataset.zoom ? [zoomButtons(panels)] : []));
+      ...legend(panels, shown), ...(host.dataset.zoom ? [zoomButtons(panels)] : []));
   }
 
   // one button per label, that shows or hides its marks in some panels
@@ -157,7 +141,7 @@
       button.type = "button";
       button.className = "key";
       button.setAttribute("aria-pressed", shown.get(mark.label));
-      sign.className = `sign ${mark.kind} ${mark.look}`;
+      sign.className = `sign ${mark.kind}`;
       sign.style.setProperty("--paint", `var(--${mark.color})`);
       sign.style.opacity = ["band", "spans"].includes(mark.kind) ? Math.max(mark.alpha, 0.35) : mark.alpha;
       button.append(sign, mark.label);

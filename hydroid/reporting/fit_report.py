@@ -3,7 +3,6 @@
 import shlex
 from collections.abc import Collection
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,17 @@ from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting import page_file
-from hydroid.reporting.objectives import learning, pareto
-from hydroid.reporting.page import Page, Plot, Section
-from hydroid.reporting.parameters_report import parameter_section
+from hydroid.reporting.page import Page, Section
+from hydroid.reporting.parameters_report import (
+    direction_section,
+    parameter_section,
+    unknown_section,
+    warnings,
+)
 from hydroid.reporting.predictions import prediction_sections
 from hydroid.reporting.quantities_report import quantity_section, speed_section
+from hydroid.reporting.search_report import search_section
 from hydroid.reporting.table import numbers_csv
-from hydroid.reporting.uncertainty_report import direction_section, unknown_section, warnings
 from hydroid.reporting.verdict_table import lead, verdict_section
 from hydroid.run.record import Record, load_record
 from hydroid.settings.fit import FitSettings
@@ -45,28 +48,25 @@ def draw(run: str | Path, without: Collection[str] = (), *, figures: bool = Fals
 def fit_page(record: Record) -> Page:
     """Return the page of a fit, with the unseen logs that it was validated on."""
     settings, summary, result = record.settings, record.summary, record.result
-    unseen = [*record.validations.values()]
-    fits = {str(summary.final): judge(settings, result.fitted, result.baselines, unseen)}
+    final, unseen = str(summary.final), [*record.validations.values()]
+    fits = {final: judge(settings, result.fitted, result.baselines, unseen)}
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
-    predictions = [replace(p, fit=str(summary.final)) for p in record.predictions]
-    folded = (
-        parameter_section(settings, summary),
-        *speed_section(settings, summary, [p.log for p in result.fitted]),
-        *direction_section(summary),
-        _search(record),
-        Section("Reproduce", facts=(("command", _command(record)),)),
-    )
+    predictions = [replace(p, fit=final) for p in (*unseen, *result.fitted)]
     sections = (
         verdict_section(fits),
         *prediction_sections(predictions, settings.arm, fits),
         *quantity_section(settings, summary),
         unknown_section(summary),
         Section("Do next", steps=_steps(record)),
-        *(replace(section, folded=True) for section in folded),
+        parameter_section(settings, summary),
+        *speed_section(settings, summary, [p.log for p in result.fitted]),
+        *direction_section(summary),
+        search_section(record),
     )
+    in_order = sorted(sections, key=lambda section: section.folded)
     title = f"Fit of {settings.arm.name}, stage {2 if settings.stage == 'hyd' else 1}"
     made_by = {k: str(v) for k, v in record.identity.items() if k in ("hydroid", "mujoco", "numpy", "python")}
-    return Page("report", title, lead(fits), sections, warnings(summary), made_by, _data(record))
+    return Page("report", title, lead(fits), tuple(in_order), warnings(summary), made_by, _data(record))
 
 
 def next_step(settings: FitSettings, logs: str, run: str) -> Finding:
@@ -79,43 +79,17 @@ def next_step(settings: FitSettings, logs: str, run: str) -> Finding:
 
 
 def _steps(record: Record) -> tuple[Finding, ...]:
-    """Return what to do next, the first things first."""
-    findings = list[Finding]()
-    if record.settings.stage == "mech" or not record.validations:
-        findings.append(next_step(record.settings, record.given, record.folder))
-    command = {"command": f"hydroid suggest {record.given} --fit {shlex.quote(record.folder)}"}
-    return (*findings, Finding("look for terms", "note", (), command))
-
-
-def _search(record: Record) -> Section:
-    """How the search went: its learning curve, the Pareto set, and what each refinement took."""
-    result, objective = record.result, record.settings.objective
-    facts: list[tuple[str, str]] = []
-    if len(result.history):
-        _, candidates, simulated, diverged = (f"{int(v):,}" for v in result.history[-1, :4])
-        tried = f"{candidates} candidates, of which {simulated} were simulated and {diverged} diverged"
-        facts.append((record.settings.search.algorithm, tried))
-    facts += [
-        (one.name, f"{one.iterations} iterations, {one.simulations:,} simulations; {one.ending}")
-        for one in result.refinements
-    ]
-    names = dict.fromkeys([str(record.summary.final), *result.segments])
-    segments = {name: result.segments[name] for name in names}
-    plots = (
-        Plot("learning", "Best candidate so far.", partial(learning, result.history, objective)),
-        Plot(
-            "pareto",
-            "The Pareto set: lower fits that segment better.",
-            partial(pareto, result.front[1], segments, objective),
-        ),
-    )
-    return Section("How the search went", facts=tuple(facts), plots=plots)
-
-
-def _command(record: Record) -> str:
-    """Return the command that makes the fit again."""
-    config, again = (shlex.quote(f"{record.folder}{end}") for end in ("/config.yaml", "-again"))
-    return f"hydroid fit-{record.settings.stage} {record.given} --config {config} --out {again}"
+    """Return what to do next, the first things first, and how to make the fit again."""
+    findings, settings, logs = list[Finding](), record.settings, record.given
+    if settings.stage == "mech" or not record.validations:
+        findings.append(next_step(settings, logs, record.folder))
+    run, config, again = (shlex.quote(f"{record.folder}{end}") for end in ("", "/config.yaml", "-again"))
+    commands = {
+        "look for terms": f"hydroid suggest {logs} --fit {run}",
+        "fit again": f"hydroid fit-{settings.stage} {logs} --config {config} --out {again}",
+    }
+    more = (Finding(kind, "note", (), {"command": command}) for kind, command in commands.items())
+    return (*findings, *more)
 
 
 def _data(record: Record) -> dict[str, str]:

@@ -61,7 +61,7 @@ def motion_section(arm: Arm, predictions: Mapping[str, Prediction]) -> tuple[Sec
         return ()
     draw = partial(moving_arm, load_model(arm).compile(), arm.joint_names, most=MOST // len(finite))
     plots = (Plot(f"motion_{i}", name, partial(draw, one)) for i, (name, one) in enumerate(finite, 1))
-    return (Section("The arm in motion", _CAPTION, tabs=tuple(Tab(p.caption, (p,)) for p in plots)),)
+    return (Section("The arm in motion", _CAPTION, tabs=tuple(Tab(p.caption, p) for p in plots)),)
 
 
 def moving_arm(

@@ -1,4 +1,4 @@
-"""A report as data: sections of text, tables, bars and charts; `page_file` writes it."""
+"""A report as data: sections of text, tables, charts and steps; `page_file` writes it."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,8 +9,6 @@ from typing import Any
 from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.reporting.table import Table
-
-_LONGEST_NAME = 40
 
 
 @dataclass(frozen=True)
@@ -35,62 +33,29 @@ class Tab:
     """
 
     name: str
-    plots: tuple[Plot, ...]
+    plot: Plot
     row: str = ""
     column: str = ""
     state: str = ""
 
 
 @dataclass(frozen=True)
-class Bar:
-    """One parameter on a bar from its lower to its upper bound; positions are parts of the bar, 0 to 1.
-
-    Attributes:
-        symbol, name: short, and in plain words.
-        value, interval: in words, with the unit.
-        ends: the bounds in words.
-        note: what is to be known about it.
-        at: position of the value.
-        band: ends of its 95 % interval.
-        prior: ends of the interval that its prior gives.
-    """
-
-    symbol: str
-    name: str
-    value: str
-    interval: str
-    ends: tuple[str, str]
-    note: str
-    at: float
-    band: tuple[float, float] | None
-    prior: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
 class Section:
-    """A heading with text, points to note, facts, tables by file name, bars and figures.
+    """A heading with text, points to note, tables by file name, and figures; folded sections open on demand.
 
     `steps` are findings that say what to do and what it would bring; their number `command` does it. `cards`
-    are small tables side by side, `more` those that are shown on demand. All of a `folded` section is.
+    are small tables side by side.
     """
 
     title: str
     text: str = ""
     points: tuple[str, ...] = ()
-    facts: tuple[tuple[str, str], ...] = ()
     tables: Mapping[str, Table] = field(default_factory=dict[str, Table])
     cards: Mapping[str, Table] = field(default_factory=dict[str, Table])
     plots: tuple[Plot, ...] = ()
     tabs: tuple[Tab, ...] = ()
-    bars: tuple[Bar, ...] = ()
     steps: tuple[Finding, ...] = ()
-    more: Mapping[str, Table] = field(default_factory=dict[str, Table])
     folded: bool = False
-
-    @property
-    def columns(self) -> list[str]:
-        """Of its tabs' buttons."""
-        return list(dict.fromkeys(tab.column for tab in self.tabs if tab.column))
 
 
 @dataclass(frozen=True)
@@ -119,14 +84,12 @@ class Page:
     def plots(self) -> Iterator[Plot]:
         """All figures."""
         for section in self.sections:
-            yield from section.plots
-            for tab in section.tabs:
-                yield from tab.plots
+            yield from (*section.plots, *(tab.plot for tab in section.tabs))
 
     @property
     def tables(self) -> dict[str, Table]:
         """All tables by file name."""
-        return {n: t for s in self.sections for n, t in {**s.tables, **s.cards, **s.more}.items()}
+        return {name: table for s in self.sections for name, table in {**s.tables, **s.cards}.items()}
 
 
 def log_names(logs: Sequence[Log]) -> list[str]:
@@ -144,7 +107,6 @@ def unique(name: str, taken: Collection[str]) -> str:
 
 
 def short_name(name: str) -> str:
-    """Return a name with unprintable characters replaced and the middle of a long one left out."""
+    """Return a name with unprintable characters replaced and the middle of one over 40 letters left out."""
     text = "".join(c if c.isprintable() else "?" for c in name)
-    half = _LONGEST_NAME // 2
-    return text if len(text) <= _LONGEST_NAME else f"{text[: half - 1]}…{text[-half:]}"
+    return text if len(text) <= 40 else f"{text[:19]}…{text[-20:]}"

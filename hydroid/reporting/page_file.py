@@ -52,12 +52,14 @@ def write_figures(page: Page, out: Path) -> list[Path]:
     Raises:
         RunError: the folder cannot be written.
     """
-    from hydroid.reporting.figure import rendered
+    from hydroid.reporting.figure import figure, saved, style
 
     written: list[Path] = []
     for plot in page.plots:
         if isinstance(drawing := plot.draw(), Chart):
-            for ending, image in zip(("png", "svg"), rendered(drawing), strict=True):
+            with style():
+                images = saved(figure(drawing))
+            for ending, image in zip(("png", "svg"), images, strict=True):
                 written.append(out / f"{plot.name}.{ending}")
                 write_atomic(written[-1], image)
     return written
@@ -67,7 +69,7 @@ def plain(drawn: Any) -> Any:
     """Return what JSON has of a drawing or a part of it: numbers have five digits; null is not finite."""
     match drawn:
         case Chart():
-            return vars(drawn.thinned()) | {"apart": drawn.apart}
+            return vars(drawn.thinned())
         case np.ndarray() if drawn.ndim == 1:
             return [float(f"{v:.5g}") if math.isfinite(v) else None for v in drawn.tolist()]
         case np.ndarray():

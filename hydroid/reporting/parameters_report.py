@@ -1,62 +1,68 @@
-"""Parameters between their bounds, as bars and as a table."""
+"""What the logs determine: the parameters, the directions of the posterior, and what a reader must know."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from hydroid.estimate import FitSummary, ParameterEstimate
+from hydroid.estimate import Covariance, FitSummary, ParameterEstimate
 from hydroid.parameters import Parameter
 from hydroid.posterior.flags import Flag, Source
-from hydroid.posterior.posterior import NORMAL
 from hydroid.quantity_table import CHOICES
-from hydroid.reporting.page import Bar, Section
-from hydroid.reporting.table import Cell, Given, Table
+from hydroid.reporting.page import Section
+from hydroid.reporting.table import Given, Table
 from hydroid.settings.fit import FitSettings
-from hydroid.words import number, plain
+from hydroid.words import number
 
 Intervals = Mapping[str, tuple[float, float]]
 
 
-def parameter_section(
-    settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None
-) -> Section:
-    """Return the section with all parameters that the fit estimates as bars, and with all in its table.
+def parameter_section(settings: FitSettings, summary: FitSummary) -> Section:
+    """Return the section with the table of all parameters."""
+    text, free = "", {p.quantity for p in settings.parameters.values() if p.fixed is None}
+    if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:
+        supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
+        text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar."
+    return Section("Parameters", text, tables={"parameters": parameter_table(settings, summary)}, folded=True)
+
+
+def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
+    """Return one row per parameter: bounds, estimate, intervals, share of the data, effect, flag.
 
     `profiles` are further intervals by parameter.
     """
-    text = "Bar: from bound to bound. Orange: the estimate and its 95 % interval. Grey: its prior."
-    free = {p.quantity for p in settings.parameters.values() if p.fixed is None}
-    if settings.stage == "hyd" and "supply_pressure" not in free and not settings.objective.pressure_weight:
-        supply = number(settings.hydraulics.supply_pressure)  # without pressures in the log only p A is known
-        text = f"Areas, masses, torques and flows hold for the given supply of {supply} bar. {text}"
-    bars = tuple(
-        _bar(settings, p, summary.estimate[p.name])
-        for p in settings.parameter_set().parameters
-        if p.lower < p.upper and summary.estimate[p.name].flag != Flag.FIXED
+
+    def row(p: Parameter) -> dict[str, Any]:
+        one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
+        low, high = map(Given, given) if given else (p.lower, p.upper)
+        ends = {"": one.interval, "by log ": one.interval_by_log}
+        ends["profile "] = (profiles or {}).get(p.name, (None, None))
+        return {
+            "name": p.name,
+            "what": _plain_name(settings, p.name),
+            "unit": p.unit,
+            "value": one.value,
+            **({"lower": low, "upper": high} if low < high else {}),
+            **{
+                f"{of}{end}": v
+                for of, pair in ends.items()
+                for end, v in zip(("from", "to"), pair, strict=True)
+            },
+            "data [%]": None if one.data_share is None else 100 * one.data_share,
+            "effect [deg]": one.effect_deg,
+            "flag": status(one),
+        }
+
+    by_log = ("by log from", "by log to") if summary.left_out_deg else ()
+    columns = ["name", "what", "unit", "lower", "upper", "value", "from", "to", *by_log]
+    columns += [*(("profile from", "profile to") if profiles else ()), "data [%]", "effect [deg]", "flag"]
+    note = (
+        "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. effect: rms "
+        "change of the angles per 1 % of the parameter. by log: from the differences between logs."
     )
-    tables = {"parameters": parameter_table(settings, summary, profiles)}
-    return Section("Parameters", text, bars=bars, more=tables)
-
-
-def _bar(settings: FitSettings, parameter: Parameter, estimate: ParameterEstimate) -> Bar:
-    low, high, prior = parameter.lower, parameter.upper, parameter.prior
-
-    def place(value: float) -> float:
-        return float(parameter.position(np.clip(value, low, high)))
-
-    ends = [end for end in estimate.interval if end is not None]
-    known = len(ends) == 2
-    return Bar(
-        parameter.name,
-        _plain_name(settings, parameter.name),
-        f"{number(estimate.value)} {parameter.unit}".rstrip(),
-        " to ".join(map(number, ends)) if known else "",
-        (plain(float(f"{low:.3g}")), plain(float(f"{high:.3g}"))),
-        status(estimate),
-        place(estimate.value),
-        (place(ends[0]), place(ends[1])) if known else None,
-        None if prior is None else (place(prior.value(-NORMAL)), place(prior.value(NORMAL))),
-    )
+    optional = ("what", *by_log, "effect [deg]", "data [%]", "lower", "upper")
+    rows = map(row, settings.parameter_set().parameters)
+    return Table.of("Parameters", {name: name for name in columns}, rows, note, optional)
 
 
 def _plain_name(settings: FitSettings, parameter: str) -> str:
@@ -80,33 +86,35 @@ def status(estimate: ParameterEstimate) -> str:
     return ", ".join(filter(None, words))
 
 
-def parameter_table(settings: FitSettings, summary: FitSummary, profiles: Intervals | None = None) -> Table:
-    """Return one row per parameter: bounds, estimate, intervals, share of the data, effect, flag."""
-    several = bool(summary.left_out_deg)
+def warnings(summary: FitSummary) -> tuple[str, ...]:
+    """Return what must be read before any use of the estimate, at most three things."""
+    return tuple(str(finding) for finding in summary.findings if finding.level != "note")[:3]
 
-    def row(p: Parameter) -> dict[str, Cell]:
-        one, given = summary.estimate[p.name], settings.parameters[p.name].bounds
-        bounds = (Given(given[0]), Given(given[1])) if given else (p.lower, p.upper)
-        low, high = bounds if bounds[0] < bounds[1] else (None, None)
-        cells: dict[str, Cell] = {
-            "name": p.name,
-            "unit": p.unit,
-            "lower": low,
-            "upper": high,
-            "value": one.value,
-        }
-        intervals = {"": one.interval} | ({"by log ": one.interval_by_log} if several else {})
-        intervals |= {"profile ": profiles.get(p.name, (None, None))} if profiles else {}
-        for of, (start, end) in intervals.items():
-            cells |= {f"{of}from": start, f"{of}to": end}
-        share = None if one.data_share is None else 100 * one.data_share
-        return cells | {"data [%]": share, "effect [deg]": one.effect_deg, "flag": status(one)}
 
-    note = (
-        "from, to: 95 % interval; empty: no limit. data: share of the information from the logs. effect: rms "
-        "change of the angles per 1 % of the parameter."
-        f"{' by log: interval from the differences between logs.' if several else ''}"
-    )
-    by_log = ("by log from", "by log to") if several else ()
-    optional = (*by_log, "effect [deg]", "data [%]", "lower", "upper")
-    return Table.of("Parameters", map(row, settings.parameter_set().parameters), note, optional)
+def unknown_section(summary: FitSummary) -> Section:
+    """Return the section of all other findings."""
+    first, everything = warnings(summary), map(str, summary.findings)
+    points = tuple(text for text in everything if text not in first)
+    return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
+
+
+def direction_section(summary: FitSummary) -> tuple[Section, ...]:
+    """Return the section on directions; none where no parameter is free."""
+    if summary.covariance is None or not summary.covariance.parameters:
+        return ()
+    return (Section("Directions", tables={"directions": direction_table(summary.covariance)}, folded=True),)
+
+
+def direction_table(known: Covariance) -> Table:
+    """Return every direction with its standard deviation and its largest parts, best determined first."""
+    _, singular, axes = np.linalg.svd(np.array(known.root))
+    rows: list[tuple[float, str]] = []
+    for value, axis in zip(singular.tolist(), axes, strict=True):
+        order = np.argsort(-np.abs(axis), kind="stable")
+        parts = [
+            (known.parameters[i], axis[i] * np.sign(axis[order[0]])) for i in order if abs(axis[i]) >= 0.1
+        ]
+        text = ", ".join(f"{name} {part:+.2f}" for name, part in parts).replace("-", "−")
+        rows.append((100 / value if value > 0 else np.inf, text))
+    header = ("standard deviation [%]", "parameters that change together, in proportion to their values")
+    return Table("", header, tuple(rows))

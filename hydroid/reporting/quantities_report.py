@@ -1,4 +1,4 @@
-"""What the logs determine, in the words of an engineer: cards, curves of speed, and their numbers."""
+"""What the logs determine, in the words of an engineer: cards of quantities, and curves of speed."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -7,7 +7,6 @@ import numpy as np
 
 from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Plot, Section
 from hydroid.reporting.table import Table
@@ -15,16 +14,10 @@ from hydroid.settings.fit import FitSettings
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as known"""
-_MOST = 5
-"""quantities of a joint that its card shows, the best known ones"""
-_CAPTION = (
-    "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands beyond "
-    "the logs."
-)
 
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Section, ...]:
-    """Return the section with a card of the quantities that are known for each joint; none without any."""
+    """Return the section with a card of the best known quantities of each joint; none without any."""
     names, cards = settings.arm.joint_names, dict[str, Table]()
     known = sorted(
         (q for q in summary.quantities.values() if q.within <= BEST_WITHIN), key=lambda q: q.within
@@ -32,7 +25,7 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
     for joint in dict.fromkeys(q.joint for q in summary.quantities.values()):
         rows = tuple(
             (q.label, f"{q.value:.3g} {q.unit} ± {100 * q.within:.2g} %")
-            for q in [q for q in known if q.joint == joint][:_MOST]
+            for q in [q for q in known if q.joint == joint][:5]
         )
         name = "machine" if joint is None else names[joint - 1]
         if rows:
@@ -44,8 +37,12 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> tuple[Sectio
 def speed_section(settings: FitSettings, summary: FitSummary, logs: Sequence[Log]) -> tuple[Section, ...]:
     """Return the section with the curves of speed; none where there are none."""
     speeds = {name: curve for name, curve in summary.curves.items() if "_speed" in name}
-    plot = Plot("speed", _CAPTION, partial(draw_speeds, speeds, logs, settings.arm.joint_names))
-    return (Section("Speeds", plots=(plot,)),) if speeds else ()
+    text = (
+        "Speeds with 95 % intervals, against command in mid travel and over the travel. Grey: commands "
+        "beyond the logs."
+    )
+    plot = Plot("speed", text, partial(draw_speeds, speeds, logs, settings.arm.joint_names))
+    return (Section("Speeds", plots=(plot,), folded=True),) if speeds else ()
 
 
 def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints: Sequence[str]) -> Chart:
@@ -55,8 +52,10 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
         at, value, ends = np.array(curve.at), np.array(curve.value), np.array(curve.interval, dtype=float)
         whole, marks = [np.ones(len(at), dtype=bool)], list[Mark]()
         if name.endswith("_speed"):  # over commands: its two directions, with the dead band between them
-            whole, commands = [at > 0, at < 0], [log.command[:, curve.joint - 1] for log in logs]
-            marks = _logged(np.concatenate(commands))
+            commands = np.concatenate([log.command[:, curve.joint - 1] for log in logs])
+            whole, logged = [at > 0, at < 0], (commands.min(initial=0.0), commands.max(initial=0.0))
+            beyond = np.array([[-105.0, logged[1]], [logged[0], 105.0]])
+            marks = [Mark("spans", beyond[0], end=beyond[1], color="pale", alpha=0.4)]
         for part, color in zip(whole, ("blue", "orange"), strict=False):
             low, high = ends[part].T
             marks += [
@@ -67,9 +66,3 @@ def draw_speeds(curves: Mapping[str, CurveEstimate], logs: Sequence[Log], joints
         title = f"{joints[curve.joint - 1]}: {curve.label}"
         panels.append(Panel(curve.along, f"speed [{curve.unit}]", tuple(marks), title, 250))
     return Chart(tuple(panels), columns=len(panels) // len({curve.joint for curve in curves.values()}))
-
-
-def _logged(commands: Array) -> list[Mark]:
-    """Shade what lies beyond the logs' commands."""
-    ends = np.array([-105.0, commands.max(initial=0.0)]), np.array([commands.min(initial=0.0), 105.0])
-    return [Mark("spans", ends[0], end=ends[1], color="pale", alpha=0.4)]

@@ -2,12 +2,11 @@
 
 import csv
 import io
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hydroid.parameters import Array
 from hydroid.words import number, plain
@@ -16,11 +15,7 @@ if TYPE_CHECKING:
     import rich.table
 
 Cell = str | int | float | None
-"""Text, a count, a measured number, or nothing."""
-
-_UNLIMITED = 1000
-_TEXT_WIDTH = 18
-"""width below which a column of text is not squeezed while optional columns can be left out"""
+"""text, a count, a measured number, or nothing"""
 
 
 class Given(float):
@@ -47,13 +42,16 @@ class Table:
 
     @classmethod
     def of(
-        cls, title: str, rows: Iterable[Mapping[str, Cell]], note: str = "", optional: tuple[str, ...] = ()
+        cls,
+        title: str,
+        columns: Mapping[str, str],
+        rows: Iterable[Mapping[str, Any]],
+        note: str = "",
+        optional: tuple[str, ...] = (),
     ) -> "Table":
-        """Return a table of rows by column name, of which there is at least one."""
-        first, *others = rows
-        return cls(
-            title, tuple(first), tuple(tuple(row.values()) for row in (first, *others)), note, optional
-        )
+        """Return a table of rows by key; `columns` are the keys that are shown, and the columns' names."""
+        cells = tuple(tuple(row.get(key) for key in columns) for row in rows)
+        return cls(title, tuple(columns.values()), cells, note, optional)
 
     def csv(self) -> str:
         """Return header and rows with every bit of the numbers, without title and note."""
@@ -69,9 +67,9 @@ class Table:
         """
         from rich.console import Console
 
-        console, endless = Console(), Console(width=_UNLIMITED)
+        console, endless = Console(), Console(width=1000)
         limited = console.is_terminal or os.environ.get("COLUMNS", "").isdigit()
-        width = console.width if limited else _UNLIMITED
+        width = console.width if limited else endless.width
         table, needed = self._rich(()), 0
         for left_out in range(len(self.optional) + 1):
             table = self._rich(self.optional[:left_out])
@@ -80,11 +78,6 @@ class Table:
                 break
         # width and height, or rich may take 80 columns for granted
         Console(width=max(width, needed), height=1).print(table)
-
-    def records(self) -> list[dict[str, str | int | float | None]]:
-        """Return rows by column name for JSON, which has no NaN or infinity: these become None."""
-        cells = ([None if isinstance(c, float) and not math.isfinite(c) else c for c in r] for r in self.rows)
-        return [dict(zip(self.header, row, strict=True)) for row in cells]
 
     @property
     def shown(self) -> list[list[str]]:
@@ -117,7 +110,7 @@ class Table:
                 Text(name.replace(" ", "\n") if right else name),
                 justify="right" if right else "left",
                 no_wrap=right,  # rich wraps words where room is short, but never numbers
-                min_width=None if right else min(widest, _TEXT_WIDTH),
+                min_width=None if right else min(widest, 18),  # before that optional columns go
                 overflow="fold",
             )
         for row in self.shown:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.fitting.validation import Prediction
-from hydroid.parameters import Array
 from hydroid.reporting.page import Page
 from hydroid.reporting.parameters_report import status
 from hydroid.reporting.predictions import prediction_sections
@@ -14,9 +13,11 @@ from hydroid.reporting.verdict_table import Verdicts, lead, verdict_section
 from hydroid.run.record import Record
 from hydroid.settings.arm import Arm
 
+SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
+
 
 def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm) -> Page:
-    """Return the page of several fits on several logs; its tables are `verdict` and `errors`."""
+    """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
     sections = verdict_section(fits), *prediction_sections(ordered, arm, fits)
     return Page("validation", "Validation", lead(fits), sections)
@@ -29,20 +30,16 @@ def merged_tables(runs: Sequence[Record]) -> dict[str, Table]:
     names, rms = tuple(f"{p.name} [{p.unit}]" for p in parameters), [run.rms_deg for run in runs]
     theta = np.array([[run.summary.values[p.name] for p in parameters] for run in runs])
 
-    def quartiles(values: Array) -> tuple[float, ...]:
-        low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1]).tolist()
-        return median, low, q1, q3, high
-
+    columns, best = np.column_stack([theta, rms]), runs[0].summary.estimate
+    units = {p.name: p.unit for p in parameters} | {"rms output error": "deg"}
+    spread = np.quantile(columns, [0.5, 0, 0.25, 0.75, 1], axis=0).T.tolist()
     rows = [
-        (p.name, p.unit, *quartiles(values), status(runs[0].summary.estimate[p.name]))
-        for p, values in zip(parameters, theta.T, strict=True)
+        (name, unit, *row, status(best[name]) if name in best else "")
+        for (name, unit), row in zip(units.items(), spread, strict=True)
     ]
-    rows.append(("rms output error", "deg", *quartiles(np.array(rms)), ""))
-    header = ("name", "unit", "median", "lowest", "lower quartile", "upper quartile", "highest", "flag")
-    spread = Table(f"{len(runs)} runs", header, tuple(rows), optional=("lower quartile", "upper quartile"))
     each = [(run.folder, run.seed, run.rms_deg, *row) for run, row in zip(runs, theta.tolist(), strict=True)]
     header = ("run", "seed", "rms output error [deg]", *names)
     return {
-        "spread": spread,
+        "spread": Table(f"{len(runs)} runs", SPREAD, tuple(rows), optional=SPREAD[4:6]),
         "runs": Table("Runs, smallest error first", header, tuple(each), optional=names[::-1]),
     }

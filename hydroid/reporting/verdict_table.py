@@ -8,7 +8,7 @@ from hydroid.estimate import JointVerdict
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.verdict import HORIZONS
 from hydroid.reporting.page import Section, short_name
-from hydroid.reporting.table import Cell, Given, Table
+from hydroid.reporting.table import Given, Table
 from hydroid.words import listed
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
@@ -24,40 +24,44 @@ Verdicts = Mapping[str, Sequence[JointVerdict]]
 
 def verdict_table(fits: Verdicts) -> Table:
     """Return the verdicts on each joint of each fit."""
-
-    def row(fit: str, one: JointVerdict) -> dict[str, Cell]:
-        errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg}
-        errors |= {name: one.baselines_deg.get(name) for name in NAMES}
-        return {
-            **({"fit": short_name(fit)} if len(fits) > 1 else {}),
-            "joint": one.name,
-            "verdict": f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}",
-            **{name: None if error is None else Given(f"{error:.2g}") for name, error in errors.items()},
-        }
-
-    rows = (row(fit, one) for fit, verdicts in fits.items() for one in verdicts)
-    return Table.of("Verdict", rows, _NOTE, NAMES[:2])
-
-
-def horizon_table(fits: Verdicts) -> Table:
-    """Return the rms error of each angle's change over some times, of the fits and the baselines."""
+    columns = {name: name for name in ("fit", "joint", "verdict", "fitted", "unseen", *NAMES)}
     rows = (
-        {
-            "joint": one.name,
-            "of": short_name(fit) if name == "the fit" else name,
-            **{f"{seconds:g} s": error for seconds, error in zip(HORIZONS, errors, strict=True)},
+        {"fit": short_name(fit), "joint": one.name}
+        | {"verdict": f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"}
+        | {
+            name: None if error is None else Given(f"{error:.2g}")
+            for name, error in {
+                "fitted": one.fitted_deg,
+                "unseen": one.unseen_deg,
+                **one.baselines_deg,
+            }.items()
         }
         for fit, verdicts in fits.items()
         for one in verdicts
-        for name, errors in one.horizons_deg.items()
     )
-    note = "rms error [deg] of how far the angle turns in this time, from any moment of the logs on."
-    return Table.of("Error of the motion ahead", rows, note)
+    if len(fits) == 1:
+        del columns["fit"]
+    return Table.of("Verdict", columns, rows, _NOTE, NAMES[:2])
 
 
 def verdict_section(fits: Verdicts) -> Section:
     """Return the section that every page of predictions begins with."""
-    return Section("Verdict", tables={"verdict": verdict_table(fits)}, more={"horizons": horizon_table(fits)})
+    return Section("Verdict", tables={"verdict": verdict_table(fits)})
+
+
+def horizon_section(fits: Verdicts) -> Section:
+    """Return the rms error of each angle's change over some times, of the fits and the baselines."""
+    rows = (
+        {"joint": one.name, "of": short_name(fit) if name == "the fit" else name}
+        | dict(zip(map(str, HORIZONS), errors, strict=True))
+        for fit, verdicts in fits.items()
+        for one in verdicts
+        for name, errors in one.horizons_deg.items()
+    )
+    columns = {"joint": "joint", "of": "of"} | {str(seconds): f"{seconds:g} s" for seconds in HORIZONS}
+    note = "rms error [deg] of how far the angle turns in this time, from any moment of the logs on."
+    table = Table.of("Error of the motion ahead", columns, rows, note)
+    return Section(table.title, tables={"horizons": table}, folded=True)
 
 
 def ordered(fits: Verdicts) -> Verdicts:

@@ -14,12 +14,12 @@ from hydroid.run.record import Record, load_record
 _log = logging.getLogger(__name__)
 
 
-def read_runs(names: Sequence[str], out: Path) -> tuple[Record, ...]:
+def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
     """Read finished runs that differ in nothing but their seeds; those that cannot be used are left out.
 
     Args:
         names: run folders, or patterns of them, in any order.
-        out: the folder for what is to be written about them.
+        out: the folder for what is to be written about them, if anything is.
 
     Returns:
         One run for each seed, in the order of the seeds.
@@ -27,7 +27,7 @@ def read_runs(names: Sequence[str], out: Path) -> tuple[Record, ...]:
     Raises:
         RunError: no run is left, runs differ in more than their seeds, or `out` is a run itself.
     """
-    if RunFolder(out).exists:
+    if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", where=str(out), hint="name another folder")
     runs: list[Record] = []
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)

@@ -19,7 +19,7 @@ from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, ArmFile, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.load import JointNumber, Settings, validate
+from hydroid.settings.load import JointNumber, Positive, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, make_parameter, nominal_value
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
@@ -53,8 +53,9 @@ class FitSettings(Settings):
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
     outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""
-    tolerance_deg: Annotated[float, Field(gt=0)] | None = None
-    """rms error on unseen logs up to which a joint is predicted [deg]; null: 2 % of its travel there"""
+    tolerance_deg: Positive | dict[JointNumber, Positive] | None = None
+    """rms error on unseen logs up to which joints are predicted [deg], of all or by joint; null: 2 % of their
+    travel there"""
     start_pose: str = "home"
     """name of the arm's pose that joints without a measured angle hold"""
     free_start: bool = True

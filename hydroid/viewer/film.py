@@ -1,56 +1,56 @@
-"""A motion as pictures: the simulated machine, the measured one as its ghost, and the signals beside them."""
+"""A motion as pictures: the simulated machine over the measured one as its ghost."""
 
 import io
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.parameters import Array
 from hydroid.progress import Progress, no_progress
-from hydroid.reporting.outlines import body_poses, shapes, sight
+from hydroid.reporting.outlines import sight
 from hydroid.viewer.motion import Motion
-from hydroid.viewer.opengl import make_renderer
-from hydroid.viewer.panel import SignalPanel
 
 Picture = NDArray[np.uint8]
 
 KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
 """width and height of a file's pictures [px], and pictures in a second"""
-GHOST = (0.12, 0.44, 0.82, 0.42)
-"""colour and opacity of the measured machine"""
-AZIMUTH, ELEVATION, FIELD = 125.0, -18.0, 40.0
-"""where the camera looks to, and how high its picture is [deg]"""
+AZIMUTH, ELEVATION = 125.0, -18.0
+"""where a camera looks to at first [deg]"""
 
 
 class Stage:
-    """Renders a motion; it is a context.
+    """Renders a motion by MuJoCo's renderer; it is a context.
 
     Args:
         motion: what moves.
-        size: of a whole picture [px].
-        panel: whether the signals stand beside the machine.
+        size: width and height of a picture [px].
 
     Raises:
         RunError: this machine cannot render.
     """
 
-    def __init__(self, motion: Motion, size: tuple[int, int], *, panel: bool = True) -> None:
-        width, height = size
-        wide = round(0.62 * width) if panel and motion.signals else width
+    def __init__(self, motion: Motion, size: tuple[int, int]) -> None:
         self._motion, self._model = motion, motion.machine.model
-        self._model.vis.global_.fovy = FIELD
+        look, (width, height) = self._model.vis, size
+        look.global_.offwidth, look.global_.offheight = width, height
         # the map covers what the camera sees, or its border shows as dots on the floor
-        self._model.vis.map.shadowclip, self._model.vis.quality.shadowsize = 3.0, 4096
-        self._renderer = make_renderer(self._model, wide, height)
+        look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
+        try:
+            self._renderer = mujoco.Renderer(self._model, height=height, width=width)
+        except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
+            how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
+            hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
+            raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
         self._data = mujoco.MjData(self._model), mujoco.MjData(self._model)
-        self._camera = _camera(motion, wide / height)
-        self._panel = SignalPanel(motion, (width - wide, height), height / 1080) if wide < width else None
+        self._camera = mujoco.MjvCamera()
+        look_at(self._camera, self._model)
 
     def __enter__(self) -> "Stage":
         return self
@@ -58,29 +58,25 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         self._renderer.close()
 
-    def machine(self, time: float) -> Picture:
-        """Return the machine at a time [s] as RGB, shape (height, width, 3)."""
+    def picture(self, time: float, text: str = "") -> Picture:
+        """Return the machine at a time [s] with a text above it as RGB, shape (height, width, 3)."""
         sample, (data, ghost) = self._motion.sample(time), self._data
         place(self._model, data, self._motion.simulated[sample])
         self._renderer.update_scene(data, self._camera)
         if self._motion.measured is not None:
             place(self._model, ghost, self._motion.measured[sample])
             add_ghost(self._model, ghost, self._renderer.scene, (AZIMUTH, ELEVATION))
-        return self._renderer.render().copy()
-
-    def picture(self, times: Sequence[float]) -> Picture:
-        """Return the machine at one time, or in two columns at several, with the signals beside it."""
-        shown = [self.machine(time) for time in times]
-        if len(shown) > 1:
-            small = [np.asarray(Image.fromarray(one).reduce(2)) for one in shown]
-            shown = [np.vstack([np.hstack(small[k : k + 2]) for k in range(0, len(small), 2)])]
-        return np.hstack(shown if self._panel is None else [*shown, self._panel.at(times)])
+        picture = Image.fromarray(self._renderer.render())
+        letters = picture.height // 30
+        place_of_text = letters, letters // 2
+        ImageDraw.Draw(picture).text(place_of_text, text, "black", ImageFont.load_default(letters))
+        return np.asarray(picture)
 
 
 def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
-    """Render a motion as a film or a strip of moments.
+    """Render a motion as a film, or the beginning of its span as a picture.
 
     Args:
         motion: what moves.
@@ -100,19 +96,16 @@ def render_motion(
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
         raise SettingsError(what, where="--span", hint="write FROM:TO in seconds")
     size, rate = KINDS[kind]
+    count = max(1, int(np.ceil((end - begin) * rate - 1e-9)))
+    error = f", rms error {motion.error:.2g}°" if np.isfinite(motion.error) else ""
     with Stage(motion, size) as stage:
-        if kind == ".png":
-            content = io.BytesIO()
-            strip = stage.picture(np.linspace(begin, end, 4).tolist())
-            Image.fromarray(strip).save(content, "PNG", optimize=True)
-            return content.getvalue()
 
         def picture(k: int) -> Picture:
             progress("pictures", k, count)
-            return stage.picture([begin + k / rate])
+            time = begin + k / max(rate, 1.0)
+            return stage.picture(time, f"{time:.1f} s{error}")
 
-        count = int(np.ceil((end - begin) * rate - 1e-9))
-        return (_gif if kind == ".gif" else _mp4)(map(picture, range(count)))
+        return (_mp4 if kind == ".mp4" else _still)(map(picture, range(count)), kind)
 
 
 def check_kind(file: Path) -> str:
@@ -127,10 +120,16 @@ def check_kind(file: Path) -> str:
     return kind
 
 
+def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
+    """Point a camera at a whole machine."""
+    camera.lookat[:], camera.distance = model.stat.center, 2.3 * model.stat.extent
+    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+
+
 def add_ghost(
     model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene, view: tuple[float, float]
 ) -> None:
-    """Add what moves of a machine to a scene, translucent.
+    """Add what moves of a machine to a scene, blue and translucent.
 
     It stands 4 mm farther away in a view of these angles [deg]: where both machines agree only the
     simulated one is seen, and their surfaces do not flicker.
@@ -138,7 +137,7 @@ def add_ghost(
     first, seen = scene.ngeom, (mujoco.MjvOption(), mujoco.MjvPerturb())
     mujoco.mjv_addGeoms(model, data, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
     for geom in scene.geoms[first : scene.ngeom]:
-        geom.rgba[:], geom.matid, geom.transparent = GHOST, -1, 1
+        geom.rgba[:], geom.matid, geom.transparent = (0.12, 0.44, 0.82, 0.42), -1, 1
         geom.pos[:] += 0.004 * sight(*view)[2]
 
 
@@ -149,36 +148,24 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
         update(model, data)
 
 
-def _camera(motion: Motion, aspect: float) -> mujoco.MjvCamera:
-    """Return a camera that has the machine and its ghost in its picture all the time."""
-    every = max(1, len(motion.time) // 40)
-    moves = [angle[::every] for angle in (motion.simulated, motion.measured) if angle is not None]
-    poses, axes = body_poses(motion.machine.model, np.vstack(moves)), sight(AZIMUTH, ELEVATION)
-    corners = [shape.placed(poses).reshape(-1, 3) for shape in shapes(motion.machine.model)]
-    seen = np.concatenate(corners) @ axes.T
-    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    slope = np.tan(0.5 * np.radians(FIELD)) * np.array([aspect, 1.0])
-    camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.lookat[:] = AZIMUTH, ELEVATION, middle @ axes
-    across, ahead = np.abs(seen - middle)[:, :2], (seen - middle)[:, 2:]
-    camera.distance = 1.1 * float((across / slope - ahead).max())  # with some room around it
-    return camera
-
-
-def _gif(pictures: Iterable[Picture]) -> bytes:
-    first, *rest = (Image.fromarray(one).quantize(96, dither=Image.Dither.NONE) for one in pictures)
+def _still(pictures: Iterable[Picture], kind: str) -> bytes:
+    """Return a GIF, or a PNG of the first picture."""
     content, pause = io.BytesIO(), round(1e3 / KINDS[".gif"][1])  # [ms]
-    first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
+    if kind == ".png":
+        Image.fromarray(next(iter(pictures))).save(content, "PNG", optimize=True)
+    else:
+        first, *rest = (Image.fromarray(one).quantize(96, dither=Image.Dither.NONE) for one in pictures)
+        first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     return content.getvalue()
 
 
-def _mp4(pictures: Iterable[Picture]) -> bytes:
+def _mp4(pictures: Iterable[Picture], kind: str) -> bytes:
     try:
         import av
     except ImportError:
         hint = "pip install 'hydroid[film]', or write a .gif"
         raise RunError("an mp4 needs the package av", hint=hint) from None
-    content, ((width, height), rate) = io.BytesIO(), KINDS[".mp4"]
+    content, ((width, height), rate) = io.BytesIO(), KINDS[kind]
     with av.open(content, "w", format="mp4") as file:
         stream: Any = file.add_stream("libx264", rate=round(rate))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"

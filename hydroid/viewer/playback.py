@@ -7,7 +7,6 @@ and the `duration` after which all stands still [s].
 import mujoco
 import numpy as np
 
-from hydroid.identified_model import IdentifiedModel
 from hydroid.plant import Plant
 from hydroid.viewer.film import place
 from hydroid.viewer.motion import Motion
@@ -83,8 +82,3 @@ class Replay:
 
 
 Playback = Sliders | Replay
-
-
-def make_sliders(model: IdentifiedModel, pose: str | None = None) -> Sliders:
-    """Return the plant of a model with all joints on sliders."""
-    return Sliders(Plant(model, joints=range(1, 1 + len(model.settings.arm.joints))), pose)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hydroid.errors import RunError
-from hydroid.viewer.film import add_ghost
+from hydroid.viewer.film import add_ghost, look_at
 from hydroid.viewer.playback import Playback
 
 FRAME = 1 / 60  # between two pictures of the viewer [s]
@@ -54,10 +54,13 @@ def show(playback: Playback) -> None:
     """
     others = set(threading.enumerate())
     try:
-        import mujoco.viewer  # loads the window library, which a cluster may lack
+        import glfw  # the window library, which a cluster may lack
+        import mujoco.viewer
 
-        if sys.platform != "darwin":
-            _try_window()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # glfw says in warnings what it returns as well
+            if sys.platform != "darwin" and not glfw.init():  # the viewer would end the whole program
+                raise RuntimeError("no display")
         viewer = mujoco.viewer.launch_passive(playback.model, playback.data, show_left_ui=False)
     except (ImportError, RuntimeError) as error:
         hint = "without a display write a file: hydroid view RUN -o arm.mp4"
@@ -65,27 +68,9 @@ def show(playback: Playback) -> None:
     drawing = set(threading.enumerate()) - others
     try:
         with viewer.lock():
-            viewer.cam.lookat[:] = playback.model.stat.center
-            viewer.cam.distance = 2.3 * playback.model.stat.extent
-            # where the model's camera `corner` stands
-            viewer.cam.azimuth, viewer.cam.elevation = 135.0, -25.0
+            look_at(viewer.cam, playback.model)
         play(playback, viewer)
     finally:
         viewer.close()
         for thread in drawing:  # a program that ends while it still draws crashes
             thread.join(5.0)
-
-
-def _try_window() -> None:
-    """Open and close a hidden window: where the viewer cannot, it ends the whole program."""
-    import glfw
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # glfw says in warnings what it returns as well
-        opened = glfw.init()
-        if opened:
-            glfw.window_hint(glfw.VISIBLE, False)
-            opened = glfw.create_window(64, 64, "", None, None)
-            glfw.terminate()
-    if not opened:
-        raise RuntimeError("no display, or no OpenGL on it")

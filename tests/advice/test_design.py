@@ -13,7 +13,6 @@ from hydroid.errors import SettingsError
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.reporting.design_report import design_table
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
@@ -94,10 +93,6 @@ def test_the_best_is_no_worse_than_any_random_one_and_repeats(designed: tuple[Fi
     again = design(settings, THETA, [], 3)
     assert np.array_equal(again.log.command, result.log.command)
     assert np.array_equal(again.best.gained, result.best.gained)
-    rows = design_table(settings.design, result, TRUTH).records()
-    assert [row["name"] for row in rows] == list(result.names)
-    for row in rows:
-        assert (row["flag"] != "") == (float(str(row["designed [%]"])) > 30)
 
 
 def test_the_forecast_is_what_a_fit_to_the_same_log_knows(designed: tuple[FitSettings, Design]):

@@ -35,7 +35,7 @@ def array(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, hyd
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page_file, "write_page", lambda *_: [])  # figures take longest
         done = hydroid.fit_mech(folder / "a.csv", runs=3, set=SMALL, out=folder)
-    return folder, {one.problem.settings.search.seed: one for one in done.results}
+    return folder, {one.problem.settings.search.seed: one for one in done.runs}
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import hydroid
 from hydroid.commands.app import app
-from hydroid.errors import SettingsError
 from hydroid.settings.log import LogSettings
 
 ROOT = Path(__file__).parents[2]
@@ -52,16 +51,3 @@ def test_the_command_prints_each_guess_and_json(tmp_path: Path) -> None:
     assert "300 samples, 2.99 s, every 0.01 s" in said
     plain = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).output)
     assert plain["log"]["joints"]["1"]["angle"] == {"column": "q1_deg", "unit": "deg"}
-
-
-def test_a_guess_is_corrected(tmp_path: Path) -> None:
-    time, u, _, q, _ = cells(300).T
-    columns = {"t": time, "shoulder cmd [V]": u / 10, "shoulder angle [deg]": q}
-    write_parquet(tmp_path / "a.parquet", columns)
-    out = tmp_path / "a.csv"
-    turned = hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scale": -10})
-    np.testing.assert_allclose(turned.result.log.command[:, 0], -u, rtol=1e-15)
-    with pytest.raises(SettingsError, match="is no setting of `log`"):
-        hydroid.convert(tmp_path / "a.parquet", out=out, set={"search.seed": 3})
-    with pytest.raises(SettingsError, match=r"unknown setting 'joints\.1\.command\.scal'"):
-        hydroid.convert(tmp_path / "a.parquet", out=out, set={"log.joints.1.command.scal": 3})

@@ -4,14 +4,12 @@ import logging
 from pathlib import Path
 
 import pytest
-import yaml
 
 import hydroid
 from hydroid.commands.stage_one import with_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.identified_model import write_settings
 
-ROOT = Path(__file__).parents[2]
 VALUES = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
 
 
@@ -29,7 +27,7 @@ def test_a_mass_that_stage_1_moved_without_knowing_it_is_said(
     known["D"] = ParameterEstimate(value=300.0, unit="N·m·s/rad", flag="not identifiable")
     write_estimate(tmp_path, FitSummary(stage="mech", estimate=known))
     with caplog.at_level(logging.WARNING, "hydroid"):
-        changes = with_mechanics(tmp_path, "fit-hyd", {}, [])
+        changes = with_mechanics(tmp_path, "fit-hyd", {})
     assert changes["parameters.M2.fixed"] == 8.0
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith(
@@ -37,28 +35,17 @@ def test_a_mass_that_stage_1_moved_without_knowing_it_is_said(
     )
 
 
-def test_stage_two_reads_logs_as_stage_one_did(tmp_path: Path):
+def test_stage_two_takes_masses_and_says_what_else_differs(tmp_path: Path, caplog):
     mech = tmp_path / "mech"
-    write_settings(mech, hydroid.load_settings("fit-mech", {"log.time.column": "t", "log.delay_s": 0.1}))
+    write_settings(mech, hydroid.load_settings("fit-mech", {"start_pose": "study"}))
     estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in VALUES.items()}
     write_estimate(mech, FitSummary(stage="mech", estimate=estimate, final="best"))
-    changes = with_mechanics(mech, "fit-hyd", {"log.delay_s": 0.2}, ["a.csv"])
+    changes = with_mechanics(mech, "fit-hyd", {"log.delay_s": 0.2})
+    assert "had another start_pose than fit-hyd" in caplog.text
     settings = hydroid.load_settings("fit-hyd", changes)
-    assert settings.log.time.column == "t"
-    assert settings.log.delay_s == 0.2  # what is asked for has the last word
-    assert settings.arm.model == (tmp_path / "mech" / "model" / "arm.xml").resolve()
+    assert settings.log.delay_s == 0.2
     # the masses hold; the damping and the spring of stage 2 have a start and a value of their own
     masses = {name: value for name, value in VALUES.items() if name.startswith("M")}
     assert {name: settings.parameters[name].fixed for name in masses} == masses
     assert settings.parameters["D"].fixed is None
     assert settings.parameters["S"].fixed == 0.0
-    # a config that names its own layout and arm keeps them
-    own = yaml.safe_load((ROOT / "configs" / "fit-hyd.yaml").read_text())
-    own |= {"arm": "hydrolek", "log": {"time": {"column": "clock"}}}
-    (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
-    settings = hydroid.load_settings(
-        tmp_path / "own.yaml", with_mechanics(mech, tmp_path / "own.yaml", {}, ["a.csv"])
-    )
-    assert settings.log.time.column == "clock"
-    assert settings.log.delay_s == 0.1
-    assert settings.arm.model == (ROOT / "models" / "hydrolek.xml").resolve()

@@ -52,7 +52,7 @@ def test_a_horizon_in_which_nothing_moves_is_left_out():
     (log,) = problem.logs
     late = replace(log, command=np.roll(log.command, -60, axis=0) * (np.arange(450) < 390)[:, None])
     stored: dict[str, dict] = {}
-    search(Problem(problem.settings, [late]), lambda row: None, lambda n, rms: None, stored)
+    search(Problem(problem.settings, [late]), lambda row: None, lambda *_: None, stored)
     assert set(stored) == {"search", "start 1 part 1", "start 1 part 2"}  # two seconds, and all
 
 
@@ -68,7 +68,7 @@ def test_starts_fill_positive_bounds_evenly_by_decades():
 
 
 def test_all_starts_end_at_one_optimum_which_is_the_truth_without_noise(exact):
-    found = search(exact, lambda row: None, lambda n, rms: None, {})
+    found = search(exact, lambda row: None, lambda *_: None, {})
     truth = exact.parameters.vector(TRUTH, "truth")
     np.testing.assert_allclose(found.theta, np.tile(truth, (2, 1)), rtol=1e-3)
     assert found.population.objectives.max() < np.deg2rad(1e-5)

@@ -143,11 +143,12 @@ def make_quantities(problem: Problem) -> Quantities:
     """Of each joint a speed that is known, one that is not, and a curve of speed that ends without limits."""
     scalars, curves = {}, {}
     for joint in problem.settings.outputs:
-        name = f"joint{joint}_speed"
+        joint_name = problem.settings.arm.joint_names[joint - 1]
+        name = f"{joint_name}_speed"
         one = {"joint": joint, "unit": "deg/s"}
         known = QuantityEstimate(label="speed at 50 %", value=12.0, sd=0.3, interval=(11.4, 12.6), **one)
         lost = QuantityEstimate(label="dead band", value=3.0, interval=(0.0, None), joint=joint, unit="%")
-        scalars |= {f"{name}_50": known, f"joint{joint}_dead_band": lost}
+        scalars |= {f"{name}_50": known, f"{joint_name}_dead_band": lost}
         curves[name] = CurveEstimate(
             label="speed",
             along="command [%]",

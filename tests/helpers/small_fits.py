@@ -41,7 +41,7 @@ class Watcher:
         if len(self.rows) == self.stop_at and self.simulations is None:
             raise KeyboardInterrupt
 
-    def refining(self, simulated: int, rms: float) -> None:
+    def refining(self, name: str, simulated: int, rms: float) -> None:
         if self.simulations is not None and len(self.rows) == self.stop_at and simulated > self.simulations:
             raise KeyboardInterrupt
 

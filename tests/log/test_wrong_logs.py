@@ -125,12 +125,12 @@ WRONG = (
     ),
     Wrong(
         "an angle that counts the other way",
-        "error: set log.joints.3.angle.scale: -1",
+        "error: set log.joints.elbow.angle.scale: -1",
         lambda: of("q3", np.negative),
     ),
     Wrong(
         "a command wired the other way",
-        "warning: angle of joint 2 moves against the command (for 99% of",
+        "warning: angle of joint shoulder moves against the command (for 99% of",
         lambda: of("u2", np.negative),
     ),
     Wrong(
@@ -156,17 +156,17 @@ WRONG = (
     ),
     Wrong(
         "a dead sensor",
-        "warning: angle of joint 2 never changes",
+        "warning: angle of joint shoulder never changes",
         lambda: of("q2", lambda q: np.full_like(q, q[0])),
     ),
     Wrong(
         "the angle of another joint",
-        "warning: strong commands hardly move joint 2",
+        "warning: strong commands hardly move joint shoulder",
         lambda: [{**(t := rig("rig_shoulder_1")), "q2_deg": t["q1_deg"]}],
     ),
     Wrong(
         "an encoder that wraps",
-        "note: angle of joint 6 wraps by 360 deg and was joined",
+        "note: angle of joint rotation wraps by 360 deg and was joined",
         lambda: [wrapped(rig())],
     ),
     Wrong(
@@ -176,7 +176,7 @@ WRONG = (
     ),
     Wrong(
         "a joint that is pushed against its stop",
-        "note: joint 2 is driven against the end of its travel for",
+        "note: joint shoulder is driven against the end of its travel for",
         lambda: [boom([60, -60, 100, -100], seconds=8)],
     ),
     Wrong(
@@ -226,7 +226,7 @@ def test_how_far_each_joint_moves(tmp_path: Path) -> None:
     (path,) = save(Wrong("", "", lambda: [boom([50])]), tmp_path)
     (log,) = hydroid.check([path], config=SETTINGS).result
     angle = log.log.angle[:, 1]
-    assert log.moved_deg == {2: pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
+    assert log.moved_deg == {"shoulder": pytest.approx(np.rad2deg(np.ptp(angle)), abs=0.2)}
 
 
 def test_small_motions_about_zero_are_not_taken_for_radians(tmp_path: Path) -> None:

@@ -38,14 +38,14 @@ def test_the_summary_holds_quantities_curves_and_covariance_as_the_file_does(fit
     summary = fitted.summary
     assert load(fitted.folder / "estimate.yaml", FitSummary) == summary
     json.dumps(summary.plain(), allow_nan=False)
-    ratio = summary.quantities["joint2_area_ratio"]
+    ratio = summary.quantities["shoulder_area_ratio"]
     values = summary.values
     assert ratio.value == pytest.approx(values["A_A"] / values["A_B"])
     assert ratio.interval[0] < ratio.value < ratio.interval[1]
-    speed = summary.curves["joint2_speed"]
+    speed = summary.curves["shoulder_speed"]
     assert len(speed.at) == len(speed.value) == len(speed.interval)
     at_50 = dict(zip(speed.at, speed.value, strict=True))[50.0]
-    assert summary.quantities["joint2_speed_50_positive"].value == pytest.approx(at_50)
+    assert summary.quantities["shoulder_speed_50_positive"].value == pytest.approx(at_50)
 
 
 def test_what_no_free_parameter_changes_is_not_stated(fitted):
@@ -58,7 +58,7 @@ def test_the_kept_precision_gives_the_intervals_of_the_fit(fitted):
     i, j = (model.settings.parameter_set().names.index(name) for name in ("A_A", "A_B"))
     found = kept.propagate(lambda theta: theta[:, [i]] / theta[:, [j]], positive=True)
     np.testing.assert_allclose(
-        found.interval[0], fitted.summary.quantities["joint2_area_ratio"].interval, rtol=1e-5
+        found.interval[0], fitted.summary.quantities["shoulder_area_ratio"].interval, rtol=1e-5
     )
 
 
@@ -84,12 +84,3 @@ def test_a_quantity_of_ones_own_has_the_shape_of_its_function(fitted, tmp_path):
     hydroid.load_plant(fitted.folder).save(tmp_path / "plant")
     saved = hydroid.quantity(tmp_path / "plant", speeds)
     np.testing.assert_array_equal(saved.interval, found.interval)
-
-
-def test_the_curves_of_an_identified_actuator_have_bands(fitted, tmp_path):
-    page = tmp_path / "actuator.html"
-    hydroid.view(fitted.folder, actuator=2, out=tmp_path)
-    assert "Bands: 95 % intervals" in page.read_text(encoding="utf-8")
-    nominal = hydroid.load_identified(None, "fit-hyd", nominal=True)
-    hydroid.view(fit=nominal, actuator=2, out=tmp_path)
-    assert "Bands" not in page.read_text(encoding="utf-8")

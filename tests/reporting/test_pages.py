@@ -111,10 +111,10 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
     problem = make_problem()
     log, fit = replace(problem.logs[0], source="b.csv"), make_fit(problem)
     page = fit_page(make_record(problem, fit))
-    assert [row["verdict"] for row in page.sections[0].tables["verdict"].records()] == ["? not tested"]
+    assert [row[1] for row in page.tables["verdict"].rows] == ["? not tested"]
     assert page.lead == "shoulder: not tested."
     page = fit_page(make_record(problem, fit, {"b.csv": make_prediction(log, error=0.001)}))
-    assert page.sections[0].tables["verdict"].records()[0]["verdict"] == "✓ predicts"
+    assert page.tables["verdict"].rows[0][1] == "✓ predicts"
     errors = next(section for section in page.sections if section.title == "Errors by log")
     assert [(tab.row, tab.column, tab.state) for tab in errors.tabs] == [
         ("b.csv unseen", "shoulder", "good"),
@@ -143,7 +143,7 @@ def test_a_validation_of_several_fits_shows_the_best_first_in_shared_charts():
     page = validation_page(predictions, fits, settings.arm)
     assert page.lead == "good is best. shoulder: predicts."
     (tab,) = next(section for section in page.sections if section.title == "Errors by log").tabs
-    labels = {mark.label for panel in tab.plots[0].draw().panels for mark in panel.marks}
+    labels = {mark.label for panel in tab.plot.draw().panels for mark in panel.marks}
     assert {label.partition(" (")[0] for label in labels} >= {"good", "bad", "measured"}
 
 

@@ -9,10 +9,10 @@ from report_fits import make_fit, make_problem
 
 from hydroid.fitting.validation import fitted
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.figure import figure, rendered, style
-from hydroid.reporting.objectives import learning, pareto
+from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.page_file import plain
-from hydroid.reporting.predictions import JointResponse, draw, joint_responses
+from hydroid.reporting.predictions import draw_response
+from hydroid.reporting.search_report import learning, pareto
 
 pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is a figure gone wrong
 
@@ -21,10 +21,6 @@ pytestmark = pytest.mark.filterwarnings("error")  # a warning of matplotlib's is
 def _styled():
     with style():
         yield
-
-
-def responses(problem, fit) -> list[JointResponse]:
-    return joint_responses(fitted(problem, fit), problem.settings.arm)
 
 
 def drawn_front(problem, fit) -> Chart:
@@ -37,7 +33,7 @@ def drawn_front(problem, fit) -> Chart:
 def draw_all(problem, fit) -> list[Chart]:
     objective = problem.settings.objective
     return [
-        *(draw(response) for response in responses(problem, fit)),
+        *(draw_response("one", joint, [p], 1000) for p in fitted(problem, fit) for joint in p.joints),
         learning(fit.history, objective),
         drawn_front(problem, fit),
     ]
@@ -88,7 +84,7 @@ def test_any_fit_can_be_drawn(shape: str):
     fit = make_fit(problem, **of_fit)
     for drawn in draw_all(problem, fit):
         if shape == "names without glyphs":
-            rendered(drawn)  # with boxes, without a warning
+            saved(figure(drawn))  # with boxes, without a warning
         else:
             check(drawn)
 
@@ -106,13 +102,12 @@ def test_what_is_not_finite_is_left_out():
 def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_command():
     problem = make_problem()
     fit = make_fit(problem)
-    (record,) = responses(problem, fit)
-    (one,) = record.of
+    (one,) = fitted(problem, fit)
     log = one.log
     pressed = replace(log, pressure=np.tile([5e6, 2e6], (*log.angle.shape, 1)))
-    upper, middle, pressure, lower = draw(replace(record, of=(replace(one, log=pressed),))).panels
+    upper, middle, pressure, lower = draw_response("one", 2, [replace(one, log=pressed)], 1000).panels
     assert labelled(pressure)["chamber A"].y == pytest.approx(np.full(len(log.time), 50.0))
-    assert len(draw(record).panels) == 3  # pressures are drawn where they are logged
+    assert len(draw_response("one", 2, [one], 1000).panels) == 3  # pressures are drawn where they are logged
     measured = np.degrees(log.angle[:, 1])
     assert labelled(upper)["measured"].y == pytest.approx(measured)
     simulated = np.degrees(fit.best.responses[0][:, 0])
@@ -126,30 +121,14 @@ def test_a_response_shows_measured_and_simulated_angle_residual_pressures_and_co
     assert np.array_equal(lower.marks[0].y, log.command[:, 1])
 
 
-@pytest.mark.parametrize(("ratio", "log"), [(5.0, False), (20.0, True), (1e6, True)])
-def test_more_than_a_decade_is_drawn_on_a_logarithmic_axis(ratio: float, log: bool):
-    problem = make_problem()
-    fit = make_fit(problem)
-    history = fit.history.copy()
-    history[:, 4] = np.geomspace(0.1 * ratio, 0.1, 7)
-    history[:, 5] = history[:, 4]
-    chart = learning(history, problem.settings.objective)
-    assert labelled(chart.panels[0])["best so far"].y == pytest.approx(np.degrees(history[:, 4]))
-    assert chart.panels[0].log_y == log
-    check(chart)
-
-
 def test_every_kind_of_mark_can_be_drawn():
     x = np.arange(1.0, 4.0)
     marks = (
         Mark("step", x, x),
-        Mark("points", x, x, look="diamond", label="p"),
+        Mark("points", x, x, label="p"),
         Mark("band", x, x, x + 1, alpha=0.3),
         Mark("spans", x[:1], end=x[1:2]),
-        Mark("rule", y=x[:1], look="dashed"),
-        Mark("rule", x[:1], look="dashed"),
-        Mark("area", np.array([1, 2, 2, np.nan, 1, 2, 2]), np.array([1, 1, 2, np.nan, 3, 3, 4])),
-        Mark("text", x, x, texts=("a", "b", "c")),
+        Mark("rule", y=x[:1]),
     )
     check(Chart((Panel("x", "y", marks), Panel("x", "", marks[1:4])), columns=2))
 

@@ -115,9 +115,8 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
     motion = simulated_motion(nominal, {"alone": replace(study_log, angle=bent)})
     assert motion.measured is not None
     with renderable(motion) as stage:
-        first, last = (stage.machine(time).astype(float) for time in (0.0, 5.0))
-        whole = stage.picture([2.0])
-    assert whole.shape == (270, 480, 3)
+        first, last = (stage.picture(time, "2.0 s").astype(float) for time in (0.0, 5.0))
+    assert last.shape == (270, 480, 3)
     assert np.abs(first - last).max() > 50  # the arm has moved
     blue = last[..., 2] - last[..., 0]
     orange = last[..., 0] - last[..., 2]
@@ -126,9 +125,6 @@ def test_the_picture_shows_arm_and_ghost_in_full_and_moves(nominal: IdentifiedMo
         assert len(seen) > 100
         assert seen.min() > 2
         assert (seen.max(axis=0) < np.array(last.shape[:2]) - 3).all()
-    panel = whole[:, last.shape[1] :]
-    assert (panel == 255).mean() > 0.5  # white, with traces
-    assert len(np.unique(panel.reshape(-1, 3), axis=0)) > 20
 
 
 @pytest.mark.parametrize("kind", [".gif", ".mp4", ".png"])

@@ -52,24 +52,14 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
     for key in ("hydroid", "mujoco"):
         if run.get(key) != other.get(key):
             return f"was made by {key} {run.get(key)}, not {other.get(key)}"
-    if text := _other_logs(run.get("logs", {}), other.get("logs", {})):
-        return f"has other logs: {text}"
-    values, others = _flat(run.get("settings")), _flat(other.get("settings"))
-    for key in sorted(values.keys() | others.keys()):
-        if values.get(key) != others.get(key) and key != but:
-            return f"has {key} = {values.get(key)}, not {others.get(key)}"
+    logs, others = run.get("logs", {}), other.get("logs", {})
+    if [*logs.values()] != [*others.values()]:  # the files may have moved
+        return f"has other logs, or others' contents: {', '.join(logs)}, not {', '.join(others)}"
+    one, two = _flat(run.get("settings")), _flat(other.get("settings"))
+    for key in sorted(one.keys() | two.keys()):
+        if one.get(key) != two.get(key) and key != but:
+            return f"has {key} = {one.get(key)}, not {two.get(key)}"
     return "" if run.get("origin") == other.get("origin") else "has another model of the arm"
-
-
-def _other_logs(own: dict[str, str], others: dict[str, str]) -> str:
-    """Say how the logs' contents differ, empty if they do not; the files may have moved."""
-    if len(own) != len(others):
-        return f"{len(own)} of them, not {len(others)}"
-    if differing := next(
-        (pair for pair in zip(own, others, strict=True) if own[pair[0]] != others[pair[1]]), None
-    ):
-        return f"{differing[1]} is not its {differing[0]}, or the content has changed"
-    return ""
 
 
 def was_fitted(run: Path, log: Log) -> bool | None:

@@ -68,7 +68,7 @@ def actuator_values(
     if isinstance(actuator, LinearActuator):
         one, sides = actuator.settings, actuator.triangle
         values |= {"opening_a": one.max_opening, "opening_b": one.max_opening}
-        values |= {"area_a": one.area_a, "area_b": one.area_b, "pivot_angle": sides.theta0}
+        values |= {"area_a": one.area_a, "area_b": one.area_b, "pivot_angle": abs(sides.theta0)}
         values |= {"pivot_distance_1": sides.a, "pivot_distance_2": sides.b}
     elif actuator is not None:
         values |= dict.fromkeys(("opening_a", "opening_b"), actuator.max_opening)

@@ -109,10 +109,8 @@ class Triangle(Settings):
     b: Positive
     """distance of the other pivot from the axis [m]"""
     theta0: float
-    """angle between the two pivots at angle 0 [deg]"""
-    extends: Literal["positive", "negative"] = "positive"
-    """direction in which the joint turns when the rod runs out: with negative the angle between the pivots is
-    theta0 - q, and a positive command turns the joint to negative angles"""
+    """angle between the two pivots at angle 0 [deg]; below 0 if the rod runs out towards negative angles, to
+    which a positive command then turns the joint"""
 
 
 class Cylinder(Settings):
@@ -175,7 +173,7 @@ class LinearActuator:
     @property
     def sense(self) -> float:
         """1 if the rod runs out towards positive angles, else -1."""
-        return 1.0 if self.triangle.extends == "positive" else -1.0
+        return math.copysign(1.0, self.triangle.theta0)
 
     def length(self, angle: Any) -> Any:
         """Distance between the pivots [m] at joint angles [rad] of any shape."""
@@ -188,7 +186,7 @@ class LinearActuator:
     def _cylinder(self, angle: Any) -> tuple[Any, Any]:
         sides, bars = self.triangle, self.settings.four_bar
         psi, first, _ = (angle, 1.0, 0.0) if bars is None else four_bar(angle, bars)
-        length, arm, _ = triangle(psi, sides.a, sides.b, self.sense * math.radians(sides.theta0))
+        length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
         return length, arm * first
 
 
@@ -255,5 +253,4 @@ def _triangle(ends: Array, axis: Array) -> Triangle:
             "a cylinder must lie across the axis"
         )
     turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
-    extends = "positive" if turn > 0 else "negative"
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=abs(turn), extends=extends)
+    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn)

@@ -110,7 +110,7 @@ def test_runs_of_other_settings_logs_and_versions_are_not_mixed(runs, caplog, ar
     lines = (array[0] / "a.csv").read_text().splitlines()
     (array[0] / "other.csv").write_text("\n".join(lines[:-1]))
     begun("other.csv")
-    assert refused().startswith("seed-3: has other logs: ")
+    assert refused().startswith("seed-3: has other logs, ")
     begun("a.csv")
     change(Path("seed-3/run.json"), hydroid="0.0")
     assert refused().startswith("seed-3: was made by hydroid 0.0, not ")

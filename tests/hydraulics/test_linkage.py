@@ -30,7 +30,8 @@ def with_cylinder(arm: Arm, **changes) -> Arm:
 def mirrored(arm: Arm) -> Arm:
     """The same with the shoulder's angle counted the other way: its cylinder extends to negative angles."""
     low, high = arm.joints[SHOULDER].range
-    triangle = arm.joints[SHOULDER].actuator.triangle.model_copy(update={"extends": "negative"})
+    sides = arm.joints[SHOULDER].actuator.triangle
+    triangle = sides.model_copy(update={"theta0": -sides.theta0})
     return with_cylinder(arm, triangle=triangle, range=(-high, -low))
 
 

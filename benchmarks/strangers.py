@@ -164,7 +164,7 @@ def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: A
             part[j] = opening(held[j], dead[:, j], exponent[:, j]) if early[j] else held[j]
             middle = (angle[j] - 0.5 * (lower[j] + upper[j])) / (upper[j] - lower[j])
             turn[j] = 1.0 / (1.0 - lever[j] * (2.0 * middle) ** 2)
-            lift[j] = torque[j] / load[j]
+            lift[j] = torque[j] * turn[j] / load[j]  # what turns faster holds less
         low, high, supply = 0.0, 1.0, 1.0
         if droop > 0:
             for _ in range(30):

@@ -28,8 +28,10 @@ from hydroid.search.descent import Descent
 from hydroid.search.genetic import Population
 from hydroid.settings.search import RefinementSettings
 
-DRAWS = 16
-"""candidates drawn for a start; more than half of the hydraulic ones may have no force-stroke curve"""
+DRAWS, BEST = 64, 2
+"""candidates drawn for a start, and how many of them are refined for a joint alone"""
+LATE = {"delay": 1.0, "opening_lag": 1.0, "pilot_lag": 1.0, "plunger_damping": 1 / 2000}
+"""what may make a joint late, and the seconds of a unit [s]"""
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
 
@@ -105,12 +107,30 @@ class Multistart:
     def _joint_by_joint(self, joints: tuple[int, ...], number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best one of each joint."""
         for joint in joints:
-            problem = alone(self._problem, joint, theta)
-            result = self._grown(problem, theta, f"start {number + 1} joint {joint}")
+            problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
+            tried = [self._grown(problem, theta, name)]
+            for other, start in enumerate(self._drawn(problem, joint, theta)):
+                tried.append(self._grown(problem, start, f"{name} draw {other + 1}"))
+            result = min(tried, key=lambda r: r.cost)
+            for other, start in enumerate(splits(problem, joint, _theta(problem, result))):
+                tried.append(self._grown(problem, start, f"{name} split {other + 1}"))
+            result = min(tried, key=lambda r: r.cost)
             best = self._best[joint] = min(self._best.get(joint, result), result, key=lambda r: r.cost)
             reached = _theta(problem, best if number == self.settings.generations else result)
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
+
+    def _drawn(self, problem: Problem, joint: int, theta: Array) -> Array:
+        """Return the best BEST of DRAWS candidates whose free parameters are drawn from their priors, (n, P)."""
+        rng = np.random.default_rng([problem.settings.search.seed, joint])
+        drawn = np.tile(theta, (DRAWS, 1))
+        for i, p in enumerate(problem.parameters.parameters):
+            scores = rng.normal(size=DRAWS)
+            if p.fixed is None and p.prior is not None:
+                drawn[:, i] = np.clip([p.prior.value(score) for score in scores], p.lower, p.upper)
+        self._memo.elsewhere += DRAWS
+        errors = np.nan_to_num(np.sum(problem.residuals(drawn) ** 2, axis=1), nan=np.inf)
+        return drawn[np.argsort(errors, kind="stable")[:BEST]]
 
     def _grown(self, problem: Problem, theta: Array, name: str) -> Descent:
         """Fit theta, shape (P,), to growing parts of the records; the last part is all of them."""
@@ -164,6 +184,32 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     """
     settings = problem.settings.alone(joint, problem.parameters.mapping(theta))
     return problem.varied(settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]])
+
+
+def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:
+    """Return starts at which a joint is as late as at theta, (P,), for another reason.
+
+    Delay and lags can stand for each other, so that least squares ends with the wrong one: each has an
+    optimum of its own. A start has half of all in the delay, or nothing, and the rest in one of the lags.
+    """
+    own = dict[str, list[int]]()
+    for i, parameter in enumerate(problem.parameters.parameters):
+        settings = problem.settings.parameters[parameter.name]
+        name = settings.quantity.removesuffix("_a").removesuffix("_b")
+        if settings.fixed is None and settings.joints == (joint,) and name in LATE:
+            own.setdefault(name, []).append(i)
+    if len(own) < 2:
+        return []
+    late = sum(LATE[name] * float(np.mean(theta[places])) for name, places in own.items())
+    starts = list[Array]()
+    for name in own:
+        start = theta.copy()
+        for other, places in own.items():
+            share = (other == name or other == "delay") / (1 + ("delay" in own and name != "delay"))
+            start[places] = share * late / LATE[other]
+        low, high = ([getattr(p, end) for p in problem.parameters.parameters] for end in ("lower", "upper"))
+        starts.append(np.clip(start, low, high))
+    return starts
 
 
 def _theta(problem: Problem, result: Descent) -> Array:

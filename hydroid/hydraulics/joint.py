@@ -93,6 +93,17 @@ def opened(side: Any, travel: float) -> float:
 
 
 @compilable
+def net_opening(c: Any, z: Any, displacement: float) -> float:
+    """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
+    net = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+    if c.opening_keep == 0.0:
+        return net
+    left = (z.opening - net) * (1.0 - c.opening_keep)
+    z.opening -= left
+    return net - left / np.log(c.opening_keep)
+
+
+@compilable
 def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> None:
     # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
     w.filled = 1.0 if w.pressure > 0.0 else 0.0
@@ -101,16 +112,17 @@ def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> 
 
 
 @compilable
-def meter(c: Any, w: Any, displacement: float, supply: float) -> None:
-    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own."""
-    if displacement > 0.0:
-        area = opened(c.a, displacement)
+def meter(c: Any, w: Any, area: float, supply: float) -> None:
+    """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own.
+
+    `area` is the net opening [m²].
+    """
+    if area > 0.0:
         _fill(c, w.a, supply, c.leakage + area, c.leakage)
         _fill(c, w.b, supply, c.leakage, c.leakage + area * c.b.return_)
     else:
-        area = opened(c.b, -displacement)
-        _fill(c, w.a, supply, c.leakage, c.leakage + area * c.a.return_)
-        _fill(c, w.b, supply, c.leakage + area, c.leakage)
+        _fill(c, w.a, supply, c.leakage, c.leakage - area * c.a.return_)
+        _fill(c, w.b, supply, c.leakage - area, c.leakage)
 
 
 @compilable

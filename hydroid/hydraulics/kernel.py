@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, settle
+from hydroid.hydraulics.joint import begin, coast, command, load, meter, move_spool, net_opening, settle
 from hydroid.hydraulics.pump import begin_line, close_line, draw, fill, open_line
 from hydroid.hydraulics.records import LINE, SCRATCH
 from hydroid.settings import linkage
@@ -189,7 +189,7 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, arm: Any, pa
             c, z, w = coefficients[j], state[j], work[j]
             if a >= idle:
                 supply = min(line.pressure, c.supply_pressure) if shared else c.supply_pressure
-                meter(c, w, move_spool(c, z, w, i, step), supply)
+                meter(c, w, net_opening(c, z, move_spool(c, z, w, i, step)), supply)
                 load(c, z, w, step)
                 if shared:
                     draw(line, c, w)

@@ -67,11 +67,11 @@ COEFFICIENTS = np.dtype(
         *LINKAGE.descr,
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("coil gap conductance backflow relief"),
+        *_fields("coil gap conductance opening_keep backflow relief"),
     ]
 )
 """what the kernel reads of a joint: its quantities, its linkage, and constants that follow from them;
-backflow is the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
+opening_keep is the part of the opening's error that a sub-step leaves, backflow the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
 
 SIDE_STATE = np.dtype(
     _fields(
@@ -87,6 +87,7 @@ JOINT_STATE = np.dtype(
         *_fields(
             "external hold "  # torque e that is neither oil nor damping; torque that held the start [N·m]
             "angle velocity "  # at the start of the step [rad]; at its end [rad/s]
+            "opening "  # of the valve, below 0 towards B [m²]
             "way predicted torque armature "  # of the look-ahead: turn [rad], velocity v*, torque, h κ
             # contact with what the joint rests on at the start: stiffness, below 0 if from above [N·m/rad],
             # and angle at which it ends [rad]
@@ -198,6 +199,7 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
     p = joints
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient)
+    table["opening_keep"] = _keep(p.opening_lag, period / substeps)
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     driven = linkages.kind != NONE
     table["relief"] = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)[:, None]
@@ -206,9 +208,13 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)
         side["fresh"] = (side.delay / period - side.late) * substeps
-        lag = np.where(side.pilot_lag > 0.0, side.pilot_lag, 1.0)
-        side["pilot_keep"] = np.where(side.pilot_lag > 0.0, np.exp(-period / lag), 0.0)
+        side["pilot_keep"] = _keep(side.pilot_lag, period)
         damping = side.plunger_damping * np.maximum(side.plunger_back, 1.0)
         side["plunger_weight"] = plunger_weight(damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
     return table
+
+
+def _keep(lag: Array, step: float) -> Array:
+    """Part of its error that a first-order lag [s] leaves after a step [s], elementwise; 0 without one."""
+    return np.where(lag > 0.0, np.exp(-step / np.where(lag > 0.0, lag, 1.0)), 0.0)

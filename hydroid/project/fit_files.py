@@ -35,7 +35,7 @@ hydraulics:
   onset_b: 0
   rotary_volume: {volume}             # cm³    of each chamber of a rotary actuator
   opening_exponent: 1.4            #        speed rises with this power of the command behind the dead band
-  plunger_damping: 200             # N·s/m  2000 N·s/m are a lag of 1 s
+  plunger_damping: 20              # N·s/m  a lag of 10 ms
   substeps: 5                      # of valves and oil in one MuJoCo step
 
 # Starts and priors follow from the arm's weight and the speeds in the log. They are wide guesses: write what
@@ -63,15 +63,14 @@ JOINT = """\
 {actuator}
   D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 10}}    # N·m·s/rad
   delay_{own}: {{quantity: delay, joints: [{name}], bounds: [0, 1], start: {delay:.2f}}}    # s
-  dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 75]}}    # %
-  dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 10, bounds: [0, 75]}}
+  dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}    # %
+  dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}
   open_A_{own}: {{quantity: opening_a, joints: [{name}], within: 4}}    # mm², at full command
   open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
-  lag_{own}: {{quantity: plunger_damping, joints: [{name}], within: 10}}    # N·s/m, behind the dead band
-  pilot_A_{own}: {{quantity: pilot_lag_a, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, before it
-  pilot_B_{own}: {{quantity: pilot_lag_b, joints: [{name}], bounds: [0, 0.6], start: 0.03}}
+  lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s, of the speed
+  pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, of the pilot stage
   draw_A_{own}: {{quantity: draw_a, joints: [{name}], within: 10, term: pump}}    # flow from the pump, over
   draw_B_{own}: {{quantity: draw_b, joints: [{name}], within: 10, term: pump}}    # flow into the chamber"""
 ALIKE = """\
@@ -81,7 +80,7 @@ CYLINDER = """\
   area_A_{own}: {{quantity: area_a, joints: [{name}], within: 1.5}}    # mm²
   area_B_{own}: {{quantity: area_b, joints: [{name}], within: 1.5}}"""
 STAND_IN = """\
-  size_{own}: {{quantity: area, joints: [{name}], within: 3}}    # cm³/rad, of the stand-in
+  size_{own}: {{quantity: area, joints: [{name}], within: 5}}    # cm³/rad, of the stand-in
   slope_{own}: {{quantity: lever_slope, joints: [{name}], nominal: 0, sd: 0.2}}    # of its lever
   bend_{own}: {{quantity: lever_bend, joints: [{name}], nominal: 0, sd: 0.2}}"""
 NO_LOG = """\
@@ -116,7 +115,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
                 damping=short(0.1 * size.damping),
                 delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
-                dead=short(DEAD * min(max(motion.dead_band, 5.0), 70.0) if motion else 5.0),
+                dead=short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
                 **words,
             )
         )

@@ -15,7 +15,7 @@ from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
 
-LIFT = 2.5
+LIFT = 2.0
 """torque of a joint at the pump's pressure, over the largest that gravity asks of it"""
 
 

@@ -24,7 +24,7 @@ from numba import njit, types
 
 from hydroid.hydraulics.cylinder import bent, four_bar, triangle, volume
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.joint import command, move_spool, opened
+from hydroid.hydraulics.joint import command, move_spool, net_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
@@ -154,8 +154,7 @@ def meter(c: Any, z: Any, w: Any, substeps: int, step: float) -> None:
     """Advance the plungers over a step; w.travel becomes the mean opening [m²], below 0 towards B."""
     net = 0.0
     for i in range(substeps):
-        displacement = move_spool(c, z, w, i, step)
-        net += opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
+        net += net_opening(c, z, move_spool(c, z, w, i, step))
     w.travel = net / substeps
 
 

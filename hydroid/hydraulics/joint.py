@@ -50,11 +50,11 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
 @compilable
 def _follow(side: Any, z: Any, delayed: float) -> float:
     """Mean of what the pilot stage has of the command during a step, first-order behind it."""
-    if side.pilot_keep == 0.0:
+    if side.pilot_lag == 0.0:
         return delayed
     left = (z.pilot - delayed) * (1.0 - side.pilot_keep)
     z.pilot -= left
-    return delayed - left / np.log(side.pilot_keep)
+    return delayed + left * side.pilot_steps
 
 
 @compilable
@@ -96,11 +96,11 @@ def opened(side: Any, travel: float) -> float:
 def net_opening(c: Any, z: Any, displacement: float) -> float:
     """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
     net = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
-    if c.opening_keep == 0.0:
+    if c.opening_lag == 0.0:
         return net
     left = (z.opening - net) * (1.0 - c.opening_keep)
     z.opening -= left
-    return net - left / np.log(c.opening_keep)
+    return net + left * c.opening_steps
 
 
 @compilable

@@ -54,7 +54,8 @@ SIDE = np.dtype(
         *((field, np.float64) for field in _SIDE_FIELDS.values()),
         ("late", np.int64),  # whole steps of the delay,
         ("fresh", np.float64),  # and sub-steps of the rest
-        ("pilot_keep", np.float64),  # part of the pilot stage's error that a step leaves
+        ("pilot_keep", np.float64),  # part of the pilot stage's error that a step leaves,
+        ("pilot_steps", np.float64),  # and its lag in steps
         ("plunger_weight", np.float64),  # of its new state in a sub-step
         ("has_notches", np.bool_),
     ]
@@ -67,11 +68,12 @@ COEFFICIENTS = np.dtype(
         *LINKAGE.descr,
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("coil gap conductance opening_keep backflow relief"),
+        *_fields("coil gap conductance opening_keep opening_steps backflow relief"),
     ]
 )
 """what the kernel reads of a joint: its quantities, its linkage, and constants that follow from them;
-opening_keep is the part of the opening's error that a sub-step leaves, backflow the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
+opening_keep is the part of the opening's error that a sub-step leaves, opening_steps its lag in sub-steps,
+backflow the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
 
 SIDE_STATE = np.dtype(
     _fields(
@@ -199,7 +201,8 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
     p = joints
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient)
-    table["opening_keep"] = _keep(p.opening_lag, period / substeps)
+    table["opening_steps"] = p.opening_lag * substeps / period
+    table["opening_keep"] = _left(table["opening_steps"])
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
     driven = linkages.kind != NONE
     table["relief"] = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)[:, None]
@@ -208,13 +211,14 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
             side[field] = joints[f"{name}_{end}"]
         side["late"] = np.floor(side.delay / period)
         side["fresh"] = (side.delay / period - side.late) * substeps
-        side["pilot_keep"] = _keep(side.pilot_lag, period)
+        side["pilot_steps"] = side.pilot_lag / period
+        side["pilot_keep"] = _left(side["pilot_steps"])
         damping = side.plunger_damping * np.maximum(side.plunger_back, 1.0)
         side["plunger_weight"] = plunger_weight(damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
     return table
 
 
-def _keep(lag: Array, step: float) -> Array:
-    """Part of its error that a first-order lag [s] leaves after a step [s], elementwise; 0 without one."""
-    return np.where(lag > 0.0, np.exp(-step / np.where(lag > 0.0, lag, 1.0)), 0.0)
+def _left(steps: Array) -> Array:
+    """Part of its error that a first-order lag leaves after one step, elementwise; the lag is in steps."""
+    return np.exp(-1.0 / np.maximum(steps, 1e-300))

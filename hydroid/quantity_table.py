@@ -149,9 +149,7 @@ _HYDRAULIC = (
     Quantity(
         "opening_exponent", "", ONE, "exponent of the valve's opening over spool travel", "", (0.3, 4.0)
     ),
-    Quantity(
-        "opening_lag", "s", 0.0, "time constant of the valve's opening", "behind the spool", (0.0, 1.0)
-    ),
+    Quantity("opening_lag", "s", 0.0, "time constant of the valve's opening", "behind the spool", (0.0, 1.0)),
     *(
         Quantity(
             f"notch_{n}",

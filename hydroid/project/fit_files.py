@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import yaml
 
 from hydroid.project.layout import Layout
@@ -47,7 +48,7 @@ parameters:
   M: {{quantity: mass, each: true, within: 2}}    # kg, M_LINK of every link
   # One pump for all joints, whose pressure falls with flow: a term that is kept if the logs ask for it.
   P_flow: {{quantity: pump_flow, fixed: {flow}, term: pump}}    # L/min, four times all joints at full speed
-  P_droop: {{quantity: pump_droop, bounds: [0, 600], start: 10, term: pump}}    # bar, at that flow
+  P_droop: {{quantity: pump_droop, bounds: [0, 2000], start: 20, term: pump}}    # bar, at that flow
 
 # The two sides of a spool are made alike.
 priors:
@@ -71,8 +72,8 @@ JOINT = """\
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
   lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s, of the speed
   pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, of the pilot stage
-  draw_A_{own}: {{quantity: draw_a, joints: [{name}], within: 10, term: pump}}    # flow from the pump, over
-  draw_B_{own}: {{quantity: draw_b, joints: [{name}], within: 10, term: pump}}    # flow into the chamber"""
+  draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # flow from the
+  draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # pump, over its own"""
 ALIKE = """\
   dead_{own}: {{of: {{dead_A_{own}: 1, dead_B_{own}: -1}}, value: 0, sd: 5}}
   exponent_{own}: {{of: {{exponent_A_{own}: 1, exponent_B_{own}: -1}}, value: 0, sd: 0.2}}"""
@@ -99,15 +100,16 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
 
     `file` is their own name as a command takes it, and `arm_file` that of the arm as they name it.
     """
-    lines, alike, volumes, flow_rate = list[str](), list[str](), list[float](), 0.0
+    lines, alike, volumes = list[str](), list[str](), list[float]()
     outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
+    flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in outputs}
+    middle = float(np.median([*flows.values()]))
     for joint in outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
         motion = layout.motions.get(joint) if layout else None
         linear = isinstance(own.actuator, LinearActuator)
         if not linear:
             volumes.append(size.displacement * math.radians(own.range[1] - own.range[0]) / 2)
-        flow_rate += 4 * 0.06 * size.displacement * size.speed  # so large that it limits no flow
         words = {"own": name.removesuffix("_joint"), "name": name}
         alike.append(ALIKE.format(**words))
         lines.append(
@@ -115,6 +117,8 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 actuator=(CYLINDER if linear else STAND_IN).format(**words),
                 damping=short(0.1 * size.damping),
                 delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
+                # a stand-in's size is a guess, but the valves of one machine let like flows through
+                draw=1 if linear else short(middle / flows[joint]),
                 dead=short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
                 **words,
             )
@@ -126,7 +130,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
         log=_log(arm, layout),
         others=_others(layout),
         volume=short(min(volumes, default=50.0)),
-        flow=short(flow_rate),
+        flow=short(4 * sum(flows.values())),  # so large that it limits no flow
         parameters="\n".join(lines),
         alike="\n".join(alike),
     )

@@ -121,7 +121,7 @@ class Multistart:
         return theta
 
     def _drawn(self, problem: Problem, joint: int, theta: Array) -> Array:
-        """Return the best BEST of DRAWS candidates whose free parameters are drawn from their priors, (n, P)."""
+        """Draw free parameters from their priors; return the best few candidates, shape (BEST, P)."""
         rng = np.random.default_rng([problem.settings.search.seed, joint])
         drawn = np.tile(theta, (DRAWS, 1))
         for i, p in enumerate(problem.parameters.parameters):

@@ -70,10 +70,10 @@ JOINT = """\
   open_B_{own}: {{quantity: opening_b, joints: [{name}], within: 4}}
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
-  lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s, of the speed
-  pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, of the pilot stage
-  draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # flow from the
-  draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # pump, over its own"""
+  lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s
+  pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, before the dead band
+  draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # over its
+  draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # own"""
 ALIKE = """\
   dead_{own}: {{of: {{dead_A_{own}: 1, dead_B_{own}: -1}}, value: 0, sd: 5}}
   exponent_{own}: {{of: {{exponent_A_{own}: 1, exponent_B_{own}: -1}}, value: 0, sd: 0.2}}"""

@@ -71,7 +71,7 @@ JOINT = """\
   exponent_A_{own}: {{quantity: opening_exponent_a, joints: [{name}], within: 3}}
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
   lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s
-  pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s, before the dead band
+  pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s
   draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # over its
   draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # own"""
 ALIKE = """\

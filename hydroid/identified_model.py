@@ -7,9 +7,8 @@ from typing import Any
 
 import yaml
 
-from hydroid.assets import find_config
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
-from hydroid.files import is_file, write_atomic
+from hydroid.files import find_config, is_file, write_atomic
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load

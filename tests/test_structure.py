@@ -11,7 +11,6 @@ ROOT = Path(__file__).parents[1] / "hydroid"
 LAYERS = [
     {"errors"},
     {
-        "assets",
         "files",
         "findings",
         "mjcf",

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from studies import Claim, Table
 
 from hydroid.parameters import Array
-from hydroid.studies.study import Row
+from hydroid.studies import Row
 
 
 class Outcome(StrEnum):

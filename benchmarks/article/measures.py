@@ -14,8 +14,7 @@ from hydroid.parameters import Array, ParameterSet
 from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.linear import linearised
 from hydroid.problem.problem import Problem
-from hydroid.studies.runs import Result
-from hydroid.studies.study import Row
+from hydroid.studies import Result, Row
 
 CONVERGED = 0.05
 """part of the objective's whole descent that is left when a search counts as converged"""

@@ -18,7 +18,7 @@ from measures import BLIND, CENTRE, UNITS
 from studies import FOLDER, ArticleStudy, Table, load_studies
 
 from hydroid.settings.study import cell_settings
-from hydroid.studies.study import Row
+from hydroid.studies import Row
 
 DOCS = FOLDER.parents[1] / "docs"
 Rows = Mapping[str, Sequence[Row]]

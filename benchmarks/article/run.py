@@ -22,7 +22,7 @@ from page import page
 from studies import Plan, Runs, load_studies
 
 from hydroid.posterior.flags import WEAK_ABOVE
-from hydroid.studies.study import processes
+from hydroid.studies import processes
 
 ROOT = Path(__file__).parents[2]
 

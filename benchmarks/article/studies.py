@@ -23,8 +23,7 @@ from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 from hydroid.settings.study import Changes, StudySettings, cell_settings
-from hydroid.studies.runs import Result, Task
-from hydroid.studies.study import Row, make_tasks, measured, run_all
+from hydroid.studies import Result, Row, Task, make_tasks, measured, run_all
 
 FOLDER = Path(__file__).parent
 QUICK_S, QUICK_SEEDS = 15.0, 2

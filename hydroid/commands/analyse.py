@@ -21,9 +21,8 @@ from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
-    from hydroid.posterior.directions import Identifiability
     from hydroid.posterior.profile import Profile
-    from hydroid.posterior.uncertainty import Uncertainty
+    from hydroid.posterior.uncertainty import Identifiability, Uncertainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +70,8 @@ def analyse(
         model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
     from hydroid.fitting.summary import account
-    from hydroid.posterior import directions, uncertainty
     from hydroid.posterior import profile as profiling
+    from hydroid.posterior import uncertainty
     from hydroid.reporting.parameters_report import direction_section, parameter_table
 
     with Progress() as progress:
@@ -81,7 +80,7 @@ def analyse(
         for done, name in enumerate(names(profile)):
             progress("profiles", done, len(names(profile)))
             profiles[name] = profiling.profile(problem, known, name)
-    identified = directions.identifiability(problem, known)
+    identified = uncertainty.identifiability(problem, known)
     summary = account(problem, known, identified)
     better = tuple(name for name, one in profiles.items() if one.better_optimum)
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)

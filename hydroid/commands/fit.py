@@ -198,8 +198,8 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     """Begin the folder's run, or continue it, to its report."""
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.reporting.fit_report import draw
+    from hydroid.run.process import log_start
     from hydroid.run.record import fit_result, save_result
-    from hydroid.run.run_log import log_start
 
     log_start(problem.settings, problem.logs)
     checkpoints = folder.begin_or_continue(problem.settings, problem.logs)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-from hydroid.assets import find_config
 from hydroid.errors import SettingsError
+from hydroid.files import find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.progress import NOTE
 from hydroid.settings.fit import FitSettings

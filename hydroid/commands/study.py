@@ -16,7 +16,7 @@ from hydroid.errors import Stopped
 from hydroid.settings.study import load_study
 
 if TYPE_CHECKING:
-    from hydroid.studies.study import Row
+    from hydroid.studies import Row
 
 
 @command
@@ -52,9 +52,9 @@ def study(
     from hydroid.estimate import finite
     from hydroid.parallel.cluster import open_workers
     from hydroid.reporting.table import Table
-    from hydroid.run.lock import locked
-    from hydroid.studies.study import processes as open_processes
-    from hydroid.studies.study import run_study
+    from hydroid.run.process import locked
+    from hydroid.studies import processes as open_processes
+    from hydroid.studies import run_study
 
     with locked(folder), open_workers(dask, insecure=dask_insecure) as workers:
         pool = nullcontext(workers.executor()) if workers else open_processes(processes)

@@ -8,9 +8,8 @@ from hydroid.findings import Finding, Level
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Parameter
 from hydroid.posterior.by_log import FEW, ByLog
-from hydroid.posterior.directions import Identifiability
 from hydroid.posterior.flags import Flag, ParameterStatus, Source
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.posterior.uncertainty import Identifiability, Uncertainty
 from hydroid.problem.problem import Problem
 
 _MOST_DIRECTIONS = 6

@@ -12,15 +12,13 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
-from hydroid.posterior.directions import Identifiability, identifiability
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
+from hydroid.posterior.uncertainty import Identifiability, Uncertainty, identifiability, uncertainty
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
-from hydroid.search import compromise
 from hydroid.search.descent import Descent
-from hydroid.search.pareto import non_dominated
+from hydroid.search.pareto import average, best, non_dominated, utopia
 
 _log = logging.getLogger(__name__)
 
@@ -191,11 +189,11 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     """The estimates that a search gives, by name, the one that the settings ask for first."""
     theta, memo = searched.theta, searched.memo
     if searched.single:
-        return {"best": compromise.best(theta, searched.population.objectives[:, 0])}
+        return {"best": best(theta, searched.population.objectives[:, 0])}
     segments = memo.evaluate(theta).segments
     candidates = {
-        "average": compromise.average(theta, segments),
-        "utopia": compromise.utopia(theta, segments),
+        "average": average(theta, segments),
+        "utopia": utopia(theta, segments),
         "best": memo.best,  # over the whole record it may have left the population
     }
     first = problem.settings.search.compromise

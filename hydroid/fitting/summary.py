@@ -7,8 +7,7 @@ from hydroid.fitting.findings import fit_findings, parameter_findings
 from hydroid.fitting.fit import Fit
 from hydroid.parameters import Array
 from hydroid.posterior.by_log import by_log
-from hydroid.posterior.directions import Identifiability
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.posterior.uncertainty import Identifiability, Uncertainty
 from hydroid.problem.problem import Problem
 
 

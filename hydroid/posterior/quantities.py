@@ -9,8 +9,7 @@ import numpy as np
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
-from hydroid.posterior.speeds import speed_tests
-from hydroid.posterior.statics import Column, gain_model, gravity, oil
+from hydroid.posterior.measures import Column, gain_model, gravity, oil, speed_tests
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates

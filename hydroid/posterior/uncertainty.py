@@ -32,7 +32,7 @@ from scipy.optimize import root_scalar
 from scipy.stats import norm as normal
 
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.flags import UNIDENTIFIABLE_ABOVE, Flag, ParameterStatus, Side, flag_of
+from hydroid.posterior.flags import UNIDENTIFIABLE_ABOVE, WEAK_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.posterior.linear import Linear, linearised, white_posterior
 from hydroid.posterior.noise import STEP, Noise, channel_noise, neighbours, transformed, unbiased
 from hydroid.posterior.posterior import COVERAGE, NORMAL, WEAK_PRIOR, Posterior, regular
@@ -190,3 +190,38 @@ def _noise(problem: Problem, linear: Linear) -> tuple[Noise, ...]:
     ]
     spread = linear.prior_scatter + np.sum([each.covariance_of(part) for each, part in pairs], axis=0)
     return tuple(each if each.source == "settings" else unbiased(each, part, spread) for each, part in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """The directions that are determined, and those that are not.
+
+    Attributes:
+        names: of the p parameters that vary.
+        alone: those of them that are not determined to WEAK_ABOVE, whatever the others are.
+        combinations: of the other parameters that are not determined either, the least determined first: the
+            relative changes, the largest +1, of those that take a tenth of it or more.
+    """
+
+    names: tuple[str, ...]
+    alone: tuple[str, ...]
+    combinations: tuple[dict[str, float], ...]
+
+    @property
+    def rank(self) -> int:
+        """Number of independent combinations that are determined."""
+        return len(self.names) - len(self.alone) - len(self.combinations)
+
+
+def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiability:
+    """Return the directions that are not determined at an estimate."""
+    root = uncertainty.posterior.root
+    names = np.array(problem.parameters.names)[uncertainty.linear.box.varied]
+    alone = np.linalg.norm(root, axis=0) < 1 / WEAK_ABOVE
+    _, values, axes = np.linalg.svd(root[:, ~alone], full_matrices=False)
+    combinations: list[dict[str, float]] = []
+    for axis in axes[values < 1 / WEAK_ABOVE][::-1]:
+        changes = axis / axis[np.argmax(np.abs(axis))]
+        order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= 0.1]
+        combinations.append({str(names[~alone][i]): float(changes[i]) for i in order})
+    return Identifiability(tuple(names.tolist()), tuple(names[alone].tolist()), tuple(combinations))

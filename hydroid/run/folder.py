@@ -16,10 +16,9 @@ from hydroid.identified_model import CONFIG, MODEL, IdentifiedModel, write_setti
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.plant import Plant
-from hydroid.run.checkpoint import CheckpointFile
+from hydroid.run.archive import CheckpointFile
 from hydroid.run.identity import DESCRIPTION, difference, identity, own_hashes
-from hydroid.run.lock import LOCK, locked
-from hydroid.run.run_log import run_log
+from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
-from hydroid.assets import find_config
 from hydroid.errors import ModelError, SettingsError
+from hydroid.files import find_config
 from hydroid.settings.linkage import DIGITS, Cylinder, LinearActuator, RotaryActuator, make_cylinder
 from hydroid.settings.load import Settings, load
 

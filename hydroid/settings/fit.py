@@ -22,9 +22,8 @@ from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, make_parameter, nominal_value
-from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings
+from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
-from hydroid.settings.simulation import SimulationSettings
 
 
 def _read_arm(value: Any, info: ValidationInfo) -> Any:

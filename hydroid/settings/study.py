@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from hydroid.assets import find_config
 from hydroid.errors import SettingsError
+from hydroid.files import find_config
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.log import Log
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from hydroid.arm.locked import Array, LockedArm, lock
 from hydroid.hydraulics.records import Records
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation.prescribed import Prescribed
 
 

@@ -11,8 +11,8 @@ import pytest
 import trimesh
 
 from hydroid.arm.model import load_machine, load_model
-from hydroid.assets import assets
 from hydroid.errors import ModelError, SettingsError
+from hydroid.files import assets
 from hydroid.settings.arm import load_arm
 
 ARM = load_arm("hydrolek")

@@ -6,7 +6,7 @@ from claims import Outcome, verdicts
 from measures import generations_to_converge
 from studies import Claim, Table
 
-from hydroid.studies.study import Row
+from hydroid.studies import Row
 
 RNG = np.random.default_rng(1)
 CLAIM = Claim(says="A beats B", item="table 1", column="error", lower="A", than="B")

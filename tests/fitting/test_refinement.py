@@ -8,7 +8,7 @@ from hydroid import load_settings
 from hydroid.fitting.refinement import refine
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.run.checkpoint import CheckpointFile
+from hydroid.run.archive import CheckpointFile
 from hydroid.search.descent import Descent
 from hydroid.settings.search import RefinementSettings
 

@@ -9,7 +9,7 @@ from hydroid.hydraulics.solenoid import curve_exists
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.scenario import Scenario
 

@@ -12,11 +12,10 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
-from hydroid.posterior.directions import identifiability
 from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import channel_noise
 from hydroid.posterior.quantities import Quantities
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
+from hydroid.posterior.uncertainty import Uncertainty, identifiability, uncertainty_from
 from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors

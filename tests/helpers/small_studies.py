@@ -8,7 +8,7 @@ import yaml
 
 from hydroid import read_logs
 from hydroid.progress import no_progress
-from hydroid.studies.study import Row, run_study
+from hydroid.studies import Row, run_study
 
 RIG = Path(__file__).parents[2] / "examples" / "logs" / "rig_shoulder_1.csv"
 

@@ -10,8 +10,8 @@ from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_volta
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
 from hydroid.posterior.bench import Bench, make_bench
+from hydroid.posterior.measures import actuator
 from hydroid.posterior.quantities import joint_measure
-from hydroid.posterior.statics import actuator
 from hydroid.problem.bindings import Bindings
 from hydroid.simulation import Candidates
 

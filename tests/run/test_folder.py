@@ -20,7 +20,7 @@ from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 from hydroid.reporting import page_file
 from hydroid.run.folder import RunFolder
-from hydroid.run.lock import locked
+from hydroid.run.process import locked
 
 SMALL = {
     "search.algorithm": "ga",

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hydroid.errors import SettingsError
-from hydroid.search.compromise import average, best, segment_best, utopia
+from hydroid.search.pareto import average, best, segment_best, utopia
 
 POINTS = np.array([[0.0, 1.0], [0.2, 0.4], [0.5, 0.5], [1.0, 0.0]])
 OBJECTIVES = np.array([[1.0, 90, 30], [2, 40, 20], [9, 30, 25], [np.nan, 0, 0]])

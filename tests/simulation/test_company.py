@@ -7,7 +7,7 @@ import pytest
 from conftest import replaced, scattered
 
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
 from hydroid.simulation.scenario import Scenario
 

@@ -7,7 +7,7 @@ from conftest import candidates
 
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.log import Log
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
 from hydroid.simulation.scenario import Scenario
 

@@ -12,7 +12,7 @@ from conftest import candidates, replaced, scattered, step_log
 from scipy.integrate import solve_ivp
 
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.simulation import SimulationSettings
+from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.scenario import Scenario
 

@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 from small_studies import content, run, written
 
-from hydroid import read_logs
+from hydroid import read_logs, studies
 from hydroid.errors import HydroidError, RunError
 from hydroid.settings.study import cell_settings, load_study
-from hydroid.studies import study as execution
-from hydroid.studies.study import make_tasks
+from hydroid.studies import make_tasks
 
 
 def stored(folder: Path) -> dict[str, dict[str, Any]]:
@@ -31,13 +30,13 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
     assert "found" not in caplog.text
     next((tmp_path / "runs").glob("*.json")).unlink()
     performed: list[tuple[str, int]] = []
-    perform = execution.perform
+    perform = studies.perform
 
     def counted(task):
         performed.append((task.cell, task.seed))
         return perform(task)
 
-    monkeypatch.setattr(execution, "perform", counted)
+    monkeypatch.setattr(studies, "perform", counted)
     again = run(file, tmp_path)
     assert len(performed) == 1
     assert "3 of 4 runs found, goes on" in caplog.text
@@ -64,7 +63,7 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
 
 
 def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypatch):
-    perform = execution.perform
+    perform = studies.perform
 
     def failing(task):
         if (task.cell, task.seed) == ("mean", 2):
@@ -73,7 +72,7 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
             raise MemoryError("for now")
         return perform(task)
 
-    monkeypatch.setattr(execution, "perform", failing)
+    monkeypatch.setattr(studies, "perform", failing)
     runs = run(written(tmp_path), tmp_path)
     assert [(row.cell, row.seed, row.failed) for row in runs if row.failed] == [
         ("mean", 1, "MemoryError: for now"),
@@ -81,7 +80,7 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
     ]
     assert [row.cell for row in runs if not row.failed] == ["largest", "largest"]
     assert len(stored(tmp_path)) == 3  # what may pass is tried again
-    monkeypatch.setattr(execution, "perform", perform)
+    monkeypatch.setattr(studies, "perform", perform)
     assert [row.failed for row in run(written(tmp_path), tmp_path)].count("") == 3
 
 

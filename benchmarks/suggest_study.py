@@ -82,7 +82,7 @@ def tried(term: str, k: int, seconds: float) -> tuple[bool, bool, bool, float, f
     # seeds below 100 were used while the test was written
     problem = Problem(make_settings(), [make_log(term, seconds, 1000 * list(TERMS).index(term) + 100 + k)])
     start = near(problem, problem.parameters.vector(TRUTH, "truth"), np.random.default_rng([k, 5]))
-    content = advice(problem, uncertainty(problem, refined(problem, start)[0])).content
+    content = advice(problem, uncertainty(problem, refined(problem, start)[0]))[0]
     free = [row["name"] for row in content["terms"] if "command" in row]
     sides = (term, f"{term}_a", f"{term}_b")
     freed = [row["rms_deg"] for row in content["terms"] if row["name"] in sides and "freed" in row]

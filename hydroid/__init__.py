@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hydroid.commands.adapt import adapt as adapt
     from hydroid.commands.analyse import analyse as analyse
     from hydroid.commands.check import check as check
     from hydroid.commands.convert import convert as convert

@@ -116,20 +116,30 @@ WORDS: dict[str, tuple[str, str]] = {
         "The limits were checked only in simulation, at the present estimate; the machine moves differently "
         "as far as it differs from the model. Watch the first run with a hand on the emergency stop.",
     ),
+    # an assumption
+    "sign doubted": (
+        "The logs contradict the sign of {0}'s angle: turned round, the error falls from {before:.2g}° "
+        "to {after:.2g}°.",
+        "Does gravity pull it the other way? Then set scale: -1 for its angle and its command, or turn the "
+        "axis in the arm's model, and fit again. Change one joint at a time.",
+    ),
+    "zero doubted": (
+        "The logs prefer another zero of {0}'s angle: with {change:.0f}° added the error falls from "
+        "{before:.2g}° to {after:.2g}°.",
+        "Check where the arm's model has its 0, or set log.joints.{0}.angle.offset.",
+    ),
+    "scale doubted": (
+        "The logs prefer {change:g} times {0}'s angle: the error falls from {before:.2g}° to {after:.2g}°.",
+        "Check the unit and log.joints.{0}.angle.scale.",
+    ),
+    "columns exchanged": (
+        "{0} moves with the command of {1}, and {1} with that of {0}.",
+        "Exchange their columns in log.joints.",
+    ),
     # a profile
     "better optimum": (
         "The profile{s} of {few} found a better fit than the estimate, which is no optimum.",
         "Fit again from there, with more iterations or another seed.",
-    ),
-    # a residual
-    "residual depends": (
-        "{0}: the measured angle is {error:.2g}° {side} than the simulated one where the {1} is {low} to "
-        "{high} {unit}.",
-        "",
-    ),
-    "residual correlated": (
-        "{0}: the error keeps its sign for {seconds:.2g} s.",
-        "No sensor is that slow: the model errs.",
     ),
     "few logs disagree": (
         "The logs disagree about {few} by more than the noise explains.",

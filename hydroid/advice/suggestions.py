@@ -2,15 +2,15 @@
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from typing import Any
 
 import yaml
 
 from hydroid.advice.actions import STATED_SD, next_actions
+from hydroid.advice.assumptions import assumption_findings, doubts
 from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, score_terms
-from hydroid.advice.residuals import UNITS, ResidualCheck, residual_checks
 from hydroid.estimate import finite
 from hydroid.findings import Finding
 from hydroid.posterior.uncertainty import Uncertainty
@@ -25,20 +25,15 @@ MOST_TRIED = 4
 Content = Mapping[str, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Advice:
-    """Suggestions as JSON has them (docs/json.md), and the eight residuals with the largest errors."""
-
-    content: Content
-    residuals: tuple[ResidualCheck, ...]
-
-
 def advice(
     problem: Problem, known: Uncertainty, run: str = "RUN", progress: Progress = no_progress
-) -> Advice:
-    """Return the suggestions about an estimate with its uncertainty; `run` is its folder in commands."""
+) -> tuple[Content, tuple[Finding, ...]]:
+    """Return the suggestions about an estimate with its uncertainty, and what is to be said, the first first.
+
+    The suggestions are as JSON has them (docs/json.md); `run` is the estimate's folder in commands.
+    """
     tests, weight = score_terms(problem, known, progress), known.linear.prior_weight
-    best, checks = promising(tests), residual_checks(problem, known)
+    best = promising(tests)
     without = refitted(problem, known.theta, weight)
     rows: list[dict[str, Any]] = []
     for i, one in enumerate(best):
@@ -62,24 +57,17 @@ def advice(
                 row |= {"parameters": entries, "command": freeing_command(problem, entries, run)}
         rows.append(row)
     rows.sort(key=lambda row: ("command" not in row, row.get("left_out_deg") or math.inf))
+    doubted = doubts(problem, known.theta, ("sign", "zero", "scale"))
     content = {
         "rms_deg": math.degrees(without.rms),
         "left_out_deg": math.degrees(without.left_out),
         "tested": len(tests),
         "terms": rows,
-        "residuals": [
-            {
-                "log": check.log,
-                "joint": check.joint,
-                "rms_deg": check.rms,
-                "correlation_s": check.correlation_s,
-                "depends_on": [one.regressor for one in check.depends],
-            }
-            for check in checks
-        ],
         "actions": next_actions(problem, known),
+        "assumptions": [asdict(doubt) for doubt in doubted],
     }
-    return Advice(content, tuple(sorted(checks, key=lambda check: -check.rms)[:8]))
+    said = *assumption_findings(problem, doubted), *missing_findings(content)
+    return content, (*said, *action_findings(content, problem.settings))
 
 
 def proposed(one: Candidate, value: float) -> dict[str, dict[str, Any]]:
@@ -134,15 +122,3 @@ def action_findings(content: Content, settings: FitSettings) -> Iterator[Finding
             numbers = {"what": action["parameter"], "before": before, "after": after, "sd": sd}
             link = settings.parameters[of].link if kind == "weigh" else None
             yield Finding(kind, "note", (link or of,), numbers)
-
-
-def residual_findings(checks: Sequence[ResidualCheck], places: Sequence[str]) -> Iterator[Finding]:
-    """Yield what each residual shows; `places` names joint and log of each."""
-    for check, place in zip(checks, places, strict=True):
-        for one in check.depends:
-            low, high = (f"{end:.3g}".replace("-", "−") for end in (one.low, one.high))
-            numbers = {"error": abs(one.mean), "side": "larger" if one.mean > 0 else "smaller"}
-            numbers |= {"unit": UNITS[one.regressor], "low": low, "high": high}
-            yield Finding("residual depends", "note", (place, one.regressor), numbers)
-        if check.correlation_s > 0.1:  # no sensor of an angle is that slow
-            yield Finding("residual correlated", "note", (place,), {"seconds": check.correlation_s})

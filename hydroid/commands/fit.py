@@ -168,6 +168,7 @@ def fit(
 
 
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
+    from hydroid.advice.assumptions import assumption_findings, doubts
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, judge
@@ -176,9 +177,12 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.verdict_table import verdict_table
 
     settings = problem.settings.of_estimate(fit.final)
-    predictions, baselines = fitted(problem.varied(settings), fit), baselines_of(settings, problem.logs)
-    verdict = judge(settings, predictions, baselines)
-    summary = summarise(problem, fit).model_copy(update={"verdict": verdict})
+    last, baselines = problem.varied(settings), baselines_of(settings, problem.logs)
+    predictions = fitted(last, fit)
+    verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
+    doubted = assumption_findings(last, doubts(last, fit.best.theta))
+    changes = {"verdict": verdict, "findings": (*summary.findings, *doubted)}
+    summary = summary.model_copy(update=changes)
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [verdict_table({fit.final: verdict}), *warnings(summary)]

@@ -12,8 +12,8 @@ from hydroid.files import is_file
 from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
-    from hydroid.advice.suggestions import Advice
     from hydroid.commands.logs import LogSources
+    from hydroid.findings import Finding
 
 TERMS = {
     "name": "quantity",
@@ -43,13 +43,13 @@ def suggest(
     config: "ConfigSource | None" = None,
     set: "SettingChanges" = None,
     repair: bool = False,
-) -> "Result[Advice]":
+) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
     Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
-    most promising ones are freed: does that lower the error on parts of the logs left out? Shows what the
-    residual depends on, and predicts for the best actions, from weighing a link to a new experiment, how much
-    each would reduce the uncertainty.
+    most promising ones are freed: does that lower the error on parts of the logs left out? Tests whether the
+    logs contradict the sign, zero or scale of an angle, and predicts for the best actions, from weighing a
+    link to a new experiment, how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd
 
@@ -63,20 +63,14 @@ def suggest(
     """
     model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
-    from hydroid.advice.suggestions import action_findings, advice, missing_findings, residual_findings
+    from hydroid.advice.suggestions import advice
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.page import log_names
     from hydroid.reporting.table import Table
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
     with Progress() as progress:
-        advised = advice(problem, uncertainty(problem, model.theta), run, progress)
-    content, checks, read = advised.content, advised.residuals, log_names(problem.logs)
-    names = problem.settings.arm.joint_names
-    places = [f"{names[check.joint - 1]} in {read[check.log]}" for check in checks]
-    findings = [*missing_findings(content), *action_findings(content, problem.settings)]
-    findings += residual_findings(checks, places)
+        content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
     none = {"name": "none of them", "rms_deg": content["rms_deg"], "left_out_deg": content["left_out_deg"]}
     note = (
         f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
@@ -88,7 +82,7 @@ def suggest(
         title = "Predicted effect of each action on standard deviations"
         tables["next_actions"] = Table.of(title, ACTIONS, actions)
     lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(tables, out)]
-    return Result(lines, content, advised)
+    return Result(lines, content, findings)
 
 
 def _verdict(term: dict[str, Any]) -> str:

@@ -18,12 +18,16 @@ from hydroid.simulation import Candidates
 
 @dataclass(frozen=True)
 class Binding:
-    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based, in SI."""
+    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based, in SI.
+
+    In a group of logs it is added to what is set otherwise.
+    """
 
     column: int
     quantity: str
     places: list[int]
     factor: float
+    group: str | None
 
 
 class Bindings:
@@ -40,20 +44,26 @@ class Bindings:
         self._arm, self._stage = settings.arm, settings.stage
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         self._rows = [
-            Binding(column, quantity, _places(settings.arm, name, p), QUANTITIES[quantity].factor)
+            Binding(column, quantity, _places(settings.arm, name, p), QUANTITIES[quantity].factor, p.group)
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
         self._refuse_overlap(list(settings.parameters))
         self.parameters = settings.parameter_set()
 
-    def candidates(self, theta: Array) -> Candidates:
-        """Spread theta, shape (n, P), over joints and links."""
+    def candidates(self, theta: Array, group: str | None = None) -> Candidates:
+        """Spread theta, shape (n, P), over joints and links, as they are in a group of logs."""
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
-        for row in self._rows:
+        # what is added comes last
+        for row in sorted(self._rows, key=lambda row: row.group is not None):
             target = mass if row.quantity == "mass" else joints[row.quantity]
-            target[:, row.places] = theta[:, row.column, None] * row.factor
+            value = theta[:, row.column, None] * row.factor
+            if row.group is None:
+                target[:, row.places] = value
+            elif row.group == group:
+                least = QUANTITIES[row.quantity].lowest * row.factor
+                target[:, row.places] = np.maximum(target[:, row.places] + value, least)
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
@@ -78,17 +88,17 @@ class Bindings:
                     )
 
     def _refuse_overlap(self, names: list[str]) -> None:
-        taken: dict[tuple[str, int], str] = {}
+        taken: dict[tuple[str, int, str | None], str] = {}
         for row in self._rows:
             name = names[row.column]
             for place in row.places:
-                if other := taken.get((row.quantity, place)):
+                if other := taken.get((row.quantity, place, row.group)):
                     raise SettingsError(
                         f"{other} and {name} both set the {row.quantity} of the same joint or link",
                         where=f"parameters.{name}",
                         hint="give each its own joints, or remove one",
                     )
-                taken[row.quantity, place] = name
+                taken[row.quantity, place, row.group] = name
 
 
 def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:

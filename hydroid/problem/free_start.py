@@ -54,11 +54,12 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
 
     One simulation for each. A start angle from which the simulation diverges has no effect.
     """
-    spec, candidates = load_model(problem.settings.arm), problem.bindings.candidates(theta[None])
+    spec = load_model(problem.settings.arm)
     base, slopes = problem.output_errors(theta[None])[0], list[StartSlopes]()
     for i, log in enumerate(problem.logs):
         joints, pressures = problem.started(log), compared_pressures(log, problem.settings)
         channels = [channel for channel in problem.channels if channel.log == i]
+        candidates = problem.bindings.candidates(theta[None], problem.settings.log.group(log.source))
         rows = slice(channels[0].rows.start, channels[-1].rows.stop)
         moved: list[Array] = []
         for joint in joints:

@@ -70,6 +70,7 @@ class Problem:
         logs: one or more records, each with its own start pose.
         spread: where candidates are simulated; None: in this process. A worker has `simulation.threads`
             threads, one where that is 0.
+        spec: the arm's model, if it is not the one that the settings name; then without `spread`.
 
     Attributes:
         channels: the compared signals, in the order of a row of residuals.
@@ -78,8 +79,14 @@ class Problem:
         bounds: [first, end) of each objective's samples in it, shape (S, 2).
     """
 
-    def __init__(self, settings: FitSettings, logs: Sequence[Log], spread: Spread | None = None) -> None:
-        spec = load_model(settings.arm)
+    def __init__(
+        self,
+        settings: FitSettings,
+        logs: Sequence[Log],
+        spread: Spread | None = None,
+        spec: mujoco.MjSpec | None = None,
+    ) -> None:
+        spec = load_model(settings.arm) if spec is None else spec
         outputs = [j - 1 for j in settings.outputs]
         self.settings, self.logs, self.outputs = settings, tuple(logs), outputs
         self._spread = spread
@@ -179,8 +186,10 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        candidates = self.bindings.candidates(theta)
-        return [simulation.simulate(candidates) for simulation in self._simulations]
+        groups = [self.settings.log.group(log.source) for log in self.logs]
+        candidates = {group: self.bindings.candidates(theta, group) for group in {*groups}}
+        pairs = zip(self._simulations, groups, strict=True)
+        return [simulation.simulate(candidates[group]) for simulation, group in pairs]
 
     def rms(self, residuals: Array) -> Array:
         """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""

@@ -95,7 +95,8 @@ class FitSettings(Settings):
             info.context["arm"] = known
         if isinstance(names, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
-            values = {**values, "parameters": expanded(names, compared, known)}
+            groups = (values.get("log") or {}).get("groups") or ()
+            values = {**values, "parameters": expanded(names, compared, known, groups)}
         return {**values, "arm": arm}
 
     @model_validator(mode="after")
@@ -108,6 +109,8 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
+            if own.group is not None and own.group not in self.log.groups:
+                raise ValueError(f"parameters.{name}: log.groups has no group {own.group!r}")
             try:
                 self._parameter(name, own)
             except ValueError as error:

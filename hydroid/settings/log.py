@@ -9,6 +9,8 @@ log:
 """
 
 from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
@@ -134,6 +136,9 @@ class LogSettings(Settings):
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
+    groups: dict[str, str] = Field(default_factory=dict[str, str])
+    """logs recorded alike (on one day, with one oil temperature, by one operator): a pattern of file names by
+    the group's name, such as `tuesday: tue_*.csv`; parameters may have an effect in one group only"""
 
     _prefix: str = PrivateAttr("")
 
@@ -146,6 +151,11 @@ class LogSettings(Settings):
         given: dict[str, Any] = vars(DEFAULTS[kind]) | (_given(common) if common else {}) | _given(own)
         names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given["column"])
         return ColumnMap(names, given["unit"], given["scale"], given["offset"])
+
+    def group(self, source: str) -> str | None:
+        """Return the first group whose pattern a log's file name matches."""
+        name = Path(source).name
+        return next((group for group, pattern in self.groups.items() if fnmatch(name, pattern)), None)
 
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own; the time's is common."""

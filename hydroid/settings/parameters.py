@@ -12,11 +12,14 @@ from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
 
 
-def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> dict[str, Any]:
+def expanded(
+    parameters: Mapping[str, Any], compared: Any, arm: Arm | None, groups: Any = ()
+) -> dict[str, Any]:
     """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
 
     `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
-    mechanical parameter serves all joints, because those that are driven but not compared need it too.
+    mechanical parameter serves all joints, because those that are driven but not compared need it too. An
+    effect of `group: each` is one of each of the groups.
 
     Raises:
         ValueError: a parameter with `joints` or `link` and `each`.
@@ -48,13 +51,18 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> d
             own = f"{name}_{place}"
             changes = result.get(own, parameters.get(own, {}))
             result[own] = {**shared, **({"link": place} if mass else {"joints": (place,)}), **changes}
-    return result
+    grouped: dict[str, Any] = {}
+    for name, entry in result.items():
+        every = isinstance(entry, dict) and entry.get("group") == "each"
+        own = {f"{name}_{group}": entry | {"group": group} for group in groups} if every else {name: entry}
+        grouped |= own
+    return grouped
 
 
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if own.nominal is not None:
-        return own.nominal
+    if own.nominal is not None or own.group is not None:
+        return own.nominal or 0.0
     if own.link is not None:
         return arm.mass_of.get(own.link)
     if own.quantity in MECHANICAL:
@@ -104,6 +112,8 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
+    if own.group is not None:
+        return prior.value(-4.0), prior.value(4.0)
     quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
     least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
     return max(prior.value(-4.0), least), prior.value(4.0)

@@ -1,0 +1,186 @@
+"""Do the tests of assumptions name a planted error, and are they silent where nothing is wrong?
+
+    python benchmarks/assumptions.py [--arms 20] [--first 0] [--kinds sign zero scale]
+
+Each arm has two or three joints against gravity, of random lengths, masses, axes and valves, and half of them
+have a pump whose pressure falls with flow. Three logs of a minute, 0.05 deg of noise. What moves it has more
+terms than the model that is fitted: notches, and lags of its own in each direction. The same logs are fitted
+twice: with the arm as it is, and with the axis of one joint turned round, a sign error. It is named where
+that joint is among those that are doubted, and first where it is the first of them.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from common import noisy, options, row, table
+
+import hydroid
+from hydroid.advice.assumptions import Doubt, doubts
+from hydroid.advice.pseudo_random import pseudo_random_log
+from hydroid.fitting.refinement import refine
+from hydroid.fitting.search import search
+from hydroid.log import Log
+from hydroid.prediction import simulate_log
+from hydroid.problem.problem import Problem
+from hydroid.settings.fit import FitSettings
+
+PERIOD, SECONDS, LOGS = 0.05, 60.0, 3
+BODY = """<body name="j{joint}" pos="{place} 0 0"><joint name="j{joint}" axis="0 {axis} 0" range="-50 50"/>
+<geom type="capsule" fromto="0 0 0 {length} 0 {bow}" size="0.08" mass="{mass}"/>"""
+MODEL = (
+    '<mujoco model="arm"><worldbody><body pos="0 0 2" euler="0 {tilt} 0">{bodies}</body></worldbody></mujoco>'
+)
+SIDES = {"open": ("opening", {"within": 4}), "dead": ("dead_band", {"sd": 12, "bounds": [5, 65]}),
+         "power": ("opening_exponent", {"within": 3})}  # fmt: skip
+FREE: dict[str, Any] = {
+    **{f"{n}_{s}": {"quantity": f"{q}_{s}", "each": True} | p for n, (q, p) in SIDES.items() for s in "ab"},
+    "delay": {"quantity": "delay", "each": True, "bounds": [0, 1], "start": 0.1},
+    "lag": {"quantity": "plunger_damping", "each": True, "within": 10},
+    "slope": {"quantity": "lever_slope", "each": True, "nominal": 0, "sd": 0.2},
+    "bend": {"quantity": "lever_bend", "each": True, "nominal": 0, "sd": 0.2},
+    "M": {"quantity": "mass", "each": True, "within": 2},
+}
+PUMP = {"flow": {"quantity": "pump_flow", "within": 2}, "droop": {"quantity": "pump_droop", "within": 3}}
+
+
+class RandomArm:
+    """An arm, its valves and its pump, drawn from a seed."""
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng([seed, 1])
+        self.joints = int(rng.integers(2, 4))
+        self.droops = bool(rng.random() < 0.5)
+        first = slice(self.joints)
+        self.length = np.array([4.0, 2.0, 1.2])[first] * rng.uniform(0.7, 1.4, self.joints)
+        self.mass = np.array([600.0, 300.0, 200.0])[first] * rng.uniform(0.7, 1.5, self.joints)
+        self.axis, self.tilt = rng.choice([-1, 1], self.joints), rng.uniform(-40, 10)
+        self.bow = rng.uniform(-0.2, 0.2, self.joints)
+        reach = np.cumsum(self.length)
+        weight = [
+            9.81
+            * sum(
+                self.mass[k] * (reach[k] - reach[j] + self.length[j] - self.length[k] / 2)
+                for k in range(j, self.joints)
+            )
+            for j in range(self.joints)
+        ]
+        self.size = np.array(weight) / (rng.uniform(0.25, 0.6, self.joints) * 2e7)  # m³/rad
+        self.opening = self.size * rng.uniform(0.25, 0.7, self.joints) / (0.7 * np.sqrt(2 / 860 * 1e7))  # m²
+
+    def settings(self, folder: Path, parameters: dict[str, Any], wrong: int | None = None) -> FitSettings:
+        """Write the arm, the axis of joint `wrong` (from 1) turned round, and read settings of a fit."""
+        bodies = ""
+        for j in range(self.joints):
+            place, axis = self.length[j - 1] if j else 0.0, self.axis[j] * (-1 if j + 1 == wrong else 1)
+            sizes = {"length": self.length[j], "bow": self.bow[j], "mass": self.mass[j]}
+            bodies += BODY.format(joint=j + 1, place=place, axis=axis, **sizes)
+        (folder / "arm.xml").write_text(MODEL.format(bodies=bodies + "</body>" * self.joints, tilt=self.tilt))
+        sizes = {
+            f"j{j + 1}": {
+                "kind": "rotary",
+                "displacement": float(1e6 * self.size[j]),
+                "max_opening": float(1e6 * self.opening[j]),
+            }
+            for j in range(self.joints)
+        }
+        (folder / "arm.yaml").write_text(yaml.safe_dump({"model": "arm.xml", "actuators": sizes}))
+        flow = 2.8 * self.opening.sum() * 0.7 * np.sqrt(2 / 860 * 1e7) * 6e4
+        known = {"supply_pressure": 200, "onset": 0, "slot_width": 1.7, "plunger_damping": 200, "substeps": 4}
+        known |= {"dead_band": 30, "opening_exponent": 1.4}
+        document = {
+            "stage": "hyd",
+            "arm": "arm.yaml",
+            "outputs": list(range(1, self.joints + 1)),
+            "free_start": False,
+            "log": {"period_s": PERIOD},
+            "simulation": {"model": "quasi-static"},
+            "hydraulics": known | ({"pump_flow": float(flow), "pump_droop": 60} if self.droops else {}),
+            "parameters": parameters | (PUMP if self.droops else {}),
+            "objective": {"norm": 2, "segments": 4},
+            "search": {
+                "algorithm": "multistart",
+                "multistart": {"starts": 1, "horizons": [], "iterations": 15},
+            },
+            "refinement": {"iterations": 25, "gain_tolerance": 0.001},
+        }
+        (folder / "fit.yaml").write_text(yaml.safe_dump(document))
+        return hydroid.load_settings(folder / "fit.yaml")
+
+    def logs(self, folder: Path, seed: int) -> list[Log]:
+        """Simulate logs with terms that the fit does not have."""
+        rng, truth = np.random.default_rng([seed, 5]), dict[str, float]()
+        for j in range(1, self.joints + 1):
+            for side in "ab":
+                truth |= {
+                    f"dead_band_{side}_{j}": rng.uniform(15, 45),
+                    f"opening_exponent_{side}_{j}": rng.uniform(1, 2),
+                }
+                truth |= {f"notch_{n}_{side}_{j}": rng.uniform(0.8, 1.25) for n in (2, 3)}
+                truth |= {
+                    f"plunger_damping_{side}_{j}": rng.uniform(50, 300),
+                    f"pilot_lag_{side}_{j}": rng.uniform(0, 0.1),
+                }
+            truth |= {
+                f"delay_{j}": rng.uniform(0.02, 0.2),
+                f"lever_slope_{j}": rng.normal(0, 0.15),
+                f"lever_bend_{j}": rng.normal(0, 0.15),
+            }
+        fixed = {n: {"quantity": n[:-2], "joints": [int(n[-1])], "fixed": float(v)} for n, v in truth.items()}
+        for j, nominal in enumerate(self.mass):
+            mass = float(nominal * np.exp(rng.normal(0, 0.25)))
+            fixed[f"M_j{j + 1}"] = {"quantity": "mass", "link": f"j{j + 1}", "fixed": mass}
+        settings = self.settings(folder, fixed)
+        settings = settings.model_copy(
+            update={"parameters": {n: p for n, p in settings.parameters.items() if p.fixed is not None}}
+        )
+        low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
+
+        def off_the_stops(log: Log) -> bool:
+            angle = simulate_log(settings, log, {}, "truth").angle
+            return bool(np.all((angle > low) & (angle < high)))
+
+        drives = (
+            pseudo_random_log(
+                rng.uniform(-0.4, 0.4, self.joints),
+                list(range(1, self.joints + 1)),
+                SECONDS,
+                PERIOD,
+                100 * seed + i,
+                off_the_stops,
+            )
+            for i in range(LOGS)
+        )
+        return [noisy(simulate_log(settings, drive, {}, "truth"), rng, 0.05) for drive in drives]
+
+
+def tested(settings: FitSettings, logs: list[Log], kinds: list[Any]) -> tuple[float, tuple[Doubt, ...]]:
+    """Fit, then test; return the rms error [deg] and what is doubted."""
+
+    problem = Problem(settings, logs)
+    found = search(problem, lambda row: None, lambda simulated, rms: None, {}).theta[0]
+    assert settings.refinement is not None
+    theta = problem.parameters.from_unit(refine(problem, found, settings.refinement).point)
+    return float(np.degrees(problem.rms(problem.residuals(theta[None]))[0])), doubts(problem, theta, kinds)
+
+
+if __name__ == "__main__":
+    given = options(__doc__, arms=20, first=0, kinds=["sign", "zero", "scale"])
+    table(
+        "arm | turned round | rms, arm as it is [deg] | doubted | rms, one turned [deg] | doubted, evidence"
+    )
+    counts = np.zeros(3, int)
+    for seed in range(given.first, given.arms):
+        drawn = RandomArm(seed)
+        wrong = int(np.random.default_rng([seed, 9]).integers(drawn.joints)) + 1
+        with tempfile.TemporaryDirectory() as folder:
+            logs = drawn.logs(Path(folder), seed)
+            rms, right = tested(drawn.settings(Path(folder), FREE), logs, given.kinds)
+            turned_rms, turned = tested(drawn.settings(Path(folder), FREE, wrong), logs, given.kinds)
+        names = [doubt.joint for doubt in turned if doubt.kind == "sign"]
+        counts += [wrong in names, names[:1] == [wrong], len(right)]
+        texts = [", ".join(f"{d.kind} {d.joint} ({d.evidence:.1f})" for d in one) for one in (right, turned)]
+        row(seed, wrong, f"{rms:.2f}", texts[0], f"{turned_rms:.2f}", texts[1])
+    print(f"\nNamed {counts[0]}, first {counts[1]} of {given.arms - given.first}; false alarms {counts[2]}.")

@@ -160,7 +160,7 @@ def tested(settings: FitSettings, logs: list[Log], kinds: list[Any]) -> tuple[fl
     """Fit, then test; return the rms error [deg] and what is doubted."""
 
     problem = Problem(settings, logs)
-    found = search(problem, lambda row: None, lambda simulated, rms: None, {}).theta[0]
+    found = search(problem, lambda _: None, lambda *_: None, {}).theta[0]
     assert settings.refinement is not None
     theta = problem.parameters.from_unit(refine(problem, found, settings.refinement).point)
     return float(np.degrees(problem.rms(problem.residuals(theta[None]))[0])), doubts(problem, theta, kinds)

@@ -22,7 +22,7 @@ def adapt(
     *,
     fit: "ModelSource",
     free: "str | None" = None,
-    out: "Source | None" = "runs/adapted",
+    out: "Source | None" = None,
     repair: bool = False,
 ) -> FitResult:
     """Adapt a fit to new logs: a few parameters are freed, all others are held at its estimate.
@@ -38,7 +38,7 @@ def adapt(
     Args:
         free (NAME,NAME): Parameters to be freed [default: of those that all joints share, such as pump and
             masses, the ones that lower the error on parts of the logs left out].
-        out (DIR): Run folder.
+        out (DIR): Run folder [default of the command line: runs/adapt].
 
     Raises:
         HydroidError: an input or a folder that cannot be used, or no parameter that helps.
@@ -57,11 +57,9 @@ def adapt(
     settings = adapted(model, chosen)
     with FitProgress(settings, "") as watcher:
         result = run_fit(settings, read, out and Path(out), progress=watcher)
-    rows = [
-        {"freed": step.parameter or "none", "rms [deg]": step.rms_deg, "left out [deg]": step.left_out_deg}
-        for step in path
-    ]
+    rows = [vars(step) | {"parameter": step.parameter or "none"} for step in path]
+    columns = {"parameter": "freed", "rms_deg": "rms [deg]", "left_out_deg": "left out [deg]"}
     note = "left out: the error on parts of the logs, each predicted by an adaptation without it."
-    steps_table = Table.of("Parameters freed one after another", rows, note)
+    steps_table = Table.of("Parameters freed one after another", columns, rows, note)
     content = {**result.content, "steps": [vars(step) for step in path]}
     return replace(result, lines=[steps_table, *result.lines], content=content)

@@ -49,6 +49,7 @@ COMMANDS = [name for commands in GROUPS.values() for name in commands]
 OUT = {
     "fit-mech": NAMED,
     "fit-hyd": NAMED,
+    "adapt": "runs/adapt",
     "validate": "runs/validate",
     "analyse": "runs/analyse",
     "report": "runs/report",

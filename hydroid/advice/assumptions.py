@@ -29,6 +29,8 @@ CHANGES: Mapping[Kind, tuple[float, ...]] = {"sign": (-1.0,), "zero": (-20.0, 20
 """of a logged angle: factor on it and on its command, degrees that are added to it, factor on it"""
 ENOUGH = 4.0
 """evidence that names a joint: the change is 55 times as likely"""
+LOWER = 0.97
+"""part of the rms error that the change must leave at most"""
 LIKELY = -2.0
 """evidence of a joint alone below which a change is not tried on all joints"""
 MOST_TRIED = 3
@@ -55,6 +57,11 @@ class Doubt:
     change: float
     rms_deg: tuple[float, float] = (np.inf, np.inf)
     evidence: float = -np.inf
+
+    @property
+    def holds(self) -> bool:
+        """Whether the logs contradict the assumption clearly."""
+        return self.evidence >= ENOUGH and self.rms_deg[1] < LOWER * self.rms_deg[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +104,11 @@ def doubts(problem: Problem, theta: Array, kinds: Sequence[Kind] = ("sign",)) ->
                 best = max(tests, key=lambda test: test[0].evidence)
                 likely += [best] if best[0].evidence >= LIKELY else []
     if not likely or len(settings.outputs) == 1:
-        return tuple(doubt for doubt, _ in likely if doubt.evidence >= ENOUGH)
+        return tuple(doubt for doubt, _ in likely if doubt.holds)
     whole = _begun(_quasi_static(settings), logs, values)
     likely = sorted(likely, key=lambda one: -one[0].evidence)[:MOST_TRIED]
     found = [_tested(whole, doubt, alone.values)[0] for doubt, alone in likely]
-    return tuple(sorted((one for one in found if one.evidence >= ENOUGH), key=lambda one: -one.evidence))
+    return tuple(sorted((one for one in found if one.holds), key=lambda one: -one.evidence))
 
 
 def _coarse(log: Log) -> Log:
@@ -139,20 +146,24 @@ def _begun(settings: FitSettings, logs: Sequence[Log], values: Mapping[str, floa
 
 
 def _refined(begun: _Refit, problem: Problem, how: RefinementSettings = SHORT) -> _Refit:
-    """Refine from its values, and with nominal masses: a wrong sign may have made them vanish."""
-    parameters, settings, values = problem.parameters, problem.settings, begun.values
-    masses = {n: p for n, p in settings.parameters.items() if p.link is not None}
-    nominal = {n: settings.nominal(p) or values[n] for n, p in masses.items()}
+    """Refine from its values, and from those before any fit: a wrong sign leads far from the right ones.
+
+    With several joints only the masses are as before any fit.
+    """
+    parameters, values = problem.parameters, begun.values
+    first = parameters.mapping(parameters.start)
+    if len(problem.settings.outputs) > 1:
+        first = {n: v for n, v in first.items() if problem.settings.parameters[n].link is not None}
 
     def rows(unit: Array) -> Array:
         theta = parameters.from_unit(unit)
         return np.hstack([problem.residuals(theta), begun.weight * problem.priors.scores(theta)])
 
-    starts = (parameters.to_unit(parameters.started(one)) for one in (values, {**values, **nominal}))
+    starts = (parameters.to_unit(parameters.started(one)) for one in (values, {**values, **first}))
     end = min((least_squares(start, rows, how) for start in starts), key=lambda end: end.cost)
     if not end.cost < begun.cost:
         return begun
-    error, objective = end.residual[: problem.measured.size], settings.objective
+    error, objective = end.residual[: problem.measured.size], problem.settings.objective
     noise = [channel_noise(c, error[c.rows], objective) for c in problem.channels]
     return replace(
         begun,

@@ -27,6 +27,8 @@ from hydroid.settings.search import RefinementSettings
 Kind = Literal["sign", "zero", "scale"]
 CHANGES: Mapping[Kind, tuple[float, ...]] = {"sign": (-1.0,), "zero": (-20.0, 20.0), "scale": (0.5, 2.0)}
 """of a logged angle: factor on it and on its command, degrees that are added to it, factor on it"""
+DOUBTED: Mapping[Kind, str] = {"sign": "sign doubted", "zero": "zero doubted", "scale": "scale doubted"}
+"""kinds of findings"""
 ENOUGH = 4.0
 """evidence that names a joint: the change is 55 times as likely"""
 LOWER = 0.97
@@ -258,4 +260,4 @@ def assumption_findings(problem: Problem, doubted: Sequence[Doubt]) -> Iterator[
     for doubt in doubted:
         before, after = doubt.rms_deg
         numbers = {"before": before, "after": after, "change": doubt.change}
-        yield Finding(f"{doubt.kind} doubted", "warning", (names[doubt.joint - 1],), numbers)
+        yield Finding(DOUBTED[doubt.kind], "warning", (names[doubt.joint - 1],), numbers)

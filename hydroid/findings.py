@@ -231,7 +231,7 @@ WORDS: dict[str, tuple[str, str]] = {
         "the log's clocks differ: mend the log, or set log.delay_s: {delay:.2f}",
     ),
     "turned": (
-        "angle of joint {0} moves against the command (for {against:.0%} of {path:.3g} deg of travel)",
+        "angle of joint {0} moves against the command (for {against:.0%} of {path} of travel)",
         "if the command is logged with the opposite sign, set log.joints.{0}.command.scale: -1",
     ),
     "no motion": (

@@ -12,7 +12,7 @@ from hydroid.files import is_file, write_atomic
 
 
 def read_mjcf(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF whose joints are hinges, each alone on its body.
+    """Read an MJCF whose joints turn or slide, each alone on its body.
 
     Raises:
         ModelError: missing or refused by MuJoCo; no joint, another kind of joint, a joint or its body without
@@ -29,8 +29,11 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
         if not joint.name or not joint.parent.name:
             what = f"joint {joint.name!r} of body {joint.parent.name!r}: both need a name"
             raise ModelError(what, where=where)
-        if joint.type != mujoco.mjtJoint.mjJNT_HINGE or len(joint.parent.joints) > 1:
-            raise ModelError(f"joint {joint.name!r} must be a hinge, alone on its body", where=where)
+        kinds = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+        if joint.type not in kinds or len(joint.parent.joints) > 1:
+            raise ModelError(
+                f"joint {joint.name!r} must be a hinge or a slide, alone on its body", where=where
+            )
     if spec.equalities:
         raise ModelError("has equality constraints, which hydroid does not simulate", where=where)
     return spec

@@ -78,7 +78,7 @@ class RandomExperiments:
         limits, arm, period = settings.design, settings.arm, settings.log.period_s
         self._rng, self._limit, self._any_pose = rng, limits.command_pct, limits.poses == "any"
         self._joints, self._poses = _driven_joints(settings), _start_poses(settings)
-        lower, upper = np.radians([joint.range for joint in arm.joints]).T
+        lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward
         self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / period)

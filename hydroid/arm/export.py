@@ -121,7 +121,8 @@ def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees
     body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
     joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
     joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
-    joint.springref = math.degrees(slack) if degrees else slack
+    turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    joint.springref = math.degrees(slack) if degrees and turns else slack
 
 
 def _draw_tendons(spec: mujoco.MjSpec) -> None:

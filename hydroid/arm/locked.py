@@ -162,7 +162,7 @@ def _fused(
                 inertia=[1.0, 1.0, 1.0],
             )
             joint = moved[number]
-            body.add_joint(name=joint.name, type=mujoco.mjtJoint.mjJNT_HINGE, pos=joint.pos, axis=joint.axis)
+            body.add_joint(name=joint.name, type=joint.type[0], pos=joint.pos, axis=joint.axis)
             bodies.append(body)
             kept.append(number)
             above = len(kept) - 1

@@ -4,12 +4,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from hydroid.cad.chain import choose_chain
-from hydroid.cad.repair import MASSLESS, ball, repair_inertias, set_inertia
+from hydroid.cad.cylinders import take_cylinders
+from hydroid.cad.notes import Notes
+from hydroid.cad.repair import repair_inertias, weigh
 from hydroid.cad.scene import SCENE, clear_scene, exclude_contacts, place_scene
 from hydroid.cad.shapes import HIDDEN, SHOWN, read_mesh, shown_stl
 from hydroid.cad.source import read_source
@@ -27,61 +30,72 @@ class ImportedArm:
         name: of the robot.
         mjcf: its model, with meshes in the folder MESHES.
         meshes: binary STL files by their path from the model.
+        cylinders: settings of the cylinders that the file models, but for areas, by joint.
         notes: what was assumed, left out or mended, a line each.
     """
 
     name: str
     mjcf: str
     meshes: dict[str, bytes]
+    cylinders: dict[str, dict[str, Any]]
     notes: tuple[str, ...]
 
 
-def import_arm(path: Path, columns: Sequence[str] = (), tip: str | None = None) -> ImportedArm:
+def import_arm(
+    path: Path, columns: Sequence[str] = (), tip: str | None = None, total_mass: float | None = None
+) -> ImportedArm:
     """Read a robot through MuJoCo's importer and take the arm out of it.
 
     Args:
         path: a URDF or an MJCF.
         columns: names of a log's columns, which help to choose among branches.
         tip: name of the link at which the arm ends; None: the tip that fits best.
+        total_mass: of the links that move [kg]; None: masses are those of the file.
 
     Raises:
         ModelError: the file cannot be read, or holds no arm.
     """
-    notes: list[str] = []
+    notes = Notes()
     spec, files, urdf = read_source(path, notes)
     _clear(spec, path)
+    cylinders = take_cylinders(spec, notes)
     choose_chain(spec, str(path), notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
-    meshes = _convert_meshes(spec, files, exact, notes)
+    meshes, lost = _convert_meshes(spec, files, exact, notes)
     _sort_shapes(spec)
     with mujoco_errors(str(path)):
         repair_inertias(spec, urdf, notes)
         spec.fuse_static()
-    if not any(np.any(joint.damping) for joint in spec.joints):
-        notes.append("no joint has damping: a fit estimates it")
+        weigh(spec, notes, total_mass, lost)
     for joint in spec.joints:
-        _mend_joint(joint, notes)
-    return ImportedArm(spec.modelname, _in_scene(spec, meshes), meshes, tuple(dict.fromkeys(notes)))
+        joint.damping = joint.stiffness = np.zeros(3)  # a fit finds them
+        joint.frictionloss = joint.armature = 0.0
+        if joint.limited == mujoco.mjtLimited.mjLIMITED_FALSE or not joint.range[0] < joint.range[1]:
+            joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+            notes.add("without limits: moving without stops, unless you give a range in arm.xml", joint.name)
+    kept = {joint.name: own for joint in spec.joints if (own := cylinders.get(joint.name))}
+    return ImportedArm(spec.modelname, _in_scene(spec, meshes), meshes, kept, tuple(notes.lines()))
 
 
 def _clear(spec: mujoco.MjSpec, path: Path) -> None:
     """Delete what is no part of the arm's bodies, and give these plain names."""
-    forces = (spec.actuators, spec.sensors, spec.equalities, spec.tendons)
-    for section in (*forces, spec.keys, spec.excludes, spec.pairs):
+    for section in (spec.keys, spec.excludes, spec.pairs):
         for part in list(section):
             spec.delete(part)
     clear_scene(spec)
     spec.modelname = _word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
-    taken = {"world"}
+    renamed, taken = dict[str, str](), {"world"}
     for number, body in enumerate(spec.bodies[1:], start=1):
-        body.name = _distinct(_word(body.name or f"link{number}"), taken)
-    taken = set()
+        old, body.name = body.name, _distinct(_word(body.name or f"link{number}"), taken)
+        renamed[old] = body.name
+    taken, joints = set(), dict[str, str]()
     for joint in spec.joints:
-        joint.name = _distinct(_word(joint.name or f"{joint.parent.name}_joint"), taken)
-    folder = path.resolve().parent / spec.texturedir
-    for texture in spec.textures:
-        texture.file = texture.file and str(folder / texture.file)  # these stay where they are
-    spec.texturedir = ""
+        old, joint.name = joint.name, _distinct(_word(joint.name or f"{joint.parent.name}_joint"), taken)
+        joints[old] = joint.name
+    for one in spec.equalities:
+        names = joints if one.type == mujoco.mjtEq.mjEQ_JOINT else renamed
+        if one.objtype != mujoco.mjtObj.mjOBJ_SITE:
+            one.name1, one.name2 = (names.get(name, name) for name in (one.name1, one.name2))
 
 
 def _word(name: str) -> str:
@@ -98,32 +112,34 @@ def _distinct(name: str, taken: set[str]) -> str:
 
 
 def _convert_meshes(
-    spec: mujoco.MjSpec, files: dict[str, Path], exact: bool, notes: list[str]
-) -> dict[str, bytes]:
-    """Turn the meshes into STL files in m, delete those that cannot be shown, and return the files.
+    spec: mujoco.MjSpec, files: dict[str, Path], exact: bool, notes: Notes
+) -> tuple[dict[str, bytes], set[str]]:
+    """Turn the meshes into STL files in m and delete those that cannot be shown.
+
+    Returns the files, and the bodies that lost a mesh.
 
     `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
     """
     read = {name: mesh for name, path in files.items() if (mesh := read_mesh(path, notes)) is not None}
-    sizes = {
-        mesh.file: float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
+    used = {geom.meshname for geom in spec.geoms}
+    sizes = [
+        float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
         for mesh in spec.meshes
-        if mesh.file in read
-    }
-    largest = max(sizes, key=lambda name: sizes[name], default="")
-    millimetres = bool(largest) and sizes[largest] > 50.0  # [m]
+        if mesh.file in read and mesh.name in used
+    ]
+    millimetres = max(sizes, default=0.0) > 50.0  # [m]
     if millimetres:
-        what = f"mesh {files[largest].name} would be {sizes[largest]:.4g} m long"
-        notes.append(f"{what}: all meshes are taken to be in mm")
+        notes.add(f"meshes up to {max(sizes):.4g} m long: all are taken to be in mm")
     taken: set[str] = set()
     names = {name: f"{MESHES}/{_distinct(_word(files[name].stem), taken)}.stl" for name in read}
-    meshes: dict[str, bytes] = {}
+    meshes, lost = dict[str, bytes](), set[str]()
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
         shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
         mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
         given = read.get(mesh.file) if shapes else None
         shown = given and shown_stl(given, mesh.scale, files[mesh.file].name, notes)
         if not shown:
+            lost |= {geom.parent.name for geom in shapes}
             for part in (*shapes, mesh):
                 spec.delete(part)
             continue
@@ -131,7 +147,7 @@ def _convert_meshes(
         meshes[mesh.file] = shown[0]
         mesh.inertia = shown[1] if exact else mesh.inertia
     spec.meshdir, spec.strippath, spec.assets = "", False, meshes
-    return meshes
+    return meshes, lost
 
 
 def _sort_shapes(spec: mujoco.MjSpec) -> None:
@@ -144,19 +160,6 @@ def _sort_shapes(spec: mujoco.MjSpec) -> None:
             geom.contype = geom.conaffinity = int(geom in (solid or visual))
             if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
                 geom.rgba = (0.94, 0.53, 0.08, 1.0)
-
-
-def _mend_joint(joint: mujoco.MjsJoint, notes: list[str]) -> None:
-    """Give the joint's link a mass, say where it has no limits, and leave to a fit what a fit finds."""
-    joint.damping = joint.stiffness = np.zeros(3)
-    joint.frictionloss = joint.armature = 0.0
-    if joint.parent.mass <= MASSLESS:
-        name = joint.parent.name
-        notes.append(f"link {name} has no mass and no shape: a steel ball of 1 kg in its joint is taken")
-        set_inertia(joint.parent, 1.0, np.array(joint.pos), ball(1.0))
-    if joint.limited == mujoco.mjtLimited.mjLIMITED_FALSE or not joint.range[0] < joint.range[1]:
-        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        notes.append(f"joint {joint.name} has no limits: it turns without stops, unless you give it a range")
 
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:

@@ -1,73 +1,105 @@
-"""Masses and inertias of bodies: those of the file, or those of their shapes where no rigid body has them."""
+"""Masses and inertias of bodies: those of the file, or those of their hulls where no machine has them."""
+
+from collections.abc import Collection
+from itertools import pairwise
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from hydroid.cad.shapes import SHOWN, Array
+from hydroid.cad.notes import Notes
+from hydroid.cad.shapes import SHOWN, Array, geom_mesh
 from hydroid.mjcf import mujoco_errors
 
-DENSITY = 1000.0
-"""of a body without a mass [kg/m³], MuJoCo's; steel links are hollow"""
 MASSLESS = 1e-6
 """mass up to which a body counts as a frame without mass [kg]"""
-NO_INERTIAL = "it has no inertial"
+USUAL = 1200.0
+"""mass of a link over the volume of its hull [kg/m³]: parts of machines are hollow, and have 500 to 3,000"""
+LEAST, MOST = 200.0, 8000.0
+"""outside these no link can be: cast parts are solid, and thin sheets make hulls that are nearly empty"""
+SLENDER = 0.015
+"""volume of a link without a shape, over the cube of its length: a box of 1 to 8"""
 NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]
 """MuJoCo's word for a full inertia that is not given"""
 
 
-def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: list[str]) -> None:
-    """Give every body a mass and an inertia that a rigid body can have.
+class Solid(NamedTuple):
+    """Volume [m³], centre [m], (3,), and inertia of 1 kg about it [m²], (3, 3), in the body's frame."""
 
-    What the file says is kept where it is possible. Otherwise MuJoCo takes that of the shapes of group SHOWN
-    at uniform density. A body without any mass becomes a mere frame.
+    volume: float
+    centre: Array
+    tensor: Array
+
+
+def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
+    """Give every body a mass and an inertia that a rigid body can have; one without a mass is a mere frame.
+
+    What the file says is kept where it is possible, else the mass with the inertia of the shape's hull.
 
     Raises:
         ModelError: MuJoCo refuses the file for another reason.
     """
-    faults = {body.name: fault for body in spec.bodies[1:] if (fault := _stated_fault(body, urdf))}
-    model = _compiled(spec)
-    wide = {body.name: _too_wide(model, model.body(body.name).id) for body in spec.bodies[1:]}
-    faults |= {name: fault for name, fault in wide.items() if fault and name not in faults}
-    stated: dict[str, tuple[float, Array]] = {}
-    for body in map(spec.body, faults):
-        stated[body.name] = body.mass * body.explicitinertial, body.ipos.copy()
-        body.explicitinertial, body.ipos, body.fullinertia = False, [np.nan] * 3, NO_TENSOR
-        for geom in body.geoms:
-            solid = geom.group == SHOWN and _kind(spec, geom) != mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-            geom.mass, geom.density = np.nan, DENSITY if solid else 0.0
-    model = _compiled(spec)
+    faults = {body.name: _stated_fault(body, urdf) for body in spec.bodies[1:]}
+    model = compiled(spec)
     for body in spec.bodies[1:]:
-        number, fault = model.body(body.name).id, faults.get(body.name)
+        number, fault = model.body(body.name).id, faults[body.name]
         if not model.body_weldid[number]:
             continue  # what cannot move
         mass, centre, turn = float(model.body_mass[number]), model.body_ipos[number].copy(), np.empty(9)
         mujoco.mju_quat2Mat(turn, model.body_iquat[number])
         axes = turn.reshape(3, 3)
         tensor = axes * model.body_inertia[number] @ axes.T
-        if fault:
-            given, place = stated[body.name]
-            hull = any(
-                _kind(spec, geom) == mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX for geom in body.geoms
-            )
-            what, weighed = "mesh's hull" if hull else "mesh", given > MASSLESS
-            if mass > MASSLESS and weighed:
-                mass, tensor = given, tensor * given / mass
-                fault += f"; the inertia of its {what} at uniform density is taken"
-            elif mass > MASSLESS:
-                fault += f"; {mass:.4g} kg are taken, its {what} at {DENSITY:g} kg/m³"
-            elif weighed:
-                mass, centre, tensor = given, place, ball(given)
-                fault += "; it has no shape, so a steel ball of its mass is taken"
-            elif fault != NO_INERTIAL:
-                fault += " and no shape: it is left out"
-            if fault != NO_INERTIAL:  # a mere frame, such as a tool's centre point
-                notes.append(f"link {body.name}: {fault}")
-        elif body.explicitinertial and mass > MASSLESS:
+        mass = 0.0 if mass <= MASSLESS or fault == "no mass" else mass
+        solid = solid_of(model, number)
+        if mass and solid and not fault and _width(tensor, mass) > _size(model, number):
+            fault = "an inertia of a far larger body"
+        if mass and fault:
+            tensor, what = ball(mass), "a steel ball of its mass is taken"
+            if solid:
+                centre, tensor, what = solid.centre, mass * solid.tensor, "that of its hull is taken"
+            notes.add(f"{fault}: {what}", f"link {body.name}")
+        set_inertia(body, mass, centre, tensor)
+
+
+def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collection[str]) -> None:
+    """Replace masses that no machine's link has, and scale all to a total [kg] that is known.
+
+    The spec has moving bodies alone, with masses and inertias. Those that `lost` a mesh count as shapeless.
+    """
+    model = compiled(spec)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    links, lines = [body for body in spec.bodies[1:] if body.joints], list[str]()
+    places = [data.joint(body.joints[0].name).xanchor for body in links]
+    places.append(places[-1] + 0.5 * (places[-1] - places[-2] if len(links) > 1 else [1.0, 0.0, 0.0]))
+    longest = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max())
+    for body, (here, there) in zip(links, pairwise(places), strict=True):
+        solid, least, most = solid_of(model, model.body(body.name).id), LEAST, MOST
+        if (
+            solid is None or body.name in lost
+        ):  # a slender link to the next joint; the last one goes on, half as long
+            way = data.body(body.name).xmat.reshape(3, 3).T @ (there - here)
+            length, least, most = max(float(np.linalg.norm(way)), 0.4 * longest, 0.1), LEAST / 10, np.inf
+            solid = Solid(SLENDER * length**3, 0.5 * way, length**2 / 12 * np.eye(3))
+        if least <= body.mass / solid.volume <= most:
             continue
-        set_inertia(body, mass if mass > MASSLESS else 0.0, centre, tensor)
+        mass = USUAL * solid.volume
+        lines.append(f"{body.name} {f'{body.mass:.2g}' if body.mass else 'none'} -> {mass:.3g}")
+        set_inertia(body, mass, solid.centre, mass * solid.tensor)
+    if lines:
+        notes.add(
+            f"MASSES THAT NO MACHINE HAS [kg]: {', '.join(lines)} ({USUAL:g} kg/m³ of hull is taken). Say "
+            "what you know: --total-mass KG, or masses in arm.xml"
+        )
+    if total is not None:
+        factor = total / sum(body.mass for body in links)
+        for body in links:
+            body.mass *= factor
+            body.fullinertia = np.array(body.fullinertia) * factor
+        notes.add(f"all masses times {factor:.3g}: what moves weighs {total:g} kg, as asked")
 
 
-def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile without the refusals that are mended here."""
     compiler = spec.compiler
     compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = True, 1e-9, 1e-9
@@ -77,9 +109,26 @@ def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return model
 
 
-def _kind(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> int | None:
-    """How MuJoCo takes the inertia of a shape's mesh; None: it has no mesh."""
-    return int(spec.mesh(geom.meshname).inertia) if geom.meshname else None
+def solid_of(model: mujoco.MjModel, body: int) -> Solid | None:
+    """Return the hulls of a body's shapes together; None: it has none with a volume."""
+    parts = list[Solid]()
+    for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_group == SHOWN)).tolist():
+        mesh, place, turn = geom_mesh(model, geom), np.eye(4), np.empty(9)
+        if mesh is None or np.linalg.matrix_rank(mesh.vertices - mesh.vertices[0], tol=1e-9) < 3:
+            continue
+        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+        place[:3, :3], place[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
+        hull = mesh.convex_hull.apply_transform(place)
+        parts.append(Solid(hull.volume, hull.center_mass, np.array(hull.moment_inertia) / hull.volume))
+    volume = sum(part.volume for part in parts)
+    if not volume:
+        return None
+    centre = np.sum([part.volume / volume * part.centre for part in parts], axis=0)
+    tensor = np.zeros((3, 3))
+    for part in parts:
+        away = part.centre - centre
+        tensor += part.volume / volume * (part.tensor + away @ away * np.eye(3) - np.outer(away, away))
+    return Solid(float(volume), centre, tensor)
 
 
 def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array) -> None:
@@ -99,36 +148,29 @@ def ball(mass: float) -> Array:
 def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
     """Say why no rigid body has the mass or inertia that a file states, and take it out; empty: one has."""
     if not body.explicitinertial:
-        return NO_INERTIAL if urdf else ""
+        return "no mass" if urdf else ""
     xx, yy, zz, xy, xz, yz = body.fullinertia
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if np.isnan(xx):
         tensor = np.diag(np.array(body.inertia))
-    fault = _tensor_fault(tensor) if body.mass > MASSLESS else "it has no mass"
+    fault = "no mass"
+    if body.mass > MASSLESS and np.isfinite(body.mass):
+        fault = "an inertia that is not finite"
+        if np.isfinite(tensor).all():
+            a, b, c = np.linalg.eigvalsh(tensor).tolist()  # exports round
+            fault = "" if a > 0 and a + b >= c * (1 - 1e-6) else "an inertia that no rigid body has"
     if fault:
-        body.mass = max(body.mass, 0.0) if np.isfinite(body.mass) else 0.0
+        body.mass = body.mass if fault != "no mass" else 0.0
         body.inertia, body.fullinertia = [1.0] * 3, NO_TENSOR
     return fault
 
 
-def _tensor_fault(tensor: Array) -> str:
-    if not tensor.any():
-        return "its inertia is 0"
-    if not np.isfinite(tensor).all():
-        return "its inertia is not finite"
-    a, b, c = np.linalg.eigvalsh(tensor).tolist()
-    if a <= 0:
-        return f"its smallest moment of inertia is {a:.3g} kg·m², and must be above 0"
-    if a + b < c * (1 - 1e-6):  # exports round
-        return f"its moments of inertia {a:.3g}, {b:.3g} and {c:.3g} kg·m² break A + B ≥ C"
-    return ""
+def _width(tensor: Array, mass: float) -> float:
+    return 2 * float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))
 
 
-def _too_wide(model: mujoco.MjModel, body: int) -> str:
-    """Why an inertia belongs to a body of another size, as one in kg·mm² does; empty: it does not."""
+def _size(model: mujoco.MjModel, body: int) -> float:
+    """Length of a body's shapes [m]."""
     geoms = np.flatnonzero((model.geom_bodyid == body) & (model.geom_group == SHOWN))
     away = np.linalg.norm(model.geom_pos[geoms] - model.body_ipos[body], axis=1)
-    size = 2 * float(np.max(away + model.geom_rbound[geoms], initial=0.0))
-    width = 2 * float(np.sqrt(model.body_inertia[body].max() / max(model.body_mass[body], MASSLESS)))
-    wide = f"its inertia is that of a body {width:.3g} m wide, but its shape is {size:.3g} m long"
-    return wide if width > size > 0 else ""
+    return 2 * float(np.max(away + model.geom_rbound[geoms], initial=0.0))

@@ -1,5 +1,6 @@
 """Mesh files and MuJoCo's shapes -> triangles in m."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import mujoco
@@ -7,6 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from hydroid.cad.notes import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
 
@@ -15,33 +17,32 @@ SHOWN, HIDDEN = 2, 3
 """groups of shapes that are seen, and of those that only collide"""
 
 
-def read_mesh(path: Path, notes: list[str]) -> trimesh.Trimesh | None:
+def read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
     """Read a mesh file of any format that trimesh knows; None, with a note: it cannot be read."""
     try:
         mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # trimesh's readers raise whatever their format's parser does
-        reason = str(error).strip().splitlines()
-        hint = "; pip install pycollada" if path.suffix.lower() == ".dae" else "; export it as STL"
-        what = reason[0] if reason else type(error).__name__
-        notes.append(f"mesh {path.name} cannot be read ({what}){hint}")
+        collada = path.suffix.lower() == ".dae" and isinstance(error, ImportError | ValueError)
+        cure = "pip install pycollada, or export them as STL" if collada else "export them as STL"
+        notes.add(f"cannot be read; {cure}", f"mesh {path.name}")
         return None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
-        notes.append(f"mesh {path.name} holds no triangles; export the solid as STL")
+        notes.add("holds no triangles; export the solid as STL", f"mesh {path.name}")
         return None
     return mesh
 
 
 def shown_stl(
-    mesh: trimesh.Trimesh, scale: Array, name: str, notes: list[str]
+    mesh: trimesh.Trimesh, scale: Array, name: str, notes: Notes
 ) -> tuple[bytes, mujoco.mjtMeshInertia] | None:
     """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note: it refuses both.
 
     That is exact where the mesh is closed, else that of its hull, and of no use where it is flat.
     """
     if len(mesh.faces) > 200_000:
-        notes.append(f"mesh {name} has more triangles than MuJoCo reads: its hull is shown")
+        notes.add("more triangles than MuJoCo reads: its hull is shown", f"mesh {name}")
         mesh = mesh.convex_hull
-    content, kinds, refusal = mesh.export(file_type="stl"), mujoco.mjtMeshInertia, ""
+    content, kinds = mesh.export(file_type="stl"), mujoco.mjtMeshInertia
     assert isinstance(content, bytes)
     closed = [kinds.mjMESH_INERTIA_EXACT] if mesh.is_volume else []
     for kind in (*closed, kinds.mjMESH_INERTIA_CONVEX, kinds.mjMESH_INERTIA_SHELL):
@@ -49,13 +50,10 @@ def shown_stl(
         spec.assets = {"a.stl": content}
         spec.add_mesh(name="a", file="a.stl", scale=scale, inertia=kind)
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="a")
-        try:
-            with mujoco_errors(f"mesh {name}"):
-                spec.compile()
+        with suppress(ModelError), mujoco_errors(f"mesh {name}"):
+            spec.compile()
             return content, kind
-        except ModelError as error:
-            refusal = str(error)
-    notes.append(f"{refusal}: it is not shown")
+    notes.add("refused by MuJoCo: not shown", f"mesh {name}")
     return None
 
 

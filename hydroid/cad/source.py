@@ -1,70 +1,89 @@
-"""A URDF or MJCF file -> MuJoCo's spec of it with hinges alone, and where its meshes are."""
+"""A URDF or MJCF file -> MuJoCo's spec of it, and where its meshes are."""
 
+from collections.abc import Mapping
 from itertools import chain, islice
 from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
 
+from hydroid.cad.notes import Notes
 from hydroid.errors import ModelError
 from hydroid.files import is_file
 from hydroid.mjcf import mujoco_errors
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
-HELD = {
-    mujoco.mjtJoint.mjJNT_SLIDE: "slides",
-    mujoco.mjtJoint.mjJNT_FREE: "floats freely",
-    mujoco.mjtJoint.mjJNT_BALL: "is a ball joint",
+REFUSED = {
+    "sdf": ("is an SDF", "convert it: sdformat2mjcf {name} arm.xml (pip install sdformat-mjcf)"),
+    "usd": ("is a USD stage", "export the arm as URDF or MJCF (Isaac Sim: the URDF exporter)"),
+    "xacro": ("is a xacro, not a URDF", "expand it first: xacro {name} > robot.urdf"),
 }
-"""kinds of joints that hydroid does not move, and what they do"""
+"""files that hold robots and are not read, and what to do"""
+IGNORED = (
+    "extension",
+    "plugin",
+    "sensor",
+    "texture",
+    "hfield",
+    "skin",
+    "flex",
+    "flexcomp",
+    "composite",
+    "size",
+)
+"""elements of an MJCF that the arm does not need, whose files or libraries are often missing"""
 
 
-def read_source(path: Path, notes: list[str]) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
-    """Read a URDF or an MJCF without the joints that hydroid does not move.
+def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:
+    """Read a URDF or an MJCF.
 
     Returns:
         MuJoCo's spec, where each file of a mesh that it names lies, and whether the file is a URDF.
 
     Raises:
-        ModelError: missing, not XML, of another kind, a xacro, or refused by MuJoCo.
+        ModelError: missing, not XML, of another kind, or refused by MuJoCo.
     """
     where = str(path)
     if not is_file(path):
         raise ModelError("no such robot", where=where, hint="give a URDF or an MJCF file")
-    try:
-        root = ElementTree.fromstring(path.read_bytes())
-    except (ElementTree.ParseError, OSError, ValueError) as error:
-        raise ModelError(f"cannot be read as XML ({error})", where=where) from None
-    if any("xacro" in str(element.tag).lower() for element in root.iter()):
-        hint = f"expand it first: xacro {path.name} > robot.urdf"
-        raise ModelError("is a xacro, not a URDF", where=where, hint=hint)
-    urdf, folder = root.tag == "robot", path.resolve().parent
-    if not urdf and root.tag != "mujoco":
+    usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
+    root = ElementTree.Element("usd") if usd else _parsed(path)
+    kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)
+    if kind in REFUSED:
+        what, hint = REFUSED[kind]
+        raise ModelError(what, where=where, hint=hint.format(name=path.name))
+    urdf, folder = kind == "robot", path.resolve().parent
+    if not urdf and kind != "mujoco":
         what = f"is neither URDF nor MJCF: its root element is <{root.tag}>"
         raise ModelError(what, where=where, hint="export the arm as URDF")
+    files = _prepare_urdf(root, notes) if urdf else {}
+    if not urdf:
+        _prepare_mjcf(root, folder)
     with mujoco_errors(where):
-        if urdf:
-            files = _prepare_urdf(root, notes)
-            spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        else:
-            spec = mujoco.MjSpec.from_file(where)
-            files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
-            folder /= spec.meshdir
-    found = {name: _find(given, folder, notes) for name, given in files.items()}
-    _hold_joints(spec, notes)
-    return spec, {name: place for name, place in found.items() if place}, urdf
+        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    if not urdf:
+        files = {mesh.file: mesh.file for mesh in spec.meshes if mesh.file}
+        folder /= spec.meshdir
+    return spec, _found(files, folder, notes), urdf
 
 
-def _prepare_urdf(root: ElementTree.Element, notes: list[str]) -> dict[str, str]:
+def _parsed(path: Path) -> ElementTree.Element:
+    try:
+        return ElementTree.fromstring(path.read_bytes())
+    except (ElementTree.ParseError, OSError, ValueError) as error:
+        raise ModelError(f"cannot be read as XML ({error})", where=str(path)) from None
+
+
+def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:
     """Let MuJoCo keep all of a URDF, and return what it says of each mesh by a plain file name."""
     children = {child.get("link") for child in root.iterfind("joint/child")}
     for link in root.iterfind("link"):
         if link.get("name") not in children:
-            notes.append(f"the root link {link.get('name')} is the fixed base: its mass does not matter")
+            notes.add("root link, the fixed base: its mass does not matter", str(link.get("name")))
     for joint in root.iterfind("joint[@type='planar']"):  # MuJoCo makes three joints of it
         joint.set("type", "fixed")
-        notes.append(_held(str(joint.get("name")), "moves in a plane"))
+        notes.add("moving in a plane, which hydroid does not model: held at 0", str(joint.get("name")))
     names: dict[str, str] = {}
     for mesh in root.iterfind("link/*/geometry/mesh"):
         mesh.set("filename", names.setdefault(str(mesh.get("filename")), f"mesh{len(names)}.stl"))
@@ -76,39 +95,34 @@ def _prepare_urdf(root: ElementTree.Element, notes: list[str]) -> dict[str, str]
     return {name: given for given, name in names.items()}
 
 
-def _find(given: str, folder: Path, notes: list[str]) -> Path | None:
-    """Look for a mesh from the folder and its parents, with and without its package's name, or by name."""
-    rest = Path(given.rpartition("://")[2])
-    places = (folder, *islice(folder.parents, 4))
-    tried = [place / tail for place in places for tail in (rest, Path(*rest.parts[1:]))]
-    alike = (path for path in islice(folder.rglob("*"), 20_000) if path.name == rest.name)
-    found = next((path for path in chain(tried, alike) if is_file(path)), None)
-    if found is None:
-        looked = f"{tried[0]}, {tried[-1]} and {rest.name} below {folder}"
-        notes.append(f"mesh {given} is not there; looked for {looked}")
+def _prepare_mjcf(root: ElementTree.Element, folder: Path) -> None:
+    """Put included files in their places, and take out what the arm does not need."""
+    for parent in [*root.iter()]:
+        for at, part in reversed([*enumerate(parent)]):
+            if part.tag == "include":
+                inner = _parsed(folder / str(part.get("file")))
+                _prepare_mjcf(inner, folder)
+                parent[at : at + 1] = [*inner]
+            elif part.tag in IGNORED or "hfield" in (part.get("type"), *part.keys()):
+                parent.remove(part)
+            elif part.tag == "material":
+                part.attrib.pop("texture", None)
+
+
+def _found(files: Mapping[str, str], folder: Path, notes: Notes) -> dict[str, Path]:
+    """Look for meshes from the folder and its parents, with and without a package's name, or by name."""
+    below = {path.name.lower(): path for path in islice(folder.rglob("*"), 20_000)} if files else {}
+    found = dict[str, Path]()
+    for name, given in files.items():
+        rest = Path(given.rpartition("://")[2].replace("\\", "/").lstrip("/"))
+        tails = (Path(given), rest, Path(*rest.parts[1:]))
+        tried = (place / tail for place in (folder, *islice(folder.parents, 4)) for tail in tails)
+        alike = [below[rest.name.lower()]] if rest.name.lower() in below else []
+        if place := next((path for path in chain(tried, alike) if is_file(path)), None):
+            found[name] = place
+        else:
+            what = (
+                f"not found from {folder} and its parents, nor by name below it: these shapes are not shown"
+            )
+            notes.add(what, f"mesh {given}")
     return found
-
-
-def _hold_joints(spec: mujoco.MjSpec, notes: list[str]) -> None:
-    """Delete the joints that are no hinges or follow others, and say so of all that is left out."""
-    followers: dict[str, str] = {}
-    for equality in spec.equalities:
-        if equality.type == mujoco.mjtEq.mjEQ_JOINT:
-            followers[equality.name1] = f"mimics {equality.name2}" if equality.name2 else "has an equality"
-        else:
-            notes.append(f"equality {equality.name or '(unnamed)'} is left out: hydroid models serial arms")
-    for joint in list(spec.joints):
-        name = joint.name or f"of {joint.parent.name}"
-        if name in followers:
-            notes.append(f"joint {name} {followers[name]}, which hydroid does not model: it is held at 0")
-        elif joint.type in HELD:
-            notes.append(_held(name, HELD[joint.type]))
-        else:
-            continue
-        spec.delete(joint)
-    if spec.actuators:
-        notes.append(f"its {len(spec.actuators)} actuators are left out: the hydraulics take their place")
-
-
-def _held(joint: str, what: str) -> str:
-    return f"joint {joint} {what}: hydroid moves hinges only, so it is held at 0"

@@ -22,11 +22,13 @@ def init(
     log: "Source | Sequence[Source] | None" = None,
     joints: str | list[str] | None = None,
     tip: str | None = None,
+    total_mass: float | None = None,
+    force: bool = False,
 ) -> "Result[Project]":
     """Write a project that runs, from your arm's CAD and your log.
 
     It has the arm's file and model, settings of a fit with starts and priors from the arm's size, a
-    picture to check the arm by, and the commands to run next. Nothing is overwritten.
+    picture to check the arm by, and the commands to run next.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -40,6 +42,8 @@ def init(
             validate on.
         joints (NAME,NAME): Names of the arm's joints in the order of the log's numbers (u1, u2, ...)
             [default: the order in the arm's file].
+        total_mass (KG): Mass of all links that move [kg], to which those of the arm's file are scaled.
+        force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default: the end of the branch
             whose joints the log names, or else of the longest branch].
 
@@ -54,7 +58,15 @@ def init(
             raise SettingsError("no such file", where=str(path))
     from hydroid.project import write_project
 
-    project = write_project(Path(folder), robots[0] if robots else None, logs, names(joints), tip)
+    project = write_project(
+        Path(folder),
+        robots[0] if robots else None,
+        logs,
+        names(joints),
+        tip=tip,
+        total_mass=total_mass,
+        force=force,
+    )
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
     unused = [f"not used: {', '.join(project.unused)}"] if project.unused else []

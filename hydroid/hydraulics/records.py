@@ -165,7 +165,7 @@ def linkages(arm: Arm, places: Sequence[int], driven: Sequence[int], joints: Rec
         actuator, one, p = arm.joints[j].actuator, table[:, column], joints[:, column]
         if actuator is None:
             raise without_actuator(arm, j)
-        ends = np.radians(arm.joints[j].range)
+        ends = np.array(arm.joints[j].limits)
         one["kind"], one["middle"], one["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
         if isinstance(actuator, LinearActuator):
             one["kind"], one["stroke"] = LINEAR, 1e-3 * actuator.stroke

@@ -86,12 +86,11 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
         if len(rows):
             many = len(rows) > 0.05 * (values != 0).sum()
             kind, remedy = _explained(signal, values) if many else ("outside", {})
-            unit = {"command": "%", "angle": "deg", "pressure": "bar"}[signal.kind]
             numbers = {"value": values[rows[0]], "low": signal.low, "high": signal.high}
-            shown = {name: number / UNITS[unit].factor for name, number in numbers.items()}
-            names = {"quantity": signal.kind, "unit": unit, "column": signal.name}
+            shown = {name: number / UNITS[signal.unit].factor for name, number in numbers.items()}
+            names = {"quantity": signal.kind, "unit": signal.unit, "column": signal.name}
             yield recording.finding("error", kind, rows, signal, signal.joint, **names, **shown, **remedy)
-        if signal.kind == "angle" and not np.isfinite(signal.high):
+        if signal.unit == "deg" and not np.isfinite(signal.high):
             there = np.flatnonzero(~np.isnan(values))
             steps = np.rad2deg(np.diff(values[there]))
             if len(far := np.flatnonzero(np.abs(steps) > 180)):
@@ -102,7 +101,7 @@ def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
     """Return the kind of fault if another unit explains values outside their limits, and what it names."""
     if signal.kind == "command" and (likely := likely_range(values)) and likely.name != "%":
         return "outside in another range", likely.remedy(signal.gain, signal.offset)
-    if signal.kind == "angle":
+    if signal.unit == "deg":
         degrees = abs(signal.gain) < 0.1
         unit, other = ("rad", values / DEGREE) if degrees else ("deg", values * DEGREE)
         scale = f"{-signal.gain / (DEGREE if degrees else 1):g}"
@@ -124,7 +123,7 @@ def _stated_units(recording: Recording) -> Iterator[LogFinding]:
             continue
         wrong = {
             "time": gain != unit.factor and unit.name == likely_time_unit(step / gain),
-            "angle": gain != unit.factor and gain in (1, DEGREE),
+            "angle": unit.quantity == "angle" and gain != unit.factor and gain in (1, DEGREE),
             "command": unit.name != "%" and gain == 1,
         }
         if wrong[signal.kind]:

@@ -13,9 +13,12 @@ from hydroid.settings.log import Kind, LogSettings
 from hydroid.units import UNITS
 from hydroid.words import listed
 
+SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
+"""units in which messages state what is measured"""
+
 
 def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
-    """Return the signals that the settings ask for, time first; joint ranges [rad], shape (J, 2)."""
+    """Return the signals that the settings ask for, time first; joint ranges [rad, m], shape (J, 2)."""
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
     for kind in get_args(Kind):
         for joint, (low, high) in enumerate(ranges.tolist(), 1):
@@ -26,10 +29,11 @@ def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
                     "angle": (low - margin, high + margin),
                     "pressure": (-5e5, 2e8),  # sensors have an offset, hoses burst
                 }[kind]
-                unit = UNITS[columns.unit.lower()].factor
-                gain, offset = columns.scale * unit, columns.offset * unit
+                unit = UNITS[columns.unit.lower()]
+                gain, offset = columns.scale * unit.factor, columns.offset * unit.factor
+                shown = SHOWN[unit.quantity]
                 signals += [
-                    Signal(name, kind, joint, part, gain, offset, *limits)
+                    Signal(name, kind, joint, part, gain, offset, *limits, shown)
                     for part, name in enumerate(columns.column)
                 ]
     return signals

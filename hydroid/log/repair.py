@@ -27,7 +27,7 @@ def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
     """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
     values, turn = recording.values.copy(), 2 * np.pi
     for column, signal in enumerate(recording.signals):
-        if signal.kind == "angle" and not np.isfinite(signal.high):
+        if signal.unit == "deg" and not np.isfinite(signal.high):
             rows = np.flatnonzero(~np.isnan(values[:, column]))
             steps = np.diff(values[rows, column])
             wraps = np.abs(np.abs(steps) - turn) < np.pi / 4  # the motion within one sample

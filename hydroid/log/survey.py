@@ -10,6 +10,7 @@ from hydroid.log.finding import LogFinding, log_finding
 from hydroid.log.log import Log
 from hydroid.log.motion import driven_joints
 from hydroid.settings.log import Kind, LogSettings
+from hydroid.units import UNITS
 
 
 def contradictions(
@@ -47,7 +48,10 @@ def contradictions(
             add("warning", "range", "command", [joint], **numbers)
         if motion.turned and joint not in backward:
             path, against = motion.directed
-            add("warning", "turned", "command", [joint], path=path, against=against)
+            measured = settings.columns("angle", joint)
+            slides = measured and UNITS[measured.unit].quantity == "length"
+            way = f"{np.radians(path):.3g} m" if slides else f"{path:.3g} deg"
+            add("warning", "turned", "command", [joint], path=way, against=against)
         if motion.push > 300 and 0 < motion.travel < 2:
             add("warning", "no motion", "angle", [joint], most=motion.travel)
         if motion.ahead:

@@ -22,7 +22,8 @@ class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa], from `low` to `high`.
 
     `name` is that in the header, `joint` a number from 1, or 0 for the time. `part` is 0, or 1 for the column
-    of a command's negative direction and of the pressure in chamber B.
+    of a command's negative direction and of the pressure in chamber B. `unit` is the one to be read: %, deg,
+    mm of a joint that slides, or bar.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Signal:
     offset: float = 0.0
     low: float = -np.inf
     high: float = np.inf
+    unit: str = ""
 
     def __str__(self) -> str:
         return f"{self.kind} of joint {self.joint}" if self.joint else self.kind

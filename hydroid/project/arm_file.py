@@ -1,10 +1,14 @@
 """The arm's files of a project: those of an imported arm, or a template to be filled in."""
 
 from collections.abc import Sequence
+from typing import Any
+
+import yaml
 
 from hydroid.cad.importer import ImportedArm
 from hydroid.cad.scene import SCENE
 from hydroid.project.sizes import LIFT, JointSize
+from hydroid.settings.arm import Arm
 
 ARM_FILE = """\
 # {title}
@@ -15,8 +19,8 @@ ARM_FILE = """\
 {notes}model: arm.xml
 
 # ACTUATORS ARE STAND-INS: each is sized to lift the arm {lift:g} times at 150 bar, at the speed of the log.
-# Angles can be predicted with them. Pressures and forces need your cylinders: give their two pivots [m], as
-# CAD shows them with all joints at 0:
+# Angles can be predicted with them. Pressures and forces need your cylinders: their areas, and where the file
+# had none their two pivots [m], as CAD shows them with all joints at 0. One along a slide needs no pivots:
 #   JOINT: {{kind: linear, pivots: {{parent: [x, y, z], child: [x, y, z]}},
 #           area_a: 3117, area_b: 2099, max_opening: 2}}
 # area_a [mm²] pushes the rod out (bore 63 mm: 3117), area_b is what the rod (36 mm) leaves; max_opening [mm²]
@@ -69,18 +73,32 @@ TEMPLATE_MODEL = f"""\
 """
 
 
-def arm_text(imported: ImportedArm, joints: Sequence[str], sizes: Sequence[JointSize], title: str) -> str:
-    """Return the arm's file of an import, with a stand-in for the actuator of each joint.
+def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize], title: str) -> str:
+    """Return the arm's file of an import, with an actuator of each joint.
 
     Args:
         imported: the arm.
-        joints: names of its joints, (J,).
-        sizes: of what moves them, (J,); empty: no joint has an actuator yet.
+        arm: what an earlier text of it, without sizes, says; None: this is that text.
+        sizes: of what moves its joints, (J,); empty: cylinders have a size that nothing uses.
         title: says where the arm came from.
     """
-    lines = [
-        f"  {name}: {{kind: rotary, displacement: {size.displacement:.3g}, max_opening: {size.opening:.3g}}}"
-        for name, size in zip(joints, sizes, strict=False)
-    ]
+    actuators = dict[str, dict[str, Any]]()
+    if arm is None:
+        areas = {"area_a": 1000, "area_b": 600, "max_opening": 1}
+        actuators = {name: own | areas for name, own in imported.cylinders.items()}
+    for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
+        own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
+        oil: dict[str, Any] = {"kind": "rotary", "displacement": rounded(size.displacement)}
+        if own is not None:  # the rod leaves about 65 % of the area
+            area = size.area or size.displacement
+            oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
+        actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
+    flow: dict[str, Any] = {"default_flow_style": True, "sort_keys": False, "width": 1e9}
+    lines = [f"  {name}: {yaml.safe_dump(own, **flow).strip()}" for name, own in actuators.items()]
     notes = "".join(f"# - {note}\n" for note in imported.notes)
     return ARM_FILE.format(title=title, notes=notes, lift=LIFT, actuators="\n".join(lines) or "  {}")
+
+
+def rounded(value: float) -> float:
+    """Return three digits of a number."""
+    return float(f"{value:.3g}")

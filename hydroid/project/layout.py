@@ -10,7 +10,7 @@ import numpy as np
 from hydroid.errors import LogError, SettingsError
 from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
 from hydroid.log.columns import angle_margin
-from hydroid.settings.arm import Arm
+from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
 
@@ -58,13 +58,16 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
         if name not in names:
             hint = f"the arm's joints: {', '.join(names)}"
             raise SettingsError(f"no joint {name!r}", where="--joints", hint=hint)
-    section, guessed, unused = guess_columns(table, order or names)
+    places = [names.index(name) for name in order or names]
+    slides = [k for k, place in enumerate(places, 1) if arm.joints[place].slides]
+    links = [arm.link_names[place] for place in places]
+    section, guessed, unused = guess_columns(table, order or names, links=links, slides=slides)
     # A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
     period = section["period_s"]
     section["period_s"] = max(period, 0.02) if period < 0.03 else 0.02 if period < 0.1 else 0.05
     reasons, entries = [*guessed], section["joints"]
     if order:
-        entries = {names.index(order[k - 1]) + 1: entry for k, entry in entries.items()}
+        entries = {places[k - 1] + 1: entry for k, entry in entries.items()}
         section["joints"] = entries = dict(sorted(entries.items()))
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     if not measured:
@@ -79,7 +82,9 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
     for joint, motion in motions.items():
         reasons += _outside(motion.log, joint, arm)
-        reasons += _remarks(motion, names, joint in wrong) if motion.log.driven[joint - 1] else []
+        reasons += (
+            _remarks(motion, arm.joints[joint - 1], joint in wrong) if motion.log.driven[joint - 1] else []
+        )
         command = entries[joint]["command"]
         if command is not None and joint in wrong:
             entries[joint]["command"] = turned(command)
@@ -89,12 +94,13 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)
 
 
-def _remarks(motion: JointMotion, names: Sequence[str], wrong: bool) -> list[str]:
+def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> list[str]:
     """Return what a user should know of a driven joint."""
-    name, lines = names[motion.joint - 1], list[str]()
+    name, lines = joint.name, list[str]()
     path, against = motion.directed
     if wrong:
-        share = f"for {max(against, 1 - against):.0%} of {path:.3g} deg of travel"
+        way = f"{np.radians(path):.3g} m" if joint.slides else f"{path:.3g} deg"
+        share = f"for {max(against, 1 - against):.0%} of {way} of travel"
         lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")
     if motion.dead_band > 10:
         lines.append(f"{name} does not move below about {motion.dead_band:g} % of command: a dead band")
@@ -110,13 +116,14 @@ def turned(command: dict[str, Any]) -> dict[str, Any]:
 
 
 def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
-    angle, own = np.degrees(log.angle[:, joint - 1]), arm.joints[joint - 1]
-    low, high, limits = float(angle.min()), float(angle.max()), own.range
-    margin = np.degrees(angle_margin(*np.radians(limits)))
-    if own.continuous or (low >= limits[0] - margin and high <= limits[1] + margin):
+    angle, own = log.angle[:, joint - 1], arm.joints[joint - 1]
+    low, high, margin = float(angle.min()), float(angle.max()), angle_margin(*own.limits)
+    if own.continuous or (low >= own.limits[0] - margin and high <= own.limits[1] + margin):
         return []
+    ends = (low, high) if own.slides else np.degrees((low, high))
+    what = ("positions", "m") if own.slides else ("angles", "deg")
     return [
-        f"{arm.joint_names[joint - 1]}: the angles in the log run from {low:.1f} to {high:.1f} deg, but the "
-        f"arm allows {limits[0]:.6g} to {limits[1]:.6g}: give the angle an offset or a scale of -1, or "
-        "change the range"
+        f"{own.name}: {what[0]} in the log run from {ends[0]:.4g} to {ends[1]:.4g} {what[1]}, but the arm "
+        f"allows {own.range[0]:.6g} to {own.range[1]:.6g}: give them an offset or a scale of -1, or change "
+        "the range in arm.xml"
     ]

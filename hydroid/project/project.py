@@ -8,6 +8,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hydroid.cad.importer import MESHES, ImportedArm, import_arm
 from hydroid.errors import RunError, SettingsError
@@ -41,6 +42,8 @@ Then, from the folder in which you ran `hydroid init`:
 - `arm.xml` is the arm's model, `arm.yaml` has its actuators: correct both.
 - `fit.yaml` are the settings of the fit: columns of the log, parameters, starts, priors.
 - A log should begin with a second without a command. Record several: fit on some, validate on another.
+- OTHER.csv stands for a log that the fit has not seen. Of one long log, cut off the last third where the arm
+  rests, keep the header on top of both parts, and fit the first.
 """
 
 
@@ -66,7 +69,7 @@ class Project:
 
 
 def write_project(
-    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), tip: str | None = None
+    folder: Path, robot: Path | None, logs: Sequence[Path], joints: Sequence[str] = (), **options: Any
 ) -> Project:
     """Write a project to a folder, new or with other things in it.
 
@@ -75,7 +78,7 @@ def write_project(
         robot: URDF, MJCF or YAML file of the arm; None: a template of boxes.
         logs: the first tells the columns; the last of several is kept to validate on.
         joints: names of the arm's joints as the log counts them; by default in the arm's order.
-        tip: link at which the arm ends; None: the tip that fits the log, or the longest branch.
+        options: `tip` and `total_mass` of `import_arm`; `force`: replace the files of an earlier project.
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of the given names.
@@ -83,21 +86,22 @@ def write_project(
         RunError: the folder cannot be written.
     """
     taken = [name for name in FILES if os.path.lexists(folder / name)]
-    if taken:
-        raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint="name another folder")
+    if not options.pop("force", False) and taken:
+        hint = "name another folder, or replace the project's files with --force"
+        raise SettingsError(f"holds {taken[0]} already", where=str(folder), hint=hint)
     table = open_table(logs[0]) if logs else None
     imported, reference, own = None, ARM, None
     if robot is not None and robot.suffix.lower() in (".yaml", ".yml"):
         own, reference = robot, Path(os.path.relpath(robot.resolve(), folder.resolve())).as_posix()
     elif robot is not None:
-        imported = import_arm(robot, table.names if table else (), tip)
+        imported = import_arm(robot, table.names if table else (), **options)
     title = f"{imported.name}, from {robot.name}" if imported and robot else ""
     with _stage(folder) as stage:
         arm = load_arm(own) if own else _write_arm(stage, imported, title)
         layout = find_layout(table, arm, joints) if table is not None else None
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
-            arm = _write_arm(stage, imported, title, arm.joint_names, sizes)
+            arm = _write_arm(stage, imported, title, arm, sizes)
         caption = f"{arm.name}, near to 0: does it look and turn like your arm?"
         write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
@@ -114,13 +118,14 @@ def write_project(
 
 
 def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
-    """Return the commands to run; of several logs the last is kept to validate on."""
+    """Return the commands to run; of several logs the last is kept to validate on, of one none is."""
     names = [shlex.quote(str(log)) for log in logs] or ["LOG.csv", "OTHER.csv"]
+    names += ["OTHER.csv"] if len(names) == 1 else []
     fitted, other = " ".join(names[:-1] or names), names[-1]
     home = shlex.quote(str(folder))
     config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
     return (
-        f"hydroid check {' '.join(names)} {config}",
+        f"hydroid check {' '.join(names if len(logs) != 1 else names[:1])} {config}",
         f"hydroid fit-hyd {fitted} {config} --out {run}",
         f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
         f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
@@ -131,13 +136,13 @@ def _write_arm(
     stage: Path,
     imported: ImportedArm | None,
     title: str,
-    joints: Sequence[str] = (),
+    arm: Arm | None = None,
     sizes: Sequence[JointSize] = (),
 ) -> Arm:
     """Write model, meshes and the arm's file, with actuators of the given sizes, and return the arm."""
     files: dict[str, str | bytes] = {MODEL: TEMPLATE_MODEL, ARM: TEMPLATE_FILE}
     if imported is not None:
-        files = {MODEL: imported.mjcf, ARM: arm_text(imported, joints, sizes, title), **imported.meshes}
+        files = {MODEL: imported.mjcf, ARM: arm_text(imported, arm, sizes, title), **imported.meshes}
     for name, content in files.items():
         write_atomic(stage / name, content)
     return load_arm(stage / ARM)
@@ -160,15 +165,21 @@ def _stage(folder: Path) -> Generator[Path]:
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:
     """Move all files to the project, or none."""
     names = tuple(name for name in FILES if (stage / name).exists())
-    moved = list[Path]()
+    moved, old = list[Path](), stage / "old"
+    old.mkdir()
     with undisturbed():
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            for name in names:  # of an earlier project
+                if os.path.lexists(folder / name):
+                    os.rename(folder / name, old / name)
             for name in names:
                 os.rename(stage / name, folder / name)
                 moved.append(folder / name)
         except OSError as error:
             for path in moved:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
+            for path in old.iterdir():
+                os.rename(path, folder / path.name)
             raise RunError(f"cannot be written ({error.strerror})", where=str(folder)) from None
     return names

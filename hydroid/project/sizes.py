@@ -14,18 +14,24 @@ from hydroid.arm.model import load_model
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
+from hydroid.settings.linkage import LinearActuator
 
 LIFT = 2.0
 """torque of a joint at the pump's pressure, over the largest that gravity asks of it"""
 
 
 class JointSize(NamedTuple):
-    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s]."""
+    """What a joint needs: oil [cm³/rad], valve opening [mm²] and damping [N·m·s/rad] at a speed [rad/s].
+
+    Of a joint that slides [mm², mm², N·s/m, m/s]. `area` is the one that pushes its cylinder's rod out [mm²];
+    0: it has none.
+    """
 
     displacement: float
     opening: float
     damping: float
     speed: float
+    area: float = 0.0
 
 
 def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
@@ -36,7 +42,7 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
 
     Args:
         arm: with its model in place.
-        speeds: that a log shows, by number of the joint [rad/s]; 0.5 for the others.
+        speeds: that a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
 
     Raises:
         ModelError: the arm's model cannot be read.
@@ -44,7 +50,7 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
     low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-    torque, oil = np.zeros(len(arm.joints)), HydraulicSettings()
+    torque, settings = np.zeros(len(arm.joints)), HydraulicSettings()
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):
         data.qpos[:] = pose
         mujoco.mj_forward(model, data)
@@ -52,10 +58,14 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
         mujoco.mj_fullM(model, data, inertia)
         # a joint without weight must give 1 rad/s² at least
         torque = np.maximum(torque, np.maximum(LIFT * abs(data.qfrc_bias), np.diag(inertia)))
-    pressure, sizes = 1e5 * oil.supply_pressure, list[JointSize]()
-    through = oil.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
+    pressure, sizes = 1e5 * settings.supply_pressure, list[JointSize]()
+    through = settings.flow_coefficient * np.sqrt((1 - 1 / LIFT) * pressure / DENSITY)  # [m/s]
     for joint, most in enumerate(torque.tolist(), 1):
         speed = max(speeds.get(joint, 0.5), 0.01)
-        volume = most / pressure
-        sizes.append(JointSize(1e6 * volume, 1e6 * volume * speed / through, most / speed, speed))
+        oil, own, lever = 1e6 * most / pressure, arm.joints[joint - 1], 0.0
+        if isinstance(own.actuator, LinearActuator):
+            lever = float(np.abs(own.actuator.moment_arm(np.linspace(*own.limits, 50))).mean())
+        sizes.append(
+            JointSize(oil, oil * speed / through, most / speed, speed, oil / lever if lever else 0.0)
+        )
     return tuple(sizes)

@@ -35,7 +35,10 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
     mujoco.mj_forward(model, data)
     (poses,) = body_poses(model, angles[None])
     outlines = [Shape(shape.body, shape.placed(poses)) for shape in shapes(model)]
-    linear = [one.actuator if isinstance(one.actuator, LinearActuator) else None for one in arm.joints]
+    linear = [
+        one.actuator if isinstance(one.actuator, LinearActuator) and not one.slides else None
+        for one in arm.joints
+    ]
     cylinders = any(linear)
     with style():
         drawing = Figure((7.2, 7.5 if cylinders else 4.4), layout="constrained")
@@ -73,8 +76,9 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
             axes.plot(*(ends @ onto).T, "o-", color="black", lw=3, ms=4)
     size = 0.12 * float(np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1)
     for joint, at, axis in zip(arm.joints, data.xanchor, data.xaxis, strict=True):
-        sense = "counter-clockwise" if axis @ ahead < 0 else "clockwise"
-        text = f"{joint.name}: + turns {sense}" if abs(axis @ ahead) > ACROSS else joint.name
+        sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
+        sense = "slides along the line" if joint.slides else sense
+        text = f"{joint.name}: + {sense}" if joint.slides != (abs(axis @ ahead) > ACROSS) else joint.name
         axes.plot(*(np.array([at - size * axis, at + size * axis]) @ onto).T, "D-", color="black", lw=1, ms=4)
         axes.annotate(text, at @ onto, rotation=30, fontsize=7).set_in_layout(False)
     axes.set(title=name, xlabel="x [m]", ylabel=upwards)

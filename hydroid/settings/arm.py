@@ -4,7 +4,8 @@ The MJCF has links, joints, ranges, masses and meshes; its keyframes are the nam
 actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +21,10 @@ from hydroid.settings.load import Settings, load
 
 if TYPE_CHECKING:
     import mujoco
+
+
+SLIDE = 2
+"""MuJoCo's number of a joint that slides"""
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -39,7 +44,7 @@ class ArmFile(Settings):
     actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = Field(
         default_factory=dict[str, Cylinder | RotaryActuator]
     )
-    """what turns the joints, by name; a joint that stage 2 does not drive needs none"""
+    """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
     """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
     pair: Beside | None = None
@@ -49,19 +54,32 @@ class ArmFile(Settings):
 
 @dataclass(frozen=True)
 class Joint:
-    """A hinge.
+    """A joint that turns, or slides; what is said of angles then holds for its position [m].
 
     Attributes:
         name: of the model's joint.
-        range: smallest and largest angle [deg].
+        range: smallest and largest angle [deg], or position [m].
         continuous: whether it turns without stops, and `range` only limits what is shown and tested.
-        actuator: what turns it; None: nothing that stage 2 knows.
+        actuator: what moves it; None: nothing that stage 2 knows.
+        slides: whether it slides.
     """
 
     name: str
     range: tuple[float, float]
     continuous: bool
     actuator: LinearActuator | RotaryActuator | None
+    slides: bool = False
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The range in the units of a simulation [rad], or [m]."""
+        low, high = self.range
+        return self.range if self.slides else (math.radians(low), math.radians(high))
+
+    @property
+    def unit(self) -> str:
+        """Unit in which people read its angles or positions."""
+        return "mm" if self.slides else "deg"
 
 
 @dataclass(frozen=True)
@@ -122,17 +140,21 @@ class Arm:
 
     def _joint(self, name: str) -> "Joint":
         joint, actuator = self._model.joint(name), self.file.actuators.get(name)
-        limited = bool(joint.limited[0])
+        limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
         # sliders and tests take a joint without limits once round
-        low, high = np.degrees(joint.range).round(DIGITS).tolist() if limited else (-180.0, 180.0)
+        low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
+        if limited:
+            low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
+        whole = Joint(name, (low, high), not limited, None, slides)
         if isinstance(actuator, Cylinder):
             try:
                 if not limited:
                     raise ValueError("a joint without limits needs a rotary actuator")
-                actuator = make_cylinder(actuator, (low, high), _at_zero(self.file.model), name)
+                data = _at_zero(self.file.model)
+                actuator = make_cylinder(actuator, whole.limits, data, name, slides=slides)
             except ValueError as error:
                 raise SettingsError(f"actuators.{name}: {error}", where=self.where) from None
-        return Joint(name, (low, high), not limited, actuator)
+        return replace(whole, actuator=actuator)
 
     @property
     def model(self) -> Path:
@@ -166,9 +188,14 @@ class Arm:
 
     @property
     def ranges(self) -> NDArray[np.float64]:
-        """Lower and upper joint stops [rad], shape (J, 2); infinite where there is none."""
+        """Lower and upper joint stops [rad], or [m] of a slide, shape (J, 2); infinite where none is."""
         free = (-np.inf, np.inf)
-        return np.radians([free if joint.continuous else joint.range for joint in self.joints])
+        return np.array([free if joint.continuous else joint.limits for joint in self.joints])
+
+    @property
+    def slides(self) -> tuple[int, ...]:
+        """Joints, from 1, that slide."""
+        return tuple(j for j, joint in enumerate(self.joints, 1) if joint.slides)
 
     @property
     def backward(self) -> tuple[int, ...]:

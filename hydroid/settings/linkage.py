@@ -34,12 +34,14 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
     The pivots lie at distances a, b [m] from the joint's axis, theta0 [rad] apart at joint angle 0. It is
     below 0 if the rod runs out towards negative angles.
     `shortest` is the cylinder's length with the rod fully in [m]: with 0 the travel is the length itself.
+    With b = 0 the cylinder lies along a joint that slides, by `angle` [m], and its moment arm is 1 or -1.
     """
+    slides = (b == 0.0) * np.sign(theta0)
     theta = angle + theta0
     cosine = a * b * np.cos(theta)
     length = np.sqrt(a * a + b * b - 2.0 * cosine)
     arm = a * b * np.sin(theta) / length
-    return length - shortest, arm, (cosine - arm * arm) / length
+    return length - shortest + slides * angle, arm + slides, (cosine - arm * arm) / length
 
 
 def four_bar(angle: Any, bars: Any) -> Any:
@@ -143,12 +145,12 @@ class Cylinder(Settings):
 
 
 class RotaryActuator(Settings):
-    """A rotary vane or piston actuator on the joint's axis."""
+    """A rotary vane or piston actuator on the joint's axis; of a joint that slides one of equal areas."""
 
     kind: Literal["rotary"]
     """rotary: a vane or piston actuator on the joint's axis"""
     displacement: Positive
-    """oil per angle [cm³/rad]"""
+    """oil per angle [cm³/rad], or area of a joint that slides [mm²]"""
     max_opening: Positive
     """largest valve opening [mm²]"""
 
@@ -191,22 +193,31 @@ class LinearActuator:
 
 
 def make_cylinder(
-    settings: Cylinder, limits: tuple[float, float], data: "mujoco.MjData | None" = None, joint: str = ""
+    settings: Cylinder,
+    limits: tuple[float, float],
+    data: "mujoco.MjData | None" = None,
+    joint: str = "",
+    *,
+    slides: bool = False,
 ) -> LinearActuator:
-    """Return a cylinder that moves its joint through a range [deg].
+    """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
 
-    `data` has all joints of the arm at 0; a cylinder whose triangle is given needs none.
+    `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
 
     Raises:
         ValueError: pivots that are not stated or make no triangle, a dead centre in the range, a linkage that
             does not reach, or a stroke that is too short.
     """
     sides, pivots = settings.triangle, None
-    if sides is None:
+    if slides:
+        if settings.triangle or settings.four_bar:
+            raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
+        sides = _along(settings.pivots, data, joint)
+    elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
     sides = sides.model_copy(update={"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
-    angles = np.radians(np.linspace(*limits, 181))
+    angles = np.linspace(*limits, 181)
     with np.errstate(all="ignore"):
         arm = np.asarray(cylinder.moment_arm(angles))
         bars = np.asarray(four_bar(angles, settings.four_bar)[1]) if settings.four_bar else np.ones(1)
@@ -214,11 +225,20 @@ def make_cylinder(
     if not ((bars * bars[0] > 0).all() and (arm * arm[0] > 0).all()):
         what = "does not reach all of its range, or has a dead centre in it"
         raise ValueError(f"its {'four-bar linkage' if settings.four_bar else 'cylinder'} {what}")
-    needed = 1e3 * float(np.ptp(cylinder.length(np.radians(limits))))
+    needed = 1e3 * float(np.ptp(cylinder.length(np.array(limits))))
     stroke = settings.stroke or round(needed, 3)
     if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
         raise ValueError(f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm")
     return replace(cylinder, stroke=stroke)
+
+
+def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
+    """Return what stands for the triangle of a cylinder along its joint: b is 0.
+
+    The rod runs out forward unless pivots say otherwise.
+    """
+    way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
+    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
 
 
 def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:

@@ -56,8 +56,8 @@ class Columns(Settings):
     direction of a command, whose values lie in [0, 100] % and are subtracted; chamber A, which pushes to
     positive angles, and chamber B of a pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar,
     pB{joint}_bar]"""
-    unit: Literal["%", "deg", "rad", "bar", "Pa", "MPa"] | None = None
-    """unit of the scaled cells; default: %, deg, bar"""
+    unit: Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"] | None = None
+    """unit of the scaled cells, of the angle of a joint that slides m, cm or mm; default: %, deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -86,7 +86,8 @@ COLUMNS = {"command": (1, 2), "angle": (1,), "pressure": (2,)}
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
     """Refuse a unit or a number of columns that the quantity does not have."""
     kind = str(info.field_name)
-    if columns and columns.unit and UNITS[columns.unit.lower()].quantity != kind:
+    measured = UNITS[columns.unit.lower()].quantity if columns and columns.unit else kind
+    if columns and {"length": "angle"}.get(measured, measured) != kind:
         raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
     if columns and columns.column and len(columns.column) not in COLUMNS[kind]:
         raise ValueError(f"{kind} needs {' or '.join(map(str, COLUMNS[kind]))} column names")

@@ -21,7 +21,7 @@ def with_cylinder(arm: Arm, **changes) -> Arm:
     cylinder, limits = joint.actuator, changes.pop("range", joint.range)
     changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
     settings = cylinder.settings.model_copy(update=changes)
-    moved = replace(joint, range=limits, actuator=make_cylinder(settings, limits))
+    moved = replace(joint, range=limits, actuator=make_cylinder(settings, np.radians(limits)))
     other = replace(arm)
     vars(other)["joints"] = (*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :])
     return other

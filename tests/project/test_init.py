@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from robots import link, write_robot
+import robots
+from robots import LIMIT, link, write_robot
 from typer.testing import CliRunner
 
 import hydroid
@@ -118,12 +119,52 @@ def test_from_cad_and_log_to_a_validated_fit(place: Path, tmp_path: Path, monkey
 
 def test_nothing_is_overwritten(place: Path):
     before = {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
-    with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder"):
+    with pytest.raises(SettingsError, match=r"mine: holds arm\.yaml already; name another folder, or"):
         init(place / "mine")
     assert before == {path: path.read_bytes() for path in (place / "mine").glob("*.*")}
     assert {path.name for path in place.iterdir()} == {"digger", "machine", "mine"} | {
         f"move_{k}.csv" for k in range(3)
     }
+
+
+def test_a_project_is_replaced_if_that_is_asked_for(tmp_path: Path):
+    robot = write_robot(tmp_path)
+    init(tmp_path / "mine", robot)
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    again = init(tmp_path / "mine", robot, force=True, total_mass=2180.0)
+    assert load_arm(tmp_path / "mine" / "arm.yaml").masses.sum() == pytest.approx(2180)
+    assert {path.name for path in (tmp_path / "mine").iterdir()} == {*again.files, "notes.txt"}
+
+
+def test_a_telescopes_column_is_its_own(tmp_path: Path):
+    """Columns in m go to the joint that slides; a bucket that nothing names is asked for."""
+    telescope = {"kind": "prismatic", "at": "2 0 0", "axis": "1 0 0", "limit": LIMIT.format(0, 1.5)}
+    robot = write_robot(tmp_path, stick_joint=robots.joint("telescope", "boom", "stick", **telescope))
+    time = np.arange(0, 20, 0.02)
+    drive = 60 * np.sign(np.sin(time)) * (time > 1)
+    way = np.cumsum(0.02 * np.roll(drive, 5)) / 100
+    columns = {"t": time, "slew_V": drive / 10, "boom_V": drive / 10, "tele_V": drive / 10, "u9": drive}
+    columns |= {"slew_deg": 30 * way, "boom_deg": 20 * way, "tele_length_m": 0.3 + 0.4 * way}
+    np.savetxt(
+        tmp_path / "a.csv",
+        np.stack([*columns.values()], 1),
+        "%.6g",
+        ",",
+        header=",".join(columns),
+        comments="",
+    )
+    made = init(tmp_path / "mine", robot, [tmp_path / "a.csv"])
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
+    assert settings.log.columns("angle", 3).column == ("tele_length_m",)
+    assert settings.log.columns("angle", 3).unit == "m"
+    assert settings.log.columns("command", 3).column == ("tele_V",)
+    assert "tele_length_m: position in m of telescope, by its unit" in made.columns
+    assert any(line.startswith("left out, though like a joint's command: u9") for line in made.columns)
+    (log,) = hydroid.read_logs(tmp_path / "a.csv", settings)
+    assert np.ptp(log.angle[:, 2]) == pytest.approx(0.4 * np.ptp(way), rel=1e-3)
+    actuator = settings.arm.joints[2].actuator
+    assert actuator.length(1.0) - actuator.length(0.25) == pytest.approx(0.75)
+    assert not any("OTHER" in step for step in made.commands if " check " in step)
 
 
 def test_an_error_leaves_nothing_behind(tmp_path: Path):
@@ -162,7 +203,7 @@ def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]
     ("column", "change", "note", "scale"),
     [
         (2, lambda u: -u, r"boom_joint moves against its command .*of the command is reversed", -10),
-        (5, lambda q: q + 2, r"boom_joint: the angles .*allows -28\.6479 to 68\.7549: give the angle an", 10),
+        (5, lambda q: q + 2, r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset", 10),
     ],
 )
 def test_what_the_numbers_of_a_log_tell_is_said(
@@ -188,12 +229,10 @@ def test_the_command_prints_what_it_assumed_and_what_is_next(place: Path, tmp_pa
     robot = write_robot(tmp_path, boom=link("boom", ixx=0, iyy=0, izz=0))
     done = CliRunner().invoke(app, ["init", str(tmp_path / "mine"), "--arm", str(robot)])
     assert done.exit_code == 0
-    assert (
-        "  link boom: its inertia is 0; the inertia of its mesh at uniform density is taken\n" in done.output
-    )
+    assert "  link boom: an inertia that no rigid body has: that of its hull is taken\n" in done.output
     assert f"  hydroid fit-hyd LOG.csv --config {tmp_path}/mine/fit.yaml" in done.output
     page = (tmp_path / "mine" / "next-steps.md").read_text()
-    assert "- link boom: its inertia is 0" in page
+    assert "- link boom: an inertia" in page
     assert load_arm(tmp_path / "mine" / "arm.yaml").name == "digger"
 
 

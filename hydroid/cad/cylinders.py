@@ -1,0 +1,221 @@
+"""Cylinders that a robot's file models as links of their own -> where they are pinned.
+
+A tube that turns on one link, a rod that slides in it and is pinned to another: in an MJCF by an equality
+constraint, which closes the loop. Between rod and moved link there may be a rocker and a coupler (a bucket's
+four-bar linkage). Where one is recognised its links are held, so that their mass is part of the links that
+carry them, and the joint that it moves gets the cylinder. A URDF cannot close loops: its rods end nowhere.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from hydroid.cad.notes import Notes
+from hydroid.mjcf import mujoco_errors
+from hydroid.settings.linkage import FourBar, Triangle, four_bar, triangle
+
+Array = NDArray[np.float64]
+PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
+"""words in the names of a cylinder's links and joints"""
+
+
+@dataclass(frozen=True)
+class _Pin:
+    """Where two bodies turn on each other [m], shape (3,), in the file's pose; `joint` None: an equality."""
+
+    bodies: tuple[str, str]
+    at: Array
+    joint: Any = None
+
+    def other(self, body: str) -> str:
+        return self.bodies[self.bodies[0] == body]
+
+
+def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, dict[str, Any]]:
+    """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
+
+    Pivots become sites of the links; a joint without limits gets those that the rod allows.
+    """
+    bare = spec.copy()
+    for geom in [geom for geom in bare.geoms if geom.meshname]:
+        bare.delete(geom)
+    free = [joint for joint in bare.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+    for part in (*free, *bare.meshes, *bare.keys, *bare.actuators, *bare.tendons):
+        bare.delete(part)
+    for body in bare.bodies[1:]:  # where bodies are is all that counts
+        body.explicitinertial, body.mass, body.inertia, body.ipos = True, 1.0, [1.0] * 3, [0.0] * 3
+        body.fullinertia, body.iquat, body.ialt.type = [np.nan] * 6, [1, 0, 0, 0], 0
+    with mujoco_errors(spec.modelname):
+        model = bare.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    pins, helpers, found = _pins(spec, data), set[str](), dict[str, dict[str, Any]]()
+    for slide in [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_SLIDE]:
+        rod, tube = slide.parent.name, slide.parent.parent.name
+        for foot in _at(pins, tube, rod):
+            for eye in _at(pins, rod, tube):
+                made = _linkage(pins, foot, eye, (tube, rod), data)
+                if made is None:
+                    continue
+                joint, own, links = made
+                found[joint.name] = own
+                helpers |= {tube, rod, *links}
+                if "triangle" not in own:
+                    carrier = joint.parent.parent.name
+                    ends = (foot, eye) if foot.other(tube) == carrier else (eye, foot)
+                    for end, pin, body in zip(
+                        ("parent", "child"), ends, (carrier, joint.parent.name), strict=True
+                    ):
+                        place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
+                        spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
+                _limit(joint, slide, own.pop("shape"), degrees=bool(spec.compiler.degree))
+                notes.add("cylinders of the file give these joints' pivots", joint.name)
+    for joint in list(spec.joints):
+        if any(body in helpers for body in _upwards(joint.parent)):
+            spec.delete(joint)
+    return found
+
+
+def is_part_of_cylinder(joint: mujoco.MjsJoint) -> bool:
+    """Return whether the names of a joint and its link tell a cylinder's tube or rod, which moves no link."""
+    return all({*re.split(r"[\W_\d]+", name.lower())} & PARTS for name in (joint.name, joint.parent.name))
+
+
+def _upwards(body: Any) -> Iterator[str]:
+    while body is not None:
+        yield body.name
+        body = body.parent
+
+
+def _pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> list[_Pin]:
+    """Return where bodies turn on each other: hinges and points that equalities connect."""
+    hinge, connect = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtEq.mjEQ_CONNECT
+    pins = [
+        _Pin((joint.parent.name, joint.parent.parent.name), data.joint(joint.name).xanchor, joint)
+        for joint in spec.joints
+        if joint.type == hinge and joint.parent.parent is not None
+    ]
+    for one in spec.equalities:
+        if one.type == connect and one.objtype == mujoco.mjtObj.mjOBJ_SITE:
+            first, second = (spec.site(name) for name in (one.name1, one.name2))
+            bodies = first.parent.name, second.parent.name
+            pins.append(_Pin(bodies, data.site(one.name1).xpos))
+        elif one.type == connect:
+            body = data.body(one.name1)
+            at = body.xpos + body.xmat.reshape(3, 3) @ np.array(one.data[:3])
+            pins.append(_Pin((one.name1, one.name2 or "world"), at))
+    return pins
+
+
+def _at(pins: Sequence[_Pin], body: str, *without: str) -> list[_Pin]:
+    return [pin for pin in pins if body in pin.bodies and pin.other(body) not in without]
+
+
+def _linkage(
+    pins: Sequence[_Pin], foot: _Pin, eye: _Pin, cylinder: tuple[str, str], data: mujoco.MjData
+) -> tuple[Any, dict[str, Any], tuple[str, ...]] | None:
+    """Return the joint that a cylinder moves, its settings, and links between them; None: it moves none.
+
+    `foot` pins the tube to a link, `eye` the rod to another.
+    """
+    tube, rod = cylinder
+    base, moved = foot.other(tube), eye.other(rod)
+    for ground in _at(pins, moved, rod):  # a rocker on the same link, with a coupler to the link that moves
+        for pin in _at(pins, moved, rod, base) if ground.other(moved) == base else ():
+            coupler = pin.other(moved)
+            for end in _at(pins, coupler, moved):
+                joint = _joint(pins, base, end.other(coupler))
+                if joint and end.other(coupler) != base:
+                    bars = _four_bar(data.joint(joint.name), (ground, pin, end, foot, eye))
+                    return (joint, bars, (moved, coupler)) if bars else None
+    joint = _joint(pins, base, moved)
+    if joint is None:
+        return None
+    at = data.joint(joint.name)
+    ends = (foot, eye) if joint.parent.name == moved else (eye, foot)
+    (a, here), (b, there) = (_polar(at, pin.at) for pin in ends)
+    shape = Triangle.model_construct(a=a, b=b, theta0=math.degrees(_wrapped(there - here)))
+    return joint, {"kind": "linear", "shape": (shape, None)}, ()
+
+
+def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
+    between = (pin.joint for pin in pins if {*pin.bodies} == {first, second} and pin.joint is not None)
+    return next(between, None)
+
+
+def _polar(joint: Any, point: Array) -> tuple[float, float]:
+    """Return distance [m] and direction [rad] of a point from a joint's axis, in a plane across it."""
+    axis, away = joint.xaxis, point - joint.xanchor
+    x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
+    x /= np.linalg.norm(x)
+    across, along = float(away @ np.cross(axis, x)), float(away @ x)
+    return math.hypot(across, along), math.atan2(across, along)
+
+
+def _wrapped(angle: float) -> float:
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def _four_bar(joint: Any, pins: Sequence[_Pin]) -> dict[str, Any] | None:
+    """Return the settings of a cylinder that turns a joint by a rocker and a coupler, as the file stands.
+
+    The pins are those of the rocker on its link and on the coupler, of the coupler on the child, of tube and
+    rod.
+    """
+    plane = [distance * np.exp(1j * angle) for distance, angle in (_polar(joint, pin.at) for pin in pins)]
+    ground, pin, child, foot, eye = plane
+    turn = abs(ground) / ground  # the rocker's pivot lies at (ground, 0)
+    side = "left" if ((pin - ground) * np.conj(child - ground)).imag > 0 else "right"
+    bars = FourBar(
+        ground=round(abs(ground), 6),
+        rocker=round(abs(pin - ground), 6),
+        coupler=round(abs(child - pin), 6),
+        child=round(abs(child), 6),
+        phase_deg=round(math.degrees(np.angle(child * turn)), 6),
+        side=side,
+    )
+    psi, first, _ = map(float, four_bar(0.0, bars))
+    if not math.isfinite(psi):
+        return None
+    theta = _wrapped(float(np.angle(eye - ground) - np.angle(foot - ground)))
+    sense = 1.0 if math.sin(theta) * first > 0 else -1.0  # the rod's pin turns with the rocker, by psi
+    theta0 = math.degrees(_wrapped(theta - psi))
+    theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way
+    shape = Triangle(
+        a=round(abs(foot - ground), 6),
+        b=round(abs(eye - ground), 6),
+        theta0=round(theta0, 6),
+    )
+    sides = {"triangle": shape.model_dump(), "four_bar": bars.model_dump()}
+    return {"kind": "linear", **sides, "shape": (shape, bars)}
+
+
+def _limit(
+    joint: mujoco.MjsJoint, slide: mujoco.MjsJoint, shape: tuple[Triangle, FourBar | None], *, degrees: bool
+) -> None:
+    """Give a joint without limits those at which the rod is at an end of its way, or at a dead centre."""
+    if joint.range[0] < joint.range[1]:
+        return
+    sides, bars = shape
+    angle = np.radians(np.arange(-1800, 1801) / 10.0)
+    with np.errstate(all="ignore"):
+        psi, first = four_bar(angle, bars)[:2] if bars else (angle, np.ones_like(angle))
+        length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
+        arm = arm * first
+    at_zero = length[1800]
+    low, high = (-np.inf, np.inf) if slide.range[0] >= slide.range[1] else np.array(slide.range) - slide.ref
+    least = 0.05 * np.nanmax(np.abs(arm))
+    good = (
+        (length - at_zero >= low) & (length - at_zero <= high) & (arm * arm[1800] > 0) & (np.abs(arm) > least)
+    )
+    bad = np.flatnonzero(~good)
+    first_bad, last_bad = bad[bad > 1800], bad[bad < 1800]
+    ends = angle[[last_bad[-1] + 1 if len(last_bad) else 0, first_bad[0] - 1 if len(first_bad) else -1]]
+    joint.range = np.degrees(ends) if degrees else ends
+    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE

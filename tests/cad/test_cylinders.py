@@ -1,0 +1,114 @@
+"""Cylinders that an MJCF models as loops of links: pivots, linkages and limits against stated truth."""
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from hydroid.cad.importer import import_arm
+from hydroid.settings.linkage import Cylinder, LinearActuator, make_cylinder
+
+FOOT, EYE = np.array([0.5, -0.3]), np.array([1.4, 0.35])
+"""of the boom's cylinder, on the house and on the boom, seen from the boom's joint [m]"""
+GROUND, PIN, CHILD = np.array([1.6, 0.15]), np.array([1.75, 0.5]), np.array([2.12, 0.3])
+"""of the bucket's rocker on the stick, of rocker and coupler, of coupler and bucket, in the stick's frame"""
+TAIL, BUCKET = np.array([0.3, 0.45]), np.array([2.0, 0.0])
+"""of the bucket's cylinder on the stick; the bucket's joint"""
+
+EXCAVATOR = """
+<mujoco model="loops"><compiler angle="radian"/><extension><plugin plugin="some.soil"/></extension>
+  <asset><texture name="mud" type="2d" file="none.png"/><material name="mud" texture="mud"/></asset>
+  <worldbody><body name="track"><freejoint/><geom type="box" size="1 1 .2" mass="2000"/>
+    <body name="house" pos="0 0 1"><joint name="swing" axis="0 0 1" range="-3 3"/>
+      <geom type="box" size="1 1 .5" material="mud" mass="4000"/>
+      <body name="boom_tube" pos="0.5 0 -0.3" euler="0 {boom} 0"><joint name="tube1" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="60"/>
+        <body name="boom_rod" pos=".3 0 0"><joint name="rod1" type="slide" axis="1 0 0" range="-.2 .3"/>
+          <geom type="capsule" fromto="0 0 0 .6 0 0" size=".03" mass="20"/></body></body>
+      <body name="boom"><joint name="boom" axis="0 -1 0"/>
+        <geom type="capsule" fromto="0 0 0 3 0 0" size=".2" mass="800"/>
+        <body name="stick" pos="3 0 0"><joint name="stick" axis="0 -1 0" range="-2 0.5"/>
+          <geom type="capsule" fromto="0 0 0 2 0 0" size=".15" mass="400"/>
+          <body name="bucket_tube" pos=".3 0 .45" euler="0 {bucket} 0"><joint name="tube2" axis="0 1 0"/>
+            <geom type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="30"/>
+            <body name="bucket_rod"><joint name="rod2" type="slide" axis="1 0 0" range="-.2 .2"/>
+              <geom type="capsule" fromto=".5 0 0 1 0 0" size=".03" mass="10"/></body></body>
+          <body name="rocker" pos="1.6 0 .15"><joint name="rocker" axis="0 -1 0"/>
+            <geom type="capsule" fromto="0 0 0 .15 0 .35" size=".03" mass="10"/></body>
+          <body name="bucket" pos="2 0 0"><joint name="bucket" axis="0 -1 0"/>
+            <geom type="box" size=".3 .4 .3" pos="0.3 0 -.3" mass="300"/>
+            <body name="coupler" pos=".12 0 .3"><joint name="coupler" axis="0 -1 0"/>
+              <geom type="capsule" fromto="0 0 0 -.37 0 .2" size=".03" mass="10"/></body></body>
+        </body></body></body></body></worldbody>
+  <equality><connect body1="boom_rod" body2="boom" anchor="{eye} 0 0"/>
+    <connect body1="bucket_rod" body2="rocker" anchor="{rod} 0 0"/>
+    <connect body1="coupler" body2="rocker" anchor="-.37 0 .2"/></equality>
+  <sensor><jointpos joint="rod1"/></sensor>
+  <actuator><velocity joint="rod1"/></actuator>
+</mujoco>"""
+
+
+def written(folder):
+    """The file: rods point from their feet to their eyes, pinned to rocker and coupler in one point."""
+    way, rod = EYE - FOOT, PIN - TAIL
+    path = folder / "loops.xml"
+    angles = {"boom": -np.arctan2(way[1], way[0]), "bucket": -np.arctan2(rod[1], rod[0])}
+    path.write_text(EXCAVATOR.format(**angles, eye=np.hypot(*way) - 0.3, rod=np.hypot(*rod)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    return import_arm(written(tmp_path_factory.mktemp("loops")))
+
+
+def actuator(arm, name) -> LinearActuator:
+    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    own = Cylinder(**arm.cylinders[name], area_a=1000, area_b=600, max_opening=1)
+    return make_cylinder(own, tuple(model.joint(name).range), data, name)
+
+
+def turned(point, angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ point
+
+
+def test_rods_are_no_end_of_the_arm_and_weigh_on_their_links(arm):
+    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    assert [model.joint(j).name for j in range(model.njnt)] == ["swing", "boom", "stick", "bucket"]
+    assert model.body_mass[-4:] == pytest.approx([4080, 800, 450, 310])
+    assert set(arm.cylinders) == {"boom", "bucket"}
+
+
+def test_a_cylinder_between_two_links_has_its_pivots(arm):
+    cylinder = actuator(arm, "boom")
+    for angle in (-0.1, 0.0, 0.2):
+        expected = np.linalg.norm(turned(EYE, angle) - FOOT)
+        assert cylinder.length(angle) == pytest.approx(expected, abs=1e-9)
+    # the joint has no limits in the file: the rod's way gives them
+    model = mujoco.MjSpec.from_string(arm.mjcf, assets=arm.meshes).compile()
+    ends = cylinder.length(model.joint("boom").range) - cylinder.length(0.0)
+    assert np.sort(ends) == pytest.approx([-0.2, 0.3], abs=3e-3)
+
+
+def test_a_buckets_linkage_moves_as_its_bars_do(arm):
+    cylinder, low, high = actuator(arm, "bucket"), -0.15, 0.15
+
+    def rod_length(angle: float, near: float = 0.0) -> float:
+        """Length of the cylinder where rocker and coupler meet, solved numerically."""
+        child = BUCKET + turned(CHILD - BUCKET, angle)
+
+        def open_by(turn):
+            return np.linalg.norm(GROUND + turned(PIN - GROUND, turn[0]) - child) - np.linalg.norm(
+                PIN - CHILD
+            )
+
+        turn = least_squares(open_by, [angle], xtol=1e-14, ftol=1e-14, gtol=1e-14).x[0]
+        return float(np.linalg.norm(GROUND + turned(PIN - GROUND, turn) - TAIL))
+
+    for angle in np.linspace(low, high, 7):
+        assert cylinder.length(angle) == pytest.approx(rod_length(angle), abs=1e-5)
+    slope = (rod_length(1e-4) - rod_length(-1e-4)) / 2e-4
+    assert cylinder.moment_arm(0.0) == pytest.approx(slope, rel=1e-4)
+    assert cylinder.sense == np.sign(slope)

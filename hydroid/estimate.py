@@ -110,6 +110,8 @@ class JointVerdict(Settings):
     joint: int
     """numbered from 1"""
     name: str
+    slides: bool = False
+    """whether it slides: 1 deg then stands for 17.5 mm"""
     verdict: str
     """predicts, predicts roughly, predicts no better than BASELINE, fits but does not predict, does not fit,
     or not tested (`fitting.verdict` has the rules)"""

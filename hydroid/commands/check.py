@@ -1,6 +1,7 @@
 """`hydroid check`: what is wrong or unusual about logs."""
 
 from collections.abc import Mapping, Sequence
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -69,7 +70,10 @@ def check(
             | {"moved_deg": dict(one.moved_deg), "findings": plain_findings(one.findings)}
         )
         if one.log is not None:
-            moved = ", ".join(f"{name} by {deg:.3g} deg" for name, deg in one.moved_deg.items()) or "nothing"
+            ways = one.moved_deg.items()
+            slides = {names[j - 1] for j in settings.arm.slides}
+            shown = [f"{n} by {f'{radians(d):.3g} m' if n in slides else f'{d:.3g} deg'}" for n, d in ways]
+            moved = ", ".join(shown) or "nothing"
             length = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
             lines.append(f"{one.path}: {length}; driven and moved: {moved}")
     exit_status = 0 if all(one.log for one in checks) else 2

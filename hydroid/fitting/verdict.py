@@ -91,6 +91,7 @@ def _judge(
     return JointVerdict(
         joint=joint,
         name=settings.arm.joint_names[joint - 1],
+        slides=settings.arm.joints[joint - 1].slides,
         verdict=word,
         fitted_deg=finite(errors[0]),
         unseen_deg=finite(errors[1]),

@@ -48,18 +48,30 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         for joint in first.joints:
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
             several = [p for p in (first, *others) if joint in p.joints]
-            drawing = partial(draw_response, title, joint, several, bins)  # a page of many logs stays small
+            slides = arm.joints[joint - 1].slides
+            drawing = partial(
+                draw_response, title, joint, several, bins, slides=slides
+            )  # many logs stay small
             error, tolerance = rms_deg([first.error(joint)]), tolerances.get(joint, np.inf)
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
             row = f"{names[log]} {_KINDS[first.unseen]}".strip()
             plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
-            tabs.append(Tab(f"{error:.2g}°", plot, row, arm.joint_names[joint - 1], state))
+            tabs.append(
+                Tab(
+                    f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}°",
+                    plot,
+                    row,
+                    arm.joint_names[joint - 1],
+                    state,
+                )
+            )
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
         for one in predictions
         for row in one.plain(arm.joint_names)
     ]
     note = "fit: 0 % for the mean of the measured angle. expected: rms error that the fit leads to expect."
+    note += " Of a joint that slides 1 deg stands for 17.5 mm." if arm.slides else ""
     optional = ("mean absolute [deg]", "largest [deg]", "inside band [%]", "expected [deg]")
     errors = Table.of("All errors", _COLUMNS, rows, note, optional)
     return (
@@ -72,32 +84,35 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
     )
 
 
-def draw_response(title: str, joint: int, several: Sequence[Prediction], bins: int) -> Chart:
+def draw_response(
+    title: str, joint: int, several: Sequence[Prediction], bins: int, *, slides: bool = False
+) -> Chart:
     """Draw the measured angle of one joint, every model's response and residual, command and pressures."""
     log, column = several[0].log, joint - 1
-    measured = np.degrees(log.angle[:, column])
+    place, unit, factor = ("position", "mm", 1e3) if slides else ("angle", "deg", np.degrees(1.0))
+    measured = factor * log.angle[:, column]
     upper = [Mark("line", log.time, measured, color="ink", label="measured", width=5, alpha=0.35)]
     middle = [ZERO]
     # a response that runs away, by three ranges of the measured angle, must not flatten the others
     far = 3.0 * max(float(np.ptp(measured)), 1.0)
     for i, (one, color) in enumerate(zip(several, cycle(SERIES), strict=False)):
-        residual, name, time = np.degrees(finite(one.error(joint))), short_name(one.fit), one.log.time
+        residual, name, time = factor * finite(one.error(joint)), short_name(one.fit), one.log.time
         rms = float(np.sqrt(np.mean(residual**2)))
-        label = f"{name} ({number(rms)}° rms)" if np.isfinite(rms) else f"{name} (diverged)"
+        label = f"{name} ({number(rms)} {unit} rms)" if np.isfinite(rms) else f"{name} (diverged)"
         residual[np.abs(residual) > far] = np.nan
-        angle = np.degrees(one.log.angle[:, column]) - residual
+        angle = factor * one.log.angle[:, column] - residual
         upper.append(Mark("line", time, angle, color=color, label=label, off=i > 0))
         middle.append(Mark("line", time, residual, color=color, label=label, width=1, off=i > 0))
         if band := one.bands.get(joint):
-            half = np.degrees(band.half)
+            half = factor * band.half
             useless = ", wider than the motion" if np.mean(2 * half) > np.ptp(measured) else ""
             # nor must a band that the parameters leave open
             half = np.fmin(half, 2.0 * float(np.nanmax(np.abs(residual), initial=1e-6)))
             label = f"95 % band of {name}{useless}"
             middle.insert(0, Mark("band", time, -half, half, color=color, label=label, alpha=0.18, off=i > 0))
     panels = [
-        Panel("", "angle [deg]", tuple(upper), title, 280),
-        Panel("", "residual [deg]", tuple(middle), height=190),
+        Panel("", f"{place} [{unit}]", tuple(upper), title, 280),
+        Panel("", f"residual [{unit}]", tuple(middle), height=190),
     ]
     pressure = None if log.pressure is None else log.pressure[:, column]
     if pressure is not None and np.isfinite(pressure).any():

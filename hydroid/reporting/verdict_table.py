@@ -29,7 +29,7 @@ def verdict_table(fits: Verdicts) -> Table:
         {"fit": short_name(fit), "joint": one.name}
         | {"verdict": f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"}
         | {
-            name: None if error is None else Given(f"{error:.2g}")
+            name: None if error is None else Given(_shown(error, one.slides))
             for name, error in {
                 "fitted": one.fitted_deg,
                 "unseen": one.unseen_deg,
@@ -42,6 +42,10 @@ def verdict_table(fits: Verdicts) -> Table:
     if len(fits) == 1:
         del columns["fit"]
     return Table.of("Verdict", columns, rows, _NOTE, NAMES[:2])
+
+
+def _shown(error: float, slides: bool) -> str:
+    return f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}"
 
 
 def verdict_section(fits: Verdicts) -> Section:

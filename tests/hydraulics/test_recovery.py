@@ -1,23 +1,13 @@
 """Every term is estimated from simulated logs: the truth lies within the interval."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from recovery import duties, settings_of
+from recovery import assert_recovered, duties, recover, settings_of
 
-from hydroid.log import Log
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import least_squares
-from hydroid.settings.fit import FitSettings
-from hydroid.settings.search import RefinementSettings
-
-NOISE_DEG = 0.02
 DUTIES = [60, -40, 90, -80, 40, 0, -30, 70, -60, 30]
 ROTARY = 4
 """the roll: a rotary actuator turns it"""
@@ -108,40 +98,6 @@ CASES = {
         NOTHING, ({2: [60, -40, 80, -70, 30]},),
     ),
 }  # fmt: skip
-
-
-def recover(
-    settings: FitSettings, logs: Sequence[Log], truth: Mapping[str, float], start: Mapping[str, float]
-) -> Uncertainty:
-    """Fit logs that the settings simulate with `truth`, noise added, from another start."""
-    rng = np.random.default_rng(0)
-    measured = [simulate_log(settings, log, truth, "truth") for log in logs]
-    noisy = [
-        replace(log, angle=log.angle + rng.normal(0, np.radians(NOISE_DEG), log.angle.shape))
-        for log in measured
-    ]
-    # the start pose is known here; its noise is another test's subject
-    for log, exact in zip(noisy, measured, strict=True):
-        log.angle[0] = exact.angle[0]
-    problem = Problem(settings, noisy)
-    begin = problem.parameters.vector(start, "start")
-
-    def residuals(unit: np.ndarray) -> np.ndarray:
-        return problem.residuals(problem.parameters.from_unit(unit))
-
-    ended = least_squares(problem.parameters.to_unit(begin[None])[0], residuals, RefinementSettings())
-    return uncertainty(problem, problem.parameters.from_unit(ended.point[None])[0])
-
-
-def assert_recovered(found: Uncertainty, settings: FitSettings, truth: Mapping[str, float]) -> None:
-    """The truth lies within three standard deviations of each estimate, and these are below a third of it."""
-    for name, estimate, deviation in zip(
-        settings.parameters, found.theta, found.standard_deviation, strict=True
-    ):
-        if settings.parameters[name].fixed is None:
-            what = f"{name}: {estimate:.5g} ± {deviation:.2g}, truth {truth[name]:.5g}"
-            assert abs(estimate - truth[name]) < 3 * deviation, what
-            assert deviation < abs(truth[name]) / 3, what
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,0 +1,69 @@
+"""A telescope: a joint that slides, with its cylinder along it."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from recovery import assert_recovered, duties, recover
+
+import hydroid
+from hydroid.arm.locked import lock
+from hydroid.arm.model import load_model
+from hydroid.settings.fit import FitSettings
+
+CRANE = """<mujoco model="crane"><worldbody><body name="boom" pos="0 0 2">
+  <joint name="boom" axis="0 -1 0" range="-20 70"/><geom type="box" size="2 .15 .2" pos="2 0 0" mass="600"/>
+  <body name="telescope" pos="1 0 0"><joint name="telescope" type="slide" axis="1 0 0" range="0 1.8"/>
+    <geom type="box" size="1.7 .1 .12" pos="1.7 0 0" mass="250"/></body></body></worldbody>
+  <keyframe><key name="up" qpos="0.9 0.4"/></keyframe></mujoco>"""
+ARM = """model: crane.xml
+actuators:
+  boom: {kind: linear, pivots: {parent: [0.3, 0, 1.4], child: [1.2, 0, 1.9]}, area_a: 7854, area_b: 4000,
+         max_opening: 8}
+  telescope: {kind: linear, area_a: 3000, area_b: 1800, max_opening: 6}
+"""
+TRUTH = {"area_A": 3400.0, "area_B": 1650.0, "delay": 0.12, "M_telescope": 310.0}
+PARAMETERS = {
+    "area_A": {"quantity": "area_a", "joints": ["telescope"], "bounds": [1500, 6000], "start": 3100},
+    "area_B": {"quantity": "area_b", "joints": ["telescope"], "bounds": [800, 3500], "start": 1750},
+    "delay": {"quantity": "delay", "joints": ["telescope"], "bounds": [0, 0.5], "start": 0.05},
+    "M_telescope": {"quantity": "mass", "link": "telescope", "within": 2},
+    "D": {"quantity": "damping", "fixed": 2000},
+}
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> FitSettings:
+    folder: Path = tmp_path_factory.mktemp("crane")
+    (folder / "crane.xml").write_text(CRANE)
+    (folder / "arm.yaml").write_text(ARM)
+    changes = {"arm": str(folder / "arm.yaml"), "outputs": [2], "parameters": PARAMETERS}
+    changes |= {"start_pose": "up", "simulation.threads": 1, "hydraulics.supply_pressure": 150}
+    return hydroid.load_settings("fit-hyd", changes)
+
+
+def test_its_cylinder_lies_along_it(settings: FitSettings) -> None:
+    joint = settings.arm.joints[1]
+    assert (joint.slides, joint.range, joint.unit) == (True, (0.0, 1.8), "mm")
+    assert joint.actuator.stroke == pytest.approx(1800)
+    assert joint.actuator.length(1.3) - joint.actuator.length(0.2) == pytest.approx(1.1)
+    np.testing.assert_array_equal(joint.actuator.moment_arm(np.linspace(0, 1.8, 5)), 1.0)
+
+
+def test_locking_the_boom_leaves_a_mass_on_a_slope(settings: FitSettings) -> None:
+    """Free of its cylinder it slides down at g sin: the reduced model is the whole one."""
+    locked = lock(load_model(settings.arm), settings.arm, ["telescope"], settings.arm.pose("up"))
+    data = mujoco.MjData(locked.model)
+    data.qpos[:] = 0.9
+    mujoco.mj_forward(locked.model, data)
+    assert data.qacc[0] == pytest.approx(-9.81 * np.sin(0.9), rel=1e-9)
+    assert data.M[0] == pytest.approx(250)
+
+
+def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:
+    """The slope tells the mass: one log has the boom up, one has it level."""
+    levels = {2: [40, -40, 80, -30, 20, -60, 60, -50, 0, 30]}
+    logs = [duties(np.array([boom, 0.4]), levels, dwell=0.8) for boom in (1.2, 0.0)]
+    start = {"area_A": 3000.0, "area_B": 1800.0, "delay": 0.05, "M_telescope": 250.0}
+    assert_recovered(recover(settings, logs, TRUTH, start), settings, TRUTH)

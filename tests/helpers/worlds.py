@@ -1,0 +1,189 @@
+"""Twelve arms as the world has them, each with a log: URDFs and MJCFs that `hydroid init` must take."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+Joint = tuple[str, str, str, str, tuple[float, float, float], str]
+"""joint, parent, child, kind, place on the parent [m], and limits"""
+SWING: Joint = ("swing", "base", "house", "revolute", (0, 0, 1), "-3 3")
+BOOM: Joint = ("boom", "house", "boom_link", "revolute", (0.5, 0, 0.3), "-0.5 1.2")
+STICK: Joint = ("stick", "boom_link", "stick_link", "revolute", (3, 0, 0), "-2.2 -0.2")
+BUCKET: Joint = ("bucket", "stick_link", "bucket_link", "revolute", (1.8, 0, 0), "-2 0.6")
+TELESCOPE: Joint = ("telescope", "stick_link", "telescope_link", "prismatic", (0.4, 0, 0), "0 1.4")
+TOOL: Joint = ("bucket", "telescope_link", "bucket_link", "revolute", (1.8, 0, 0), "-2 0.6")
+SIZES = {"house": 1.5, "boom_link": 3.0, "stick_link": 1.8, "telescope_link": 1.8, "bucket_link": 0.9}
+"""length of the links [m]; they are a fifth as wide and high"""
+EXCAVATOR = (SWING, BOOM, STICK, BUCKET)
+CRANE = (SWING, BOOM, STICK, TELESCOPE, TOOL)
+AXES = {"swing": "0 0 1", "telescope": "1 0 0"}
+
+
+@dataclass(frozen=True)
+class World:
+    """One arm and its log.
+
+    joints: that the import must find, in order. columns: of commands and positions in the log, by joint.
+    density: of the links in the file [kg/m³]; None: they have no masses. shape: of a link's geometry.
+    more: of the URDF. said: beginnings of lines that must be printed.
+    """
+
+    joints: Sequence[str]
+    parts: Sequence[Joint]
+    columns: Mapping[str, tuple[str, str]]
+    density: float | None = 1200.0
+    shape: str = '<box size="{0} {1} {1}"/>'
+    more: str = ""
+    said: Sequence[str] = ()
+    write: Callable[["World", Path], Path] = field(default=lambda world, folder: urdf(world, folder))
+
+
+def named(*joints: str, pattern: str = "{}_cmd_V {}_deg") -> dict[str, tuple[str, str]]:
+    """Columns that have the joints' names, in m of a telescope."""
+    command, angle = pattern.split()
+    units = {"telescope": angle.replace("deg", "m")}
+    return {joint: (command.format(joint), units.get(joint, angle).format(joint)) for joint in joints}
+
+
+def urdf(world: World, folder: Path) -> Path:
+    """Write the URDF of an arm, and its meshes in mm where it has some."""
+    text = '<link name="base"/>'
+    for name, parent, child, kind, at, limits in world.parts:
+        length = SIZES.get(child, 0.6)
+        mass = "" if world.density is None else inertial(length, world.density * length**3 / 25)
+        shape = world.shape.format(length, length / 5, child)
+        seen = f'<visual><origin xyz="{length / 2} 0 0"/><geometry>{shape}</geometry></visual>'
+        text += f'<link name="{child}">{mass}{seen if shape else ""}</link>'
+        low, high = limits.split() if limits else (0, 0)
+        limit = f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/>' if limits else ""
+        text += (
+            f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            f'<origin xyz="{at[0]} {at[1]} {at[2]}"/><axis xyz="{AXES.get(name, "0 -1 0")}"/>{limit}</joint>'
+        )
+        solid = trimesh.creation.box((1e3 * length, 200 * length, 200 * length))
+        if "mm_" in world.shape:
+            (folder / f"mm_{child}.stl").write_bytes(solid.export(file_type="stl"))
+    path = folder / "robot.urdf"
+    path.write_text(f'<robot name="machine">{text}{world.more}</robot>')
+    return path
+
+
+def inertial(length: float, mass: float) -> str:
+    """The inertial of a box that begins at its joint."""
+    along, across = mass * 2 * (length / 5) ** 2 / 12, mass * (length**2 + (length / 5) ** 2) / 12
+    return (
+        f'<inertial><origin xyz="{length / 2} 0 0"/><mass value="{mass}"/><inertia ixx="{along}" '
+        f'iyy="{across}" izz="{across}" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+
+
+def mjcf(world: World, folder: Path) -> Path:
+    """Write an MJCF with an include, a missing texture, a plugin and a sensor."""
+    body = ""
+    for name, _, child, kind, at, limits in reversed(world.parts):
+        length, slides = SIZES[child], kind == "prismatic"
+        body = (
+            f'<body name="{child}" pos="{at[0]} {at[1]} {at[2]}"><joint name="{name}" range="{limits}" '
+            f'type="{"slide" if slides else "hinge"}" axis="{AXES.get(name, "0 -1 0")}"/><geom type="box" '
+            f'size="{length / 2} {length / 10} {length / 10}" pos="{length / 2} 0 0" material="paint" '
+            f'mass="{1200 * length**3 / 25}"/>{body}</body>'
+        )
+    (folder / "looks.xml").write_text(
+        '<mujoco><asset><texture name="mud" type="2d" file="none.png"/>'
+        '<material name="paint" texture="mud"/></asset></mujoco>'
+    )
+    path = folder / "machine.xml"
+    path.write_text(
+        '<mujoco model="machine"><compiler angle="radian" autolimits="true"/><include file="looks.xml"/>'
+        '<extension><plugin plugin="some.soil"/></extension><worldbody><body name="track"><freejoint/>'
+        f'<geom type="box" size="1 1 .3" mass="3000"/>{body}</body></worldbody>'
+        '<sensor><jointpos joint="boom"/></sensor></mujoco>'
+    )
+    return path
+
+
+def _legs() -> tuple[Joint, ...]:
+    parts: list[Joint] = []
+    for side in ("fl", "fr"):
+        above = "base"
+        for name in ("swivel", "stabilizer", "steering", "wheel", "hub"):
+            parts.append((f"{name}_{side}", above, f"{name}_{side}_link", "revolute", (0.4, 0, 0), "-1 1"))
+            above = f"{name}_{side}_link"
+    return tuple(parts)
+
+
+TUBE: Joint = ("boom_tube", "house", "boom_tube_link", "revolute", (0.6, 0, -0.2), "-1 1")
+ROD: Joint = ("boom_rod", "boom_tube_link", "boom_rod_link", "prismatic", (0.3, 0, 0), "0 0.8")
+NAMES, LONG = ("swing", "boom", "stick", "bucket"), ("swing", "boom", "stick", "telescope", "bucket")
+MIMIC = (
+    '<link name="lever"/><joint name="lever_joint" type="revolute"><parent link="stick_link"/>'
+    '<child link="lever"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="bucket"/>'
+    "</joint>"
+)
+HEAVY = "MASSES THAT NO MACHINE HAS [kg]: house"
+WORLDS = {
+    "as CAD should be": World(NAMES, EXCAVATOR, named(*NAMES)),
+    "a simulator's default masses": World(NAMES, EXCAVATOR, named(*NAMES), density=0.05, said=[HEAVY]),
+    "no masses": World(NAMES, EXCAVATOR, named(*NAMES), density=None, said=[HEAVY]),
+    "no masses, lost meshes": World(
+        NAMES, EXCAVATOR, named(*NAMES), None, '<mesh filename="package://x/{2}.dae"/>',
+        said=["mesh package://x/house.dae, mesh", HEAVY],
+    ),
+    "meshes in mm": World(
+        NAMES, EXCAVATOR, named(*NAMES), shape='<mesh filename="mm_{2}.stl"/>', said=["meshes up to 3000 m"],
+    ),
+    "a crane with a telescope": World(LONG, CRANE, named(*LONG)),
+    "a forwarder, joints by number": World(
+        LONG, CRANE, {name: (f"u{k}", f"q{k}{'_m' if k == 4 else ''}") for k, name in enumerate(LONG, 1)},
+    ),
+    "legs longer than the arm": World(
+        LONG, (*_legs(), *CRANE), named(*LONG), said=["the arm is swing - boom - stick - telescope - bucket"],
+    ),
+    "cylinders as open links": World(
+        NAMES, (*EXCAVATOR, TUBE, ROD), named(*NAMES), said=["boom_tube and boom_rod: part of a cylinder"],
+    ),
+    "an MJCF with textures and plugins": World(LONG, CRANE, named(*LONG), write=mjcf),
+    "continuous swing, a mimic, other words": World(
+        NAMES, (("swing", "base", "house", "continuous", (0, 0, 1), ""), BOOM, STICK, BUCKET),
+        {
+            "stick": ("dipper joystick [V]", "dipper angle [deg]"),
+            "swing": ("slew joystick [V]", "slew angle [deg]"),
+            "bucket": ("tool joystick [V]", "tool angle [deg]"),
+            "boom": ("boom joystick [V]", "boom angle [deg]"),
+        },
+        more=MIMIC, said=["lever_joint: following another joint", "swing: without limits"],
+    ),
+    "columns by the names of links": World(
+        ("j1", "j2", "j3"),
+        (
+            ("j1", "base", "turret", "revolute", (0, 0, 1), "-3 3"),
+            ("j2", "turret", "mast", "revolute", (0.5, 0, 0.3), "-0.5 1.2"),
+            ("j3", "mast", "jib", "revolute", (2.0, 0, 0), "-2.2 -0.2"),
+        ),
+        {"j3": ("jib_cmd", "jib_deg"), "j1": ("turret_cmd", "turret_deg"), "j2": ("mast_cmd", "mast_deg")},
+    ),
+}  # fmt: skip
+
+
+def write_log(world: World, path: Path, seconds: float = 30.0) -> Path:
+    """Write a log of the world's columns, in the order of `columns`: each joint follows its command."""
+    rng, time = np.random.default_rng(3), np.arange(0, seconds, 0.02)
+    parts = {name: limits for name, *_, limits in world.parts}
+    columns = {"time_s": time}
+    measured: dict[str, np.ndarray] = {}
+    for joint, (command, angle) in world.columns.items():
+        levels = np.where(np.arange(15) % 2, 1, -1) * rng.uniform(30, 90, 15)
+        drive = np.repeat(np.r_[0, levels], len(time) // 16 + 1)[: len(time)]
+        low, high = map(float, (parts[joint] or "-1 1").split())
+        way = np.cumsum(np.roll(drive, 6))
+        place = low + (high - low) * (0.2 + 0.6 * (way - way.min()) / np.ptp(way))
+        columns[command] = drive / 10 if "V" in command else drive
+        measured[angle] = place if angle.endswith("_m") else np.degrees(place)
+    columns |= measured
+    np.savetxt(
+        path, np.stack([*columns.values()], axis=1), "%.6g", ",", header=",".join(columns), comments=""
+    )
+    return path

@@ -71,7 +71,8 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
     mujoco.mj_kinematics(model, data)
     links, lines = [body for body in spec.bodies[1:] if body.joints], list[str]()
     places = [data.joint(body.joints[0].name).xanchor for body in links]
-    places.append(places[-1] + 0.5 * (places[-1] - places[-2] if len(links) > 1 else [1.0, 0.0, 0.0]))
+    before = places[-2] if len(links) > 1 else places[-1] - [1.0, 0.0, 0.0]
+    places.append(1.5 * places[-1] - 0.5 * before)
     longest = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max())
     for body, (here, there) in zip(links, pairwise(places), strict=True):
         solid, least, most = solid_of(model, model.body(body.name).id), LEAST, MOST

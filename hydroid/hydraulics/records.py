@@ -20,8 +20,9 @@ from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weigh
 from hydroid.hydraulics.valve import conductance
 from hydroid.quantity_table import QUANTITIES, ROWS
 from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
-from hydroid.settings.linkage import LinearActuator, four_bar, triangle
+from hydroid.settings.linkage import four_bar, triangle
 
 Array = NDArray[np.float64]
 Records: TypeAlias = np.recarray[Any, Any]

@@ -13,8 +13,8 @@ from hydroid.arm.model import load_model
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.parameters import Array
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.linkage import LinearActuator
 from hydroid.simulation import Candidates, Simulation
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario

@@ -10,7 +10,7 @@ import yaml
 from hydroid.project.layout import Layout
 from hydroid.project.sizes import JointSize
 from hydroid.settings.arm import Arm
-from hydroid.settings.linkage import LinearActuator
+from hydroid.settings.cylinder import LinearActuator
 
 LONGEST_STEP = 0.025
 """of MuJoCo [s], in a log of fewer samples"""

@@ -13,8 +13,8 @@ import numpy as np
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.linkage import LinearActuator
 
 LIFT = 2.0
 """torque of a joint at the pump's pressure, over the largest that gravity asks of it"""

@@ -15,7 +15,7 @@ from hydroid.reporting.chart import SERIES
 from hydroid.reporting.figure import SHADES, legend, saved, style
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight
 from hydroid.settings.arm import Arm
-from hydroid.settings.linkage import LinearActuator
+from hydroid.settings.cylinder import LinearActuator
 
 VIEWS = {"from the right (-y)": (0.0, "z [m]"), "from above": (-90.0, "y [m]")}
 """elevation of the sight [deg], and what points upwards; x points to the right"""

@@ -16,7 +16,8 @@ from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
-from hydroid.settings.linkage import DIGITS, Cylinder, LinearActuator, RotaryActuator, make_cylinder
+from hydroid.settings.cylinder import LinearActuator, make_cylinder
+from hydroid.settings.linkage import DIGITS, Cylinder, RotaryActuator
 from hydroid.settings.load import Settings, load
 
 if TYPE_CHECKING:
@@ -75,11 +76,6 @@ class Joint:
         """The range in the units of a simulation [rad], or [m]."""
         low, high = self.range
         return self.range if self.slides else (math.radians(low), math.radians(high))
-
-    @property
-    def unit(self) -> str:
-        """Unit in which people read its angles or positions."""
-        return "mm" if self.slides else "deg"
 
 
 @dataclass(frozen=True)
@@ -145,16 +141,16 @@ class Arm:
         low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
         if limited:
             low, high = (joint.range if slides else np.degrees(joint.range)).round(DIGITS).tolist()
-        whole = Joint(name, (low, high), not limited, None, slides)
+        bare = Joint(name, (low, high), not limited, None, slides)
         if isinstance(actuator, Cylinder):
             try:
                 if not limited:
                     raise ValueError("a joint without limits needs a rotary actuator")
-                data = _at_zero(self.file.model)
-                actuator = make_cylinder(actuator, whole.limits, data, name, slides=slides)
+                zero = _at_zero(self.file.model)
+                actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
             except ValueError as error:
                 raise SettingsError(f"actuators.{name}: {error}", where=self.where) from None
-        return replace(whole, actuator=actuator)
+        return replace(bare, actuator=actuator)
 
     @property
     def model(self) -> Path:

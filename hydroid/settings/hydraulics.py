@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from hydroid.quantity_table import HYDRAULIC, QUANTITIES, TARGETS, Quantity
-from hydroid.settings.linkage import LinearActuator, RotaryActuator
+from hydroid.settings.cylinder import LinearActuator
+from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.load import Positive, Settings
 
 

@@ -7,17 +7,13 @@ its numbers are ours.)
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
 from hydroid.settings.load import Positive, Settings
-
-if TYPE_CHECKING:
-    import mujoco
 
 Vector = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -153,124 +149,3 @@ class RotaryActuator(Settings):
     """oil per angle [cm³/rad], or area of a joint that slides [mm²]"""
     max_opening: Positive
     """largest valve opening [mm²]"""
-
-
-@dataclass(frozen=True)
-class LinearActuator:
-    """A cylinder and the triangle that it spans with its joint, or with the rocker of a four-bar linkage.
-
-    Attributes:
-        settings: areas, valve opening and linkage.
-        triangle: of its pivots, `a` at least `b`.
-        stroke: of the rod [mm].
-        pivots: on the parent and on the moved link, in their frames [m]; None where only distances are given.
-    """
-
-    kind: ClassVar[str] = "linear"
-    settings: Cylinder
-    triangle: Triangle
-    stroke: float
-    pivots: tuple[Vector, Vector] | None = None
-
-    @property
-    def sense(self) -> float:
-        """1 if the rod runs out towards positive angles, else -1."""
-        return math.copysign(1.0, self.triangle.theta0)
-
-    def length(self, angle: Any) -> Any:
-        """Distance between the pivots [m] at joint angles [rad] of any shape."""
-        return self._cylinder(angle)[0]
-
-    def moment_arm(self, angle: Any) -> Any:
-        """Torque per force, and rod speed per joint speed [m], at joint angles [rad] of any shape."""
-        return self._cylinder(angle)[1]
-
-    def _cylinder(self, angle: Any) -> tuple[Any, Any]:
-        sides, bars = self.triangle, self.settings.four_bar
-        psi, first, _ = (angle, 1.0, 0.0) if bars is None else four_bar(angle, bars)
-        length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
-        return length, arm * first
-
-
-def make_cylinder(
-    settings: Cylinder,
-    limits: tuple[float, float],
-    data: "mujoco.MjData | None" = None,
-    joint: str = "",
-    *,
-    slides: bool = False,
-) -> LinearActuator:
-    """Return a cylinder that moves its joint through a range [rad], or along it [m] where the joint `slides`.
-
-    `data` has all joints of the arm at 0; a cylinder whose triangle is given, or along its joint, needs none.
-
-    Raises:
-        ValueError: pivots that are not stated or make no triangle, a dead centre in the range, a linkage that
-            does not reach, or a stroke that is too short.
-    """
-    sides, pivots = settings.triangle, None
-    if slides:
-        if settings.triangle or settings.four_bar:
-            raise ValueError("its joint slides, so it lies along it: give neither triangle nor four_bar")
-        sides = _along(settings.pivots, data, joint)
-    elif sides is None:
-        sides, pivots = _pinned(settings.pivots, data, joint)
-    sides = sides.model_copy(update={"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
-    cylinder = LinearActuator(settings, sides, 0.0, pivots)
-    angles = np.linspace(*limits, 181)
-    with np.errstate(all="ignore"):
-        arm = np.asarray(cylinder.moment_arm(angles))
-        bars = np.asarray(four_bar(angles, settings.four_bar)[1]) if settings.four_bar else np.ones(1)
-    # beyond a dead centre the moment arm has another sign
-    if not ((bars * bars[0] > 0).all() and (arm * arm[0] > 0).all()):
-        what = "does not reach all of its range, or has a dead centre in it"
-        raise ValueError(f"its {'four-bar linkage' if settings.four_bar else 'cylinder'} {what}")
-    needed = 1e3 * float(np.ptp(cylinder.length(np.array(limits))))
-    stroke = settings.stroke or round(needed, 3)
-    if stroke < 0.98 * needed:  # catalogues round: the cylinder then stops first
-        raise ValueError(f"a stroke of {stroke:g} mm is too short for the range, which needs {needed:.1f} mm")
-    return replace(cylinder, stroke=stroke)
-
-
-def _along(given: Pivots | None, data: Any, joint: str) -> Triangle:
-    """Return what stands for the triangle of a cylinder along its joint: b is 0.
-
-    The rod runs out forward unless pivots say otherwise.
-    """
-    way = 1.0 if given is None else float(np.subtract(given.child, given.parent) @ data.joint(joint).xaxis)
-    return Triangle.model_construct(a=1.0, b=0.0, theta0=90.0 if way > 0 else -90.0)
-
-
-def _pinned(given: Pivots | None, data: Any, joint: str) -> tuple[Triangle, tuple[Vector, Vector]]:
-    """The triangle of a cylinder's pivots, and these in the frames of parent and moved body [m]."""
-    if given is not None:
-        ends = np.array([given.parent, given.child])
-    else:
-        try:
-            ends = np.array([data.site(f"{joint}_pivot_{end}").xpos for end in ("parent", "child")])
-        except KeyError as error:
-            name = str(error).split("'")[1]
-            raise ValueError(f"the model has no site {name}; add it, or give pivots") from None
-    at, child = data.joint(joint), int(data.model.joint(joint).bodyid[0])
-    bodies = int(data.model.body_parentid[child]), child
-    local = [data.xmat[b].reshape(3, 3).T @ (e - data.xpos[b]) for b, e in zip(bodies, ends, strict=True)]
-    parent, moved = (tuple(place.round(DIGITS).tolist()) for place in local)
-    return _triangle(ends - at.xanchor, at.xaxis), (parent, moved)
-
-
-def _triangle(ends: Array, axis: Array) -> Triangle:
-    """The triangle of two pivots, (2, 3), seen from the joint at angle 0 [m], and the joint's axis, (3,)."""
-    heights = ends @ axis
-    near, far = flat = ends - np.outer(heights, axis)
-    a, b = np.linalg.norm(flat, axis=1).tolist()
-    if min(a, b) < 1e-6:
-        which = "parent" if a < 1e-6 else "child"
-        raise ValueError(f"the pivot on the {which} lies on the joint's axis, so it has no moment arm")
-    length, skew = float(np.linalg.norm(near - far)), float(np.ptp(heights))
-    if skew > 0.1 * length:  # the triangle is flat, and errs by half the square of this part
-        raise ValueError(
-            f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "
-            "a cylinder must lie across the axis"
-        )
-    turn = round(math.degrees(math.atan2(float(np.cross(near, far) @ axis), float(near @ far))), DIGITS)
-    return Triangle(a=round(a, DIGITS), b=round(b, DIGITS), theta0=turn)

@@ -6,7 +6,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from hydroid.cad.importer import import_arm
-from hydroid.settings.linkage import Cylinder, LinearActuator, make_cylinder
+from hydroid.settings.cylinder import LinearActuator, make_cylinder
+from hydroid.settings.linkage import Cylinder
 
 FOOT, EYE = np.array([0.5, -0.3]), np.array([1.4, 0.35])
 """of the boom's cylinder, on the house and on the boom, seen from the boom's joint [m]"""

@@ -8,8 +8,9 @@ from hydraulic_reference import changed, simulate, wheel
 
 from hydroid.hydraulics.records import Records, linkages, nominal_joints
 from hydroid.settings.arm import Arm
+from hydroid.settings.cylinder import make_cylinder
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.linkage import FourBar, Triangle, four_bar, make_cylinder
+from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
 SETTINGS = HydraulicSettings()
 SHOULDER = 1

@@ -45,7 +45,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> FitSettings:
 
 def test_its_cylinder_lies_along_it(settings: FitSettings) -> None:
     joint = settings.arm.joints[1]
-    assert (joint.slides, joint.range, joint.unit) == (True, (0.0, 1.8), "mm")
+    assert (joint.slides, joint.range, joint.limits) == (True, (0.0, 1.8), (0.0, 1.8))
     assert joint.actuator.stroke == pytest.approx(1800)
     assert joint.actuator.length(1.3) - joint.actuator.length(0.2) == pytest.approx(1.1)
     np.testing.assert_array_equal(joint.actuator.moment_arm(np.linspace(0, 1.8, 5)), 1.0)

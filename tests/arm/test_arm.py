@@ -167,7 +167,7 @@ WRONG = [
     (("</mujoco>", ""), {}, "XML parse error"),
     (('range="-20 60"', 'range="-20"'), {}, "does not have enough data"),
     (('axis="0 -1 0"', 'type="ball"'), {}, "must be a hinge or a slide"),
-    (('<joint name="tilt"', '<joint name="extra"/><joint name="tilt"'), {}, "a hinge or a slide, alone on its body"),
+    (('<joint name="tilt"', '<joint name="extra"/><joint name="tilt"'), {}, "alone on its body"),
     (('<joint name="tilt"', "<joint"), {}, "both need a name"),
     (('<body name="bar"', "<body"), {}, "both need a name"),
     (("</mujoco>", '<equality><joint joint1="lift" joint2="tilt"/></equality></mujoco>'), {}, "equality"),

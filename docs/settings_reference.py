@@ -7,7 +7,7 @@ import ast
 import inspect
 import re
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hydroid.quantity_table import HYDRAULIC, Quantity
+from hydroid.quantity_table import HYDRAULIC
 from hydroid.settings.arm import Arm, ArmFile
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -38,39 +38,54 @@ _ELSEWHERE = ("arm", "command", "angle", "pressure")
 _UNIT = re.compile(r" ?\[([^\]]*[^\d\], ][^\],]*)\]")
 
 
+_TASKS = {
+    "What is compared, and when it counts as predicted": (
+        *("stage", "arm", "outputs", "tolerance_deg", "start_pose", "free_start", "payloads", "objective"),
+    ),
+    "How a log is read": ("log",),
+    "What is estimated, and what is known of it": ("parameters", "priors", "scale"),
+    "The hydraulics": ("hydraulics",),
+    "How the machine is simulated": ("simulation",),
+    "How the estimate is found": ("search", "refinement", "joint_refinement"),
+    "The next experiment": ("design",),
+}
+"""sections of a fit's file, and the settings of each"""
+
+
 def reference() -> str:
     """Return the whole page as Markdown."""
-    arm = "\n## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n"
-    study = "\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n"
-    return (
-        _HEAD
-        + "## A fit's file\n\n"
-        + _table(FitSettings)
-        + arm
-        + _table(ArmFile)
-        + study
-        + _table(StudySettings)
-    )
+    rows = dict(_rows(FitSettings))
+    parts = [_HEAD]
+    for title, names in _TASKS.items():
+        own = [row for key, row in rows.items() if re.split(r"[.<]", key)[0] in names]
+        parts.append(f"## {title}\n\n{_table(own)}\n")
+    parts.append("## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n")
+    parts.append(_table(row for _, row in _rows(ArmFile)))
+    parts.append("\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n")
+    parts.append(_table(row for _, row in _rows(StudySettings)))
+    return "".join(parts)
 
 
-def _table(kind: type[BaseModel]) -> str:
-    lines = ["| setting | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+def _table(rows: Iterable[str]) -> str:
+    return "\n".join(["| setting | value | default | meaning |", "| --- | --- | --- | --- |", *rows]) + "\n"
+
+
+def _rows(kind: type[BaseModel]) -> Iterator[tuple[str, str]]:
+    """Key and row of every setting of a class."""
     for key, field, meaning, default in _settings(kind, ""):
         unit = _unit(field, meaning)
         text = _UNIT.sub("", meaning, count=1) if unit and f"[{unit}]" in meaning else meaning
-        cells = f"`{key}`", _type(field.annotation), default, unit, text.replace("|", "\\|")
-        lines.append(f"| {' | '.join(cells)} |")
+        yield key, _line(key, _type(field.annotation), unit, default, text)
         if field.annotation is HydraulicSettings:
-            lines += map(_row, HYDRAULIC.values())
-    return "\n".join(lines) + "\n"
+            for quantity in HYDRAULIC.values():
+                kind_of = "number or null" if quantity.optional or quantity.default is None else "number"
+                named, value = f"hydraulics.{quantity.name}", f"`{_yaml(quantity.default)}`"
+                yield named, _line(named, kind_of, quantity.unit, value, quantity.meaning)
 
 
-def _row(quantity: Quantity) -> str:
-    """A quantity of the hydraulics as a row of the table of settings."""
-    kind = "number or null" if quantity.optional or quantity.default is None else "number"
-    default = f"`{_yaml(quantity.default)}`"
-    cells = f"`hydraulics.{quantity.name}`", kind, default, quantity.unit, quantity.meaning
-    return f"| {' | '.join(cells)} |"
+def _line(key: str, kind: str, unit: str, default: str, meaning: str) -> str:
+    value = f"{kind} [{unit}]" if unit else kind
+    return f"| `{key}` | {value} | {default} | {meaning.replace('|', chr(92) + '|')} |"
 
 
 def _settings(

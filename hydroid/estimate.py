@@ -126,7 +126,8 @@ class JointVerdict(Settings):
     horizons_deg: dict[str, tuple[float | None, ...]] = Field(
         default_factory=dict[str, tuple[float | None, ...]]
     )
-    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s there, of the fit and of the baselines"""
+    """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
+    the fit and of the baselines; empty where there are none"""
 
 
 def _finding(value: Any) -> Any:

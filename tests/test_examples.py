@@ -1,11 +1,14 @@
 """The examples run as they stand, and the benchmarks can be imported."""
 
+import json
 import re
 import subprocess
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -38,6 +41,22 @@ def test_the_environment_passes_gymnasiums_own_check(gym_env):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym_env.ShoulderEnv(), skip_render_check=True)
+
+
+def test_the_notebook_goes_from_a_log_to_the_arm(monkeypatch: pytest.MonkeyPatch):
+    """Its cells, one after the other, as Jupyter runs them; what a cell ends with shows itself."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    monkeypatch.chdir(EXAMPLES)
+    before, names = sorted(EXAMPLES.iterdir()), dict[str, Any]()
+    for cell in json.loads((EXAMPLES / "notebook.ipynb").read_text())["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    assert sorted(EXAMPLES.iterdir()) == before  # nothing is written
+    assert names["fit"].summary.rms_deg < 0.5
+    assert "shoulder" in names["fit"]._repr_html_()
+    assert np.degrees(names["shoulder"]) == pytest.approx(20, abs=1)
 
 
 def test_every_benchmark_can_be_imported():

@@ -72,7 +72,7 @@ def analyse(
     from hydroid.fitting.summary import account
     from hydroid.posterior import profile as profiling
     from hydroid.posterior import uncertainty
-    from hydroid.reporting.parameters_report import direction_section, parameter_table
+    from hydroid.reporting.parameters_report import parameter_table, unknown_sections
 
     with Progress() as progress:
         known = uncertainty.uncertainty(problem, model.theta)
@@ -86,7 +86,7 @@ def analyse(
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)
     intervals = {name: one.interval for name, one in profiles.items()}
     tables = {"parameters": parameter_table(problem.settings, summary, intervals)}
-    every = tables | {name: t for s in direction_section(summary) for name, t in s.tables.items()}
+    every = tables | {name: t for s in unknown_sections(summary) for name, t in s.tables.items()}
     content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
     content |= summary.model_copy(update={"findings": findings}).model_dump(
         mode="json", include={"findings", "estimate"}

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Protocol
 
 from hydroid.errors import SettingsError
 from hydroid.files import find_config
@@ -13,11 +13,38 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
 if TYPE_CHECKING:
-    from hydroid.commands.fit import FitResult
+    from hydroid.fitting.validation import Prediction
+    from hydroid.fitting.verdict import Baselines
+    from hydroid.problem.problem import Problem
+
+
+class Fitted(Protocol):
+    """What a fit returns, as far as commands read it (`commands.fit.FitResult`)."""
+
+    @property
+    def model(self) -> IdentifiedModel:
+        """At the final estimate."""
+        ...
+
+    @property
+    def problem(self) -> "Problem":
+        """The logs and the model."""
+        ...
+
+    @property
+    def predictions(self) -> "tuple[Prediction, ...]":
+        """Of its own logs."""
+        ...
+
+    @property
+    def baselines(self) -> "Baselines":
+        """Fitted to the same logs."""
+        ...
+
 
 Source = str | Path
 ConfigSource = str | Path | FitSettings
-ModelSource = Union[str, Path, IdentifiedModel, "FitResult"]
+ModelSource = str | Path | IdentifiedModel | Fitted
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 

@@ -124,6 +124,7 @@ class FitProgress(Progress):
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
         for number, joint in enumerate(self._joints, start=1):
             name = name.replace(f"joint {number} ", f"{joint} ")
+        name = name.replace("refined", "all joints together")
         self(f"{name}: simulations", simulated, None, f"rms error {math.degrees(rms):.3g} deg")
 
 

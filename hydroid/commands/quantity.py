@@ -40,7 +40,7 @@ def quantity(
         def speed(plant):
             before = plant.reset("study")[1]
             for _ in range(50):
-                after = plant.step([0, 50, 0, 0, 0, 0, 0])[1]
+                after = plant.step({"shoulder": 50})[1]
             return (after - before) / 0.5
         found = hydroid.quantity("runs/a", speed, unit="rad/s")
         print(found.value, found.interval, found.unit)

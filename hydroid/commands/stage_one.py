@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hydroid.commands.inputs import ConfigSource, load_settings
+from hydroid.commands.inputs import ConfigSource, ModelSource, load_settings, open_model
 from hydroid.errors import SettingsError
 from hydroid.estimate import estimate_file, read_values
 from hydroid.files import is_file
@@ -33,24 +33,32 @@ def load_stage(stage: str, config: ConfigSource, changes: Mapping[str, Any]) -> 
 
 
 def with_mechanics(
-    mech: str | Path | None, config: ConfigSource, changes: Mapping[str, Any]
+    mech: ModelSource | None, config: ConfigSource, changes: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return changes of settings that hold the parameters of stage 1 at its estimate.
 
     Args:
-        mech: a run folder of stage 1, or a YAML file of values by name. Its masses hold, and its damping and
-            stiffness where `config` states no start or nominal value of its own. None: `config` fixes them,
-            or says what is known of them (a prior or a start), and they are estimated with the others.
+        mech: a run folder or a result of stage 1, or a YAML file of values by name. Its masses hold, and its
+            damping and stiffness where `config` states no start or nominal value of its own. None: `config`
+            fixes them, or says what is known of them (a prior or a start), and they are estimated with the
+            others.
         config: settings of stage 2.
         changes: settings to replace; they have the last word.
 
     Raises:
         RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
-    values, summary = ({}, None) if mech is None else read_values(Path(mech))
+    values, summary, first = dict[str, Any](), None, None
+    if isinstance(mech, str | Path):
+        values, summary = read_values(Path(mech))
+        beside = estimate_file(Path(mech)).parent / CONFIG
+        first = load(beside, FitSettings) if is_file(beside) else None
+    elif mech is not None:
+        model = open_model(mech)
+        values, summary, first = model.values, model.summary, model.settings
     settings = load_stage("hyd", config, changes)
-    if mech is not None and is_file(beside := estimate_file(Path(mech)).parent / CONFIG):
-        first, same = load(beside, FitSettings), ("start_pose", "payloads")
+    if first is not None:
+        same = "start_pose", "payloads"
         other = [name for name in same if getattr(first, name) != getattr(settings, name)]
         other += ["arm"] * (first.arm.joint_names != settings.arm.joint_names)
         if other:

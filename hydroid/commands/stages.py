@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hydroid.commands.fit import FitResult, fit
-from hydroid.commands.inputs import ConfigSource, SettingChanges, Source, setting_changes
+from hydroid.commands.inputs import ConfigSource, ModelSource, SettingChanges, Source, setting_changes
 from hydroid.commands.logs import read_logs, run_logs
 from hydroid.commands.options import NAMED, command, taking
 from hydroid.commands.progress import FitProgress
@@ -98,7 +98,7 @@ class FitOptions:
 class HydOptions(FitOptions):
     """The options of stage 2."""
 
-    mech: "Source | None" = None
+    mech: "ModelSource | None" = None
     both_stages: bool | None = None
 
     stage: ClassVar[str] = "hyd"

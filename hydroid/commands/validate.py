@@ -5,17 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.commands.fit import FitResult
 from hydroid.commands.inputs import ModelSource, SettingChanges, Source, as_list, open_model
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
 from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
+from hydroid.identified_model import IdentifiedModel
 
 if TYPE_CHECKING:
     from hydroid.commands.logs import LogSources
     from hydroid.fitting.validation import Prediction
-    from hydroid.identified_model import IdentifiedModel
     from hydroid.log import Log
 
 
@@ -53,7 +52,7 @@ def validate(
         LogError: a log cannot be used.
         RunError: a simulation diverged, or the folder cannot be written.
     """
-    given = as_list(fit)
+    given: list[ModelSource] = as_list(fit)
     if leave_one_out and len(given) > 1:
         raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     models = [open_model(one, None, set) for one in given]
@@ -73,13 +72,13 @@ def validate(
         if leave_one_out:
             fitted, baselines, predictions = _left_out(model, own)
         else:
-            if isinstance(one, FitResult):
+            if isinstance(one, str | Path | IdentifiedModel):
+                fitted, baselines = fitted_by(model)
+                seen = [was_fitted(Path(model.source).parent, log) for log in own]
+            else:
                 fitted, baselines = one.predictions, one.baselines
                 hashes = {log_hash(log) for log in one.problem.logs}
                 seen = [log_hash(log) in hashes for log in own]
-            else:
-                fitted, baselines = fitted_by(model)
-                seen = [was_fitted(Path(model.source).parent, log) for log in own]
             new = [None if known is None else not known for known in seen]
             predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
             if out is not None and (run := keep_validation(model, predictions)):

@@ -1,14 +1,15 @@
 """How well a model predicts a log: its response with a band, and the article's error indices (table 9)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hydroid.errors import SettingsError
+from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.refinement import refine
@@ -21,6 +22,11 @@ from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.search import RefinementSettings
+
+HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
+"""over which a predicted change of an angle is compared [s]"""
+SETTLING = 2.0
+"""simulated before each start of a horizon, and from start to start [s]"""
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,7 @@ class Prediction:
         response: their angles [rad], shape (T, K).
         bands: prediction bands by joint; empty of a model that is no fit.
         unseen: whether the model was made without this log; None: not known.
+        ahead: `errors_ahead` of the joints [rad], shape (N, HORIZONS, K); none where N is 0.
     """
 
     fit: str
@@ -56,6 +63,7 @@ class Prediction:
     response: Array
     bands: Mapping[int, Band] = field(default_factory=dict[int, Band])
     unseen: bool | None = None
+    ahead: Array = field(default_factory=partial(np.empty, (0, len(HORIZONS), 0)))
 
     @property
     def indices(self) -> dict[int, ErrorIndices]:
@@ -96,7 +104,38 @@ def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Predicti
     joints = tuple(model.settings.outputs)
     response = predict(model, log, joints)
     bands = prediction_bands(model, log, response)
-    return Prediction(model.name, log, joints, response, bands, unseen)
+
+    def errors(part: Log) -> Array:
+        try:
+            return part.angle[:, [j - 1 for j in joints]] - predict(model, part, joints)
+        except RunError:
+            return np.full((len(part.time), len(joints)), np.inf)
+
+    ahead = np.empty((0, len(HORIZONS), 0)) if unseen is False else errors_ahead(log, errors)
+    return Prediction(model.name, log, joints, response, bands, unseen, ahead)
+
+
+def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
+    """Return by how much predicted changes of angles over HORIZONS are off, from starts all along a log.
+
+    Each start is simulated from SETTLING before it, at the angles measured there: valves, pilot stages and
+    pump are then as the commands have left them.
+
+    Args:
+        log: the log.
+        errors: of a part of it [rad], shape (T, K).
+
+    Returns:
+        One row for each start [rad], shape (N, HORIZONS, K); NaN where the log ends before.
+    """
+    before, rows = round(SETTLING / log.period), list[Array]()
+    steps = [before + round(seconds / log.period) for seconds in HORIZONS]
+    for first in range(0, len(log.time) - steps[0], before):
+        error = errors(log.part(first, first + steps[-1] + 1))
+        none = np.full(error.shape[1], np.nan)
+        with np.errstate(invalid="ignore"):  # it may have diverged
+            rows.append(np.array([error[k] - error[before] if k < len(error) else none for k in steps]))
+    return np.array(rows)
 
 
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:

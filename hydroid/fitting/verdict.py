@@ -16,12 +16,13 @@ its. The first of these that is true is the verdict:
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from hydroid.estimate import JointVerdict, finite
 from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
-from hydroid.fitting.validation import Prediction
+from hydroid.fitting.validation import Prediction, errors_ahead
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
@@ -32,8 +33,6 @@ CLEARLY = 0.9
 """part of a baseline's error on unseen logs that a better fit stays below"""
 WORSE = 2.0
 """times the error on fitted logs, beyond which a fit does not predict"""
-HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
-"""over which a predicted change of an angle is compared [s]"""
 ANYWHERE = np.array([-np.inf, np.inf])
 
 Baselines = Mapping[int, Mapping[str, Baseline]]
@@ -86,8 +85,11 @@ def _judge(
         for some in (own, new)
     ]
     word = _word(errors, by_rival, tolerance, stated=stated is not None)
-    ahead = {"the fit": [p.error(joint) for p in judged]}
-    ahead |= {name: [one.errors([p.log]) for p in judged] for name, one in rivals.items()}
+    ahead: dict[str, list[Array]] = {}
+    if new and all(len(p.ahead) for p in new):
+        ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
+        for name, rival in rivals.items():
+            ahead[name] = [errors_ahead(p.log, partial(_column, rival))[..., 0] for p in new]
     return JointVerdict(
         joint=joint,
         name=settings.arm.joint_names[joint - 1],
@@ -97,10 +99,7 @@ def _judge(
         unseen_deg=finite(errors[1]),
         tolerance_deg=tolerance,
         baselines_deg=by_rival[1] or by_rival[0],
-        horizons_deg={
-            name: tuple(_change_deg(some, judged, seconds) for seconds in HORIZONS)
-            for name, some in ahead.items()
-        },
+        horizons_deg={name: _rms_ahead(np.concatenate(errors)) for name, errors in ahead.items()},
     )
 
 
@@ -129,10 +128,13 @@ def rms_deg(errors: Iterable[Array]) -> float:
     return float(np.degrees(np.sqrt(np.mean(np.concatenate([*errors]) ** 2))))
 
 
-def _change_deg(errors: Sequence[Array], of: Sequence[Prediction], seconds: float) -> float | None:
-    """Return the rms error of the angle's change over a time [deg]; None: no log lasts so long."""
-    changes: list[Array] = []
-    for error, prediction in zip(errors, of, strict=True):
-        ahead = round(seconds / prediction.log.period)
-        changes.append(error[ahead:] - error[: max(len(error) - ahead, 0)])
-    return finite(rms_deg(changes)) if sum(map(len, changes)) else None
+def _column(rival: Baseline, part: Log) -> Array:
+    return rival.errors([part])[:, None]
+
+
+def _rms_ahead(errors: Array) -> tuple[float | None, ...]:
+    """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS), over the starts [deg]."""
+    there = np.where(np.isnan(errors), 0.0, 1.0)
+    with np.errstate(all="ignore"):
+        mean = np.sum(np.nan_to_num(errors**2, posinf=np.inf), axis=0) / np.sum(there, axis=0)
+    return tuple(map(finite, np.degrees(np.sqrt(mean)).tolist()))

@@ -97,6 +97,13 @@ class Log:
         cut = {"time": self.time[:end], "command": self.command[:end], "angle": self.angle[:end]}
         return replace(self, **cut, pressure=pressure)
 
+    def part(self, first: int, end: int) -> "Log":
+        """Return the samples from `first` to before `end`, which start where they were measured."""
+        at = slice(first, end)
+        pressure = None if self.pressure is None else self.pressure[at]
+        own = {"command": self.command[at], "angle": self.angle[at], "pressure": pressure, "rest": 0}
+        return replace(self, time=self.time[at] - self.time[first], **own)
+
     def _at_rest(self, signal: Floats) -> Floats:
         rest = self.first_command if self.rest is None else self.rest
         longest = round(2.0 / self.period)  # a leaking valve lets an arm sink

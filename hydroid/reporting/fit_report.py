@@ -13,9 +13,8 @@ from hydroid.fitting.verdict import judge
 from hydroid.reporting import page_file
 from hydroid.reporting.page import Page, Section
 from hydroid.reporting.parameters_report import (
-    direction_section,
     parameter_section,
-    unknown_section,
+    unknown_sections,
     warnings,
 )
 from hydroid.reporting.predictions import prediction_sections
@@ -56,11 +55,10 @@ def fit_page(record: Record) -> Page:
         verdict_section(fits),
         *prediction_sections(predictions, settings.arm, fits),
         *quantity_section(settings, summary),
-        unknown_section(summary),
+        *unknown_sections(summary),
         Section("Do next", steps=_steps(record)),
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in result.fitted]),
-        *direction_section(summary),
         search_section(record),
     )
     in_order = sorted(sections, key=lambda section: section.folded)

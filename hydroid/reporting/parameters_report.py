@@ -91,18 +91,16 @@ def warnings(summary: FitSummary) -> tuple[str, ...]:
     return tuple(str(finding) for finding in summary.findings if finding.level != "note")[:3]
 
 
-def unknown_section(summary: FitSummary) -> Section:
-    """Return the section of all other findings."""
-    first, everything = warnings(summary), map(str, summary.findings)
-    points = tuple(text for text in everything if text not in first)
-    return Section("What is not known", "" if points else "The logs determine every free parameter.", points)
-
-
-def direction_section(summary: FitSummary) -> tuple[Section, ...]:
-    """Return the section on directions; none where no parameter is free."""
-    if summary.covariance is None or not summary.covariance.parameters:
-        return ()
-    return (Section("Directions", tables={"directions": direction_table(summary.covariance)}, folded=True),)
+def unknown_sections(summary: FitSummary) -> tuple[Section, ...]:
+    """Return the section of all other findings; those after the first six stand with the directions."""
+    first, known = warnings(summary), summary.covariance
+    points = tuple(text for text in map(str, summary.findings) if text not in first)
+    none = "" if points else "The logs determine every free parameter."
+    sections = [Section("What is not known", none, points[:6])]
+    if known is not None and known.parameters:
+        tables = {"directions": direction_table(known)}
+        sections.append(Section("Directions", points=points[6:], tables=tables, folded=True))
+    return tuple(sections)
 
 
 def direction_table(known: Covariance) -> Table:

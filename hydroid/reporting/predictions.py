@@ -80,7 +80,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             "Errors by log", "Rms error of each joint; choose one to see its response.", tabs=tuple(tabs)
         ),
         Section(errors.title, tables={"errors": errors}, folded=True),
-        horizon_section(fits),
+        *horizon_section(fits),
     )
 
 

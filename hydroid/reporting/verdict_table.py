@@ -6,7 +6,7 @@ import numpy as np
 
 from hydroid.estimate import JointVerdict
 from hydroid.fitting.baselines import NAMES
-from hydroid.fitting.verdict import HORIZONS
+from hydroid.fitting.validation import HORIZONS
 from hydroid.reporting.page import Section, short_name
 from hydroid.reporting.table import Given, Table
 from hydroid.words import listed
@@ -53,19 +53,22 @@ def verdict_section(fits: Verdicts) -> Section:
     return Section("Verdict", tables={"verdict": verdict_table(fits)})
 
 
-def horizon_section(fits: Verdicts) -> Section:
-    """Return the rms error of each angle's change over some times, of the fits and the baselines."""
-    rows = (
+def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
+    """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
+    rows = [
         {"joint": one.name, "of": short_name(fit) if name == "the fit" else name}
         | dict(zip(map(str, HORIZONS), errors, strict=True))
         for fit, verdicts in fits.items()
         for one in verdicts
         for name, errors in one.horizons_deg.items()
-    )
+    ]
     columns = {"joint": "joint", "of": "of"} | {str(seconds): f"{seconds:g} s" for seconds in HORIZONS}
-    note = "rms error [deg] of how far the angle turns in this time, from any moment of the logs on."
+    note = (
+        "rms error [deg] of how far the angle turns in this time, from starts every 2 s of the unseen logs. "
+        "Each is simulated from 2 s before, at the measured angles."
+    )
     table = Table.of("Error of the motion ahead", columns, rows, note)
-    return Section(table.title, tables={"horizons": table}, folded=True)
+    return (Section(table.title, tables={"horizons": table}, folded=True),) if rows else ()
 
 
 def ordered(fits: Verdicts) -> Verdicts:

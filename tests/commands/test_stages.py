@@ -3,12 +3,15 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from command_line import Run
 
 import hydroid
+from hydroid.errors import RunError
 
+ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
 GA = ["--algorithm", "ga"]
 VALUES = {"D": 80.0, "S": 0.0, "M1": 4.6, "M2": 5.1, "M3": 22.5, "M4": 1.6, "M5": 4.0, "M6": 4.7}
@@ -70,6 +73,29 @@ def test_python_does_what_the_terminal_does_and_shows_it(short: Path, hydroid_cl
     assert len(repr(one)) < 200
     assert all(f"<td>{name}</td>" in one._repr_html_() for name in one.summary.values)
     assert [run["seed"] for run in fitted.plain()["runs"]] == [5, 6]
+
+
+def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(short: Path, tmp_path: Path):
+    small = {"search.ga.population": 6, "search.ga.generations": 2}
+    before = sorted(tmp_path.iterdir())
+    fitted = hydroid.fit_mech(short, algorithm="ga", refinement=False, set=small)
+    assert fitted.to_frame()["value"].to_dict() == fitted.summary.values
+    predicted = fitted.predict(short)
+    assert np.array_equal(predicted.response, fitted.predictions[0].response)
+    assert predicted.ahead.shape[1:] == (5, 1)
+    (seen,) = fitted.validate(short).content["verdict"]
+    assert (seen["unseen_deg"], seen["fitted_deg"]) == (None, pytest.approx(fitted.summary.rms_deg))
+    other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
+    (unseen,) = fitted.validate(other).content["verdict"]
+    assert unseen["fitted_deg"] == seen["fitted_deg"]
+    assert len(unseen["horizons_deg"]["nine numbers"]) == 5
+    start = fitted.model.settings.arm.pose("study")
+    np.testing.assert_array_equal(fitted.plant().reset("study"), start)
+    np.testing.assert_array_equal(hydroid.load_plant(fitted).reset("study"), start)
+    with pytest.raises(RunError, match="has no folder"):
+        fitted.report()
+    assert sorted(tmp_path.iterdir()) == before
+    assert fitted.report(tmp_path / "page").stat().st_size > 0
 
 
 def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_path: Path):

@@ -7,8 +7,8 @@ import pytest
 
 from hydroid import load_settings
 from hydroid.fitting.baselines import NAMES
-from hydroid.fitting.validation import Prediction
-from hydroid.fitting.verdict import HORIZONS, judge
+from hydroid.fitting.validation import HORIZONS, Prediction, errors_ahead
+from hydroid.fitting.verdict import judge
 from hydroid.log import Log
 
 SETTINGS = load_settings("fit-mech")
@@ -93,7 +93,19 @@ def test_the_errors_are_those_of_the_joint_by_name():
     assert one.baselines_deg["nine numbers"] == pytest.approx(5.0)
 
 
-def test_the_error_of_a_change_is_of_what_the_angle_turns_in_that_time():
-    drift = replace(predicted(0, LOG), response=LOG.angle[:, [1]] - np.radians(0.5) * TIME[:, None])
-    (one,) = judge(SETTINGS, [drift], {})
-    assert one.horizons_deg["the fit"] == pytest.approx([0.5 * seconds for seconds in HORIZONS])
+def test_an_error_ahead_begins_anew_at_every_start():
+    """A model that is 10 % too slow errs by what the joint has turned since a start, however late that is."""
+    late = replace(LOG, source="b.csv")
+
+    def slow(part: Log) -> np.ndarray:
+        return 0.1 * (part.angle[:, [1]] - part.angle[0, 1])
+
+    ahead = errors_ahead(late, slow)
+    turned = [late.angle[400 + round(s / 0.01), 1] - late.angle[400, 1] for s in HORIZONS[:4]]
+    assert ahead[1, :4, 0] == pytest.approx(0.1 * np.array(turned))
+    assert np.isnan(ahead[1, 4, 0])  # the log ends before
+    one = replace(predicted(0, late), unseen=True, ahead=ahead)
+    (judged,) = judge(SETTINGS, [], {}, [one])
+    assert judged.horizons_deg["the fit"][4] is None
+    rms = np.degrees(np.sqrt(np.nanmean(ahead[:, :4, 0] ** 2, axis=0)))
+    assert judged.horizons_deg["the fit"][:4] == pytest.approx(rms)

@@ -92,6 +92,8 @@ def test_steps_are_the_simulation_of_the_fit_bit_for_bit(stage, changes, joints)
 @pytest.mark.parametrize("stage", ["mech", "hyd"])
 def test_a_slower_control_period_holds_the_command(stage):
     fitted = model(stage)
+    by_name, by_number = Plant(fitted, joints=["shoulder"]), Plant(fitted, joints=[2])
+    np.testing.assert_array_equal(by_name.step({"shoulder": 50}), by_number.step([0, 50, 0, 0, 0, 0, 0]))
     fast, slow = Plant(fitted), Plant(fitted, period=0.05)
     command = np.zeros(7)
     for k in range(40):
@@ -223,7 +225,9 @@ def test_a_plant_that_diverges_says_when(stage, capfd, tmp_path, monkeypatch):
         (lambda: Plant(model()).step([0, 1]), "command"),
         (lambda: Plant(model()).step(5.0), "command"),
         (lambda: Plant(model()).step([0, np.nan, 0, 0, 0, 0, 0]), "command"),
-        (lambda: Plant(model()).step([1, 0, 0, 0, 0, 0, 0]), "command"),
+        (lambda: Plant(model()).step([1, 0, 0, 0, 0, 0, 0]), "only shoulder take"),
+        (lambda: Plant(model()).step({"boom": 1.0}), "no joint boom; the arm has azimuth"),
+        (lambda: Plant(model(), joints=["boom"]), "joints 1 to 7: azimuth, shoulder"),
     ],
 )
 def test_what_no_plant_can_be_or_do_is_refused(refused, says):

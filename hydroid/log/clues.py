@@ -126,6 +126,8 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return "other"
     if unit:
         return KINDS.get(unit.quantity, "other")
+    if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:
+        return "command"  # also in /joint_commands.position[boom]
     for word in reversed(there):
         for kind, those in WORDS.items():
             if word in those.split():

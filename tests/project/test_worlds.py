@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from log_formats import BagWriter
 from worlds import SIZES, WORLDS, write_log
 
 import hydroid
@@ -30,3 +31,23 @@ def test_an_arm_of_the_world_is_taken_as_it_is(name: str, tmp_path: Path) -> Non
             assert np.abs(np.log(mass / true[link])) < np.log(6 if "lost" in name else 1.2)
     (read,) = hydroid.read_logs(log, settings)
     assert read.driven.all()
+
+
+def test_the_folder_of_a_ros_2_bag_whose_joints_change_places(tmp_path: Path) -> None:
+    """Names in each message, not places, tell the joints; commands come as joint states too."""
+    world = WORLDS["a crane with a telescope"]
+    rng, joints = np.random.default_rng(0), list(world.columns)
+    data = np.loadtxt(write_log(world, tmp_path / "a.csv"), delimiter=",", skiprows=1)
+    with BagWriter(tmp_path / "bag", "ros2") as bag:
+        for row in data:
+            order = rng.permutation(len(joints))
+            for topic, values in ("commands", 10 * row[1:6]), ("states", row[6:]):
+                message = bag.joints(1e9 + row[0], [joints[k] for k in order], values[order].copy())
+                bag.write(f"/joint_{topic}", 1e9 + row[0], message)
+    robot = world.write(world, tmp_path)
+    hydroid.init(tmp_path / "mine", arm=robot, log=tmp_path / "bag")
+    settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
+    (log,) = hydroid.read_logs(tmp_path / "bag", settings)
+    assert log.driven.all()
+    assert np.ptp(log.angle[:, 3]) == pytest.approx(np.ptp(data[:, 9]), rel=1e-3)
+    assert settings.log.columns("command", 4).column == ("/joint_commands.position[telescope]",)

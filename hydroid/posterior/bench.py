@@ -39,6 +39,11 @@ class Bench:
     scenario: Scenario
 
     @property
+    def slides(self) -> bool:
+        """Whether the joint slides."""
+        return self.settings.arm.joints[self.joint - 1].slides
+
+    @property
     def sense(self) -> float:
         """Direction in which a positive command turns the joint, 1 or -1."""
         actuator = self.settings.arm.joints[self.joint - 1].actuator
@@ -90,9 +95,9 @@ class Movement:
         return -self.bench.sense if self.command < 0 else self.bench.sense
 
     def speeds(self, candidates: Candidates) -> Array:
-        """Return speeds [deg/s] between samples, shape (n, samples)."""
-        angle = self.bench.drive(candidates, self.command, self.start, self.samples)
-        return self.sign * np.degrees(np.diff(angle, axis=1)) / self.bench.period
+        """Return speeds [deg/s], or [mm/s] of a joint that slides, between samples, shape (n, samples)."""
+        steps = np.diff(self.bench.drive(candidates, self.command, self.start, self.samples), axis=1)
+        return self.sign * (1e3 * steps if self.bench.slides else np.degrees(steps)) / self.bench.period
 
     def end(self, speeds: Array) -> Array:
         """Return the speed at the end of speeds, shape (n, samples): shape (n,)."""

@@ -121,15 +121,16 @@ def speed_tests(
         def row(name: str, label: str, unit: str, value: Array) -> tuple[Column, Array]:
             return Column(name + ending, label + word, unit), value
 
+        per_second = "mm/s" if bench.slides else "deg/s"
         runs = {u: step.speeds(candidates) for u, step in steps.items()}
         speed = {u: steps[u].end(run) for u, run in runs.items()}
         for u, value in speed.items():
-            point = Column("speed", "speed", "deg/s", False, sign * u)
+            point = Column("speed", "speed", per_second, False, sign * u)
             yield point, sign * bench.sense * value
         for u in (50.0, 100.0):
-            yield row(f"speed_{u:.0f}", f"speed at {u:.0f} % command", "deg/s", speed[u])
+            yield row(f"speed_{u:.0f}", f"speed at {u:.0f} % command", per_second, speed[u])
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
-        yield row("gain", "gain between command and speed", "deg/s per %", gain)
+        yield row("gain", "gain between command and speed", f"{per_second} per %", gain)
         onset, risen = (steps[rise].reaches(runs[rise], part * speed[rise]) for part in (ONSET, RISEN))
         yield row("dead_time", f"dead time at {rise:g} % command", "s", onset)
         yield row("time_constant", f"time constant at {rise:g} % command", "s", risen - onset)

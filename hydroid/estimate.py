@@ -165,8 +165,6 @@ class FitSummary(Settings):
     """what to know before using the estimate, the most important first (`hydroid.findings`)"""
     verdict: tuple[JointVerdict, ...] = ()
     """of each compared joint on the fitted logs; the page of a run adds the unseen logs"""
-    strained_priors: dict[str, float] = Field(default_factory=dict[str, float])
-    """priors that the final estimate is far from: the distance in standard deviations, by name"""
     estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
     """by name; the first is the search's own"""
     quantities: dict[str, QuantityEstimate] = Field(default_factory=dict[str, QuantityEstimate])

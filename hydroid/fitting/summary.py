@@ -34,7 +34,6 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         "simulations": int(fit.history[-1, 2]),
         "diverged": int(fit.history[-1, 3]),
         "findings": (*fit_findings(fit), *known.findings),
-        "strained_priors": dict(fit.strains),
         "estimates": estimates,
         "quantities": fit.quantities.scalars,
         "curves": fit.quantities.curves,

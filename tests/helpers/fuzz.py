@@ -185,7 +185,10 @@ def check_log(path: Path, data: bytes) -> None:
         command, angle = (
             cells[:, names.index(f"{n}{joint + 1}_{u}")] for n, u in (("u", "pct"), ("q", "deg"))
         )
-        held = np.clip(command[np.searchsorted(at, log.time + 1e-8, side="right") - 1], -100, 100)
+        held = command[np.searchsorted(at, log.time + 1e-8, side="right") - 1]
+        if 0.8 * np.median(np.diff(time)) >= 0.01:  # of a slower log they change on a line
+            held = np.interp(log.time + 0.005, at, command)
+        held = np.clip(held, -100, 100)
         np.testing.assert_allclose(log.command[:, joint], held, atol=1e-12)
         line = np.interp(log.time, at, np.unwrap(np.radians(angle)) if joint == 5 else np.radians(angle))
         turns = 2 * np.pi * np.rint((log.angle[:, joint] - line) / (2 * np.pi)) if joint == 5 else 0.0

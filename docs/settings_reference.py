@@ -54,7 +54,8 @@ _TASKS = {
 
 def reference() -> str:
     """Return the whole page as Markdown."""
-    rows = dict(_rows(FitSettings))
+    rows, grouped = dict(_rows(FitSettings)), {name for names in _TASKS.values() for name in names}
+    assert {re.split(r"[.<]", key)[0] for key in rows} == grouped, "a setting belongs to no task"
     parts = [_HEAD]
     for title, names in _TASKS.items():
         own = [row for key, row in rows.items() if re.split(r"[.<]", key)[0] in names]

@@ -49,22 +49,14 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
             title = f"{arm.joint_names[joint - 1]} in {names[log]}"
             several = [p for p in (first, *others) if joint in p.joints]
             slides = arm.joints[joint - 1].slides
-            drawing = partial(
-                draw_response, title, joint, several, bins, slides=slides
-            )  # many logs stay small
+            # of many logs fewer samples are drawn: the page stays small
+            drawing = partial(draw_response, title, joint, several, bins, slides=slides)
             error, tolerance = rms_deg([first.error(joint)]), tolerances.get(joint, np.inf)
             state = "good" if error <= tolerance else "fair" if error <= 2 * tolerance else "bad"
             row = f"{names[log]} {_KINDS[first.unseen]}".strip()
             plot = Plot(f"response_{len(tabs) + 1}", title, drawing, zoom=True)
-            tabs.append(
-                Tab(
-                    f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}°",
-                    plot,
-                    row,
-                    arm.joint_names[joint - 1],
-                    state,
-                )
-            )
+            size = f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}°"
+            tabs.append(Tab(size, plot, row, arm.joint_names[joint - 1], state))
     rows = [
         row | {"fit": short_name(one.fit), "log": names[one.log.source], "kind": _KINDS[one.unseen]}
         for one in predictions

@@ -8,7 +8,7 @@ from hydroid.estimate import JointVerdict
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
 from hydroid.reporting.page import Section, short_name
-from hydroid.reporting.table import Given, Table
+from hydroid.reporting.table import Cell, Given, Table
 from hydroid.words import listed
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
@@ -25,27 +25,22 @@ Verdicts = Mapping[str, Sequence[JointVerdict]]
 def verdict_table(fits: Verdicts) -> Table:
     """Return the verdicts on each joint of each fit."""
     columns = {name: name for name in ("fit", "joint", "verdict", "fitted", "unseen", *NAMES)}
-    rows = (
-        {"fit": short_name(fit), "joint": one.name}
-        | {"verdict": f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"}
-        | {
-            name: None if error is None else Given(_shown(error, one.slides))
-            for name, error in {
-                "fitted": one.fitted_deg,
-                "unseen": one.unseen_deg,
-                **one.baselines_deg,
-            }.items()
-        }
-        for fit, verdicts in fits.items()
-        for one in verdicts
-    )
+    rows: list[dict[str, Cell]] = []
+    for fit, verdicts in fits.items():
+        for one in verdicts:
+            errors = {"fitted": one.fitted_deg, "unseen": one.unseen_deg} | one.baselines_deg
+            row = {name: _shown(error, one.slides) for name, error in errors.items()}
+            verdict = f"{_SIGNS.get(one.verdict, '✗')} {one.verdict}"
+            rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
     if len(fits) == 1:
         del columns["fit"]
     return Table.of("Verdict", columns, rows, _NOTE, NAMES[:2])
 
 
-def _shown(error: float, slides: bool) -> str:
-    return f"{1e3 * np.radians(error):.2g} mm" if slides else f"{error:.2g}"
+def _shown(error: float | None, slides: bool) -> Cell:
+    if error is None:
+        return None
+    return f"{1e3 * np.radians(error):.2g} mm" if slides else Given(f"{error:.2g}")
 
 
 def verdict_section(fits: Verdicts) -> Section:
@@ -57,7 +52,7 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
     """Return the rms error of each angle's change over some times, of fits and baselines, if known."""
     rows = [
         {"joint": one.name, "of": short_name(fit) if name == "the fit" else name}
-        | dict(zip(map(str, HORIZONS), errors, strict=True))
+        | {str(ahead): _shown(e, one.slides) for ahead, e in zip(HORIZONS, errors, strict=True)}
         for fit, verdicts in fits.items()
         for one in verdicts
         for name, errors in one.horizons_deg.items()

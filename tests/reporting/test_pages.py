@@ -19,7 +19,7 @@ from hydroid.reporting.page import Page, Section
 from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.table import Table
 from hydroid.reporting.validation_report import validation_page
-from hydroid.reporting.verdict_table import ordered
+from hydroid.reporting.verdict_table import horizon_section, ordered, verdict_table
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -122,6 +122,15 @@ def test_the_verdict_comes_first_and_is_not_tested_until_a_log_is_unseen():
     ]
     (steps,) = [section.steps for section in page.sections if section.title == "Do next"]
     assert not any("has not seen" in step.what for step in steps)
+
+
+def test_errors_of_a_joint_that_slides_are_in_millimetres():
+    problem = make_problem()
+    (one,) = judge(problem.settings, [], {}, [make_prediction(problem.logs[0], error=0.02)])
+    slid = one.model_copy(update={"slides": True, "horizons_deg": {"the fit": (1.0, None, 1.0, 1.0, 1.0)}})
+    assert "20 mm" in verdict_table({"a": [slid]}).rows[0]
+    (section,) = horizon_section({"a": [slid]})
+    assert section.tables["horizons"].rows[0][2:4] == ("17 mm", None)
 
 
 def test_a_fit_that_fails_says_so_in_every_place():

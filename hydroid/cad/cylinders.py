@@ -140,7 +140,7 @@ def _linkage(
     at = data.joint(joint.name)
     ends = (foot, eye) if joint.parent.name == moved else (eye, foot)
     (a, here), (b, there) = (_polar(at, pin.at) for pin in ends)
-    shape = Triangle.model_construct(a=a, b=b, theta0=math.degrees(_wrapped(there - here)))
+    shape = Triangle.model_construct(a=a, b=b, theta0=math.degrees(_wrapped(there - here - at.qpos[0])))
     return joint, {"kind": "linear", "shape": (shape, None)}, ()
 
 
@@ -177,10 +177,10 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> dict[str, Any] | None:
         rocker=round(abs(pin - ground), 6),
         coupler=round(abs(child - pin), 6),
         child=round(abs(child), 6),
-        phase_deg=round(math.degrees(np.angle(child * turn)), 6),
+        phase_deg=round(math.degrees(np.angle(child * turn) - joint.qpos[0]), 6),
         side=side,
     )
-    psi, first, _ = map(float, four_bar(0.0, bars))
+    psi, first, _ = map(float, four_bar(joint.qpos[0], bars))
     if not math.isfinite(psi):
         return None
     theta = _wrapped(float(np.angle(eye - ground) - np.angle(foot - ground)))
@@ -208,14 +208,13 @@ def _limit(
         psi, first = four_bar(angle, bars)[:2] if bars else (angle, np.ones_like(angle))
         length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
         arm = arm * first
-    at_zero = length[1800]
+    here = int(np.abs(angle - (math.radians(joint.ref) if degrees else joint.ref)).argmin())
+    change = length - length[here]
     low, high = (-np.inf, np.inf) if slide.range[0] >= slide.range[1] else np.array(slide.range) - slide.ref
     least = 0.05 * np.nanmax(np.abs(arm))
-    good = (
-        (length - at_zero >= low) & (length - at_zero <= high) & (arm * arm[1800] > 0) & (np.abs(arm) > least)
-    )
+    good = (change >= low) & (change <= high) & (arm * arm[here] > 0) & (np.abs(arm) > least)
     bad = np.flatnonzero(~good)
-    first_bad, last_bad = bad[bad > 1800], bad[bad < 1800]
+    first_bad, last_bad = bad[bad > here], bad[bad < here]
     ends = angle[[last_bad[-1] + 1 if len(last_bad) else 0, first_bad[0] - 1 if len(first_bad) else -1]]
     joint.range = np.degrees(ends) if degrees else ends
     joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE

@@ -71,6 +71,16 @@ def actuator(arm, name) -> LinearActuator:
     return make_cylinder(own, tuple(model.joint(name).range), data, name)
 
 
+def test_angles_count_from_the_joints_own_zero(arm, tmp_path):
+    path = written(tmp_path)
+    text = path.read_text().replace('name="bucket" axis', 'name="bucket" ref="0.3" axis')
+    path.write_text(text.replace('name="boom" axis', 'name="boom" ref="-0.2" axis'))
+    other = import_arm(path)
+    here, there = (actuator(one, "bucket") for one in (arm, other))
+    np.testing.assert_allclose(there.length(0.4), here.length(0.1), atol=1e-6)
+    np.testing.assert_allclose(there.moment_arm(0.3), here.moment_arm(0.0), atol=1e-6)
+
+
 def turned(point, angle):
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ point
 

@@ -3,7 +3,7 @@
 A wrong sign turns gravity round. A fit hides much of that behind other parameters, but not how the load
 changes with the pose. Two fits tell, each of a few steps of least squares with the quasi-static model on a
 few logs, as assumed and with the assumption changed. First a joint alone, while the others follow their
-logged motion. If the change is not clearly worse there, all joints together: a change that only makes up for
+logged motion. If the change is better there, all joints together: a change that only makes up for
 another error of the model spoils the load of other joints. With n independent samples, and sums of squares S
 and S' of residuals and priors, the logs make the change more likely by the factor (S / S')^(n/2).
 """
@@ -33,11 +33,11 @@ ENOUGH = 4.0
 """evidence that names a joint: the change is 55 times as likely"""
 LOWER = 0.97
 """part of the rms error that the change must leave at most"""
-LIKELY = -2.0
+LIKELY = 2.0
 """evidence of a joint alone below which a change is not tried on all joints"""
-MOST_TRIED = 3
+MOST_TRIED = 2
 """changes that are tried on all joints"""
-MOST_LOGS = 6
+MOST_LOGS = 4
 """logs that are fitted again, spread over all"""
 SHORT = RefinementSettings(iterations=12, gain_tolerance=3e-3)
 LONG = RefinementSettings(iterations=40, gain_tolerance=1e-3)

@@ -39,7 +39,7 @@ MOST_TRIED = 2
 """changes that are tried on all joints"""
 MOST_LOGS = 4
 """logs that are fitted again, spread over all"""
-SHORT = RefinementSettings(iterations=12, gain_tolerance=3e-3)
+SHORT = RefinementSettings(iterations=8, gain_tolerance=0.01)
 LONG = RefinementSettings(iterations=40, gain_tolerance=1e-3)
 TINY = np.finfo(float).tiny
 FOLLOWED = 0.2

@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 NEARER = 0.95
 """part of the quasi-static model's rms error that the dynamic one must reach to be preferred"""
 TOO_FAR = 2.0
-"""times the rms error of the last estimate from which no other model is refined"""
+"""times the rms error of the last estimate from which the dynamic model is not refined"""
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it"""
 
@@ -130,7 +130,8 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         assert settings.refinement is not None
         own = problem.varied(settings.of_estimate(name))
         theta = own.parameters.started(last.parameters.mapping(start.theta))
-        if if_nearer and not own.rms(own.residuals(theta[None]))[0] < TOO_FAR * start.rms:
+        other_model = if_nearer and own.settings.quasi_static != last.settings.quasi_static
+        if other_model and not own.rms(own.residuals(theta[None]))[0] < TOO_FAR * start.rms:
             return
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
         new = _estimates(own, {name: own.parameters.from_unit(result.point)})

@@ -48,7 +48,7 @@ parameters:
   M: {{quantity: mass, each: true, within: 2}}    # kg, M_LINK of every link
   # One pump for all joints, whose pressure falls with flow: a term that is kept if the logs ask for it.
   P_flow: {{quantity: pump_flow, fixed: {flow}, term: pump}}    # L/min, four times all joints at full speed
-  P_droop: {{quantity: pump_droop, bounds: [0, 2000], start: 20, term: pump}}    # bar, at that flow
+  P_droop: {{quantity: pump_droop, bounds: [0, 2000], start: 5, term: pump}}    # bar, at that flow
 
 # The two sides of a spool are made alike.
 priors:

@@ -19,7 +19,7 @@ from hydroid.progress import Progress, no_progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 
-MOST_TRIED = 4
+MOST_TRIED = 6
 """terms that are really freed, the most promising first"""
 
 Content = Mapping[str, Any]

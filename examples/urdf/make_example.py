@@ -81,7 +81,8 @@ def commands(joints: int, seed: int) -> np.ndarray:
 
 def write_log(project: Path, path: Path, seed: int) -> None:
     """Simulate the project's arm at other values, and write what a logger would: volts and radians."""
-    model = hydroid.start_values(hydroid.load_settings(project / "fit.yaml", {"log.period_s": PERIOD}))
+    changes = {"log.period_s": PERIOD, "simulation.model": "dynamic"}  # a machine has oil and inertia
+    model = hydroid.start_values(hydroid.load_settings(project / "fit.yaml", changes))
     factor = {n: next((f for s, f in TRUTH.items() if n.startswith(s)), 1.0) for n in model.values}
     truth = identified(model.settings, {n: v * factor[n] for n, v in model.values.items()}, "the machine")
     arm = model.settings.arm

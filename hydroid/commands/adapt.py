@@ -36,8 +36,9 @@ def adapt(
         print(adapted.summary.values)
 
     Args:
-        free (NAME,NAME): Parameters to be freed [default: of those that all joints share, such as pump and
-            masses, the ones that lower the error on parts of the logs left out].
+        logs (LOG): The new logs.
+        free (NAME,NAME): Parameters to be freed [default: masses and pump, one after the other, as long as
+            the error on parts of the logs left out falls].
         out (DIR): Run folder [default of the command line: runs/adapt].
 
     Raises:

@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 NEARER = 0.95
 """part of the quasi-static model's rms error that the dynamic one must reach to be preferred"""
-TOO_FAR = 2.0
+TOO_FAR = 5.0
 """times the rms error of the last estimate from which the dynamic model is not refined"""
 STRAINED_ABOVE = 2.0
 """standard deviations from its prior beyond which an estimate strains it"""

@@ -72,8 +72,8 @@ JOINT = """\
   exponent_B_{own}: {{quantity: opening_exponent_b, joints: [{name}], within: 3}}
   lag_{own}: {{quantity: opening_lag, joints: [{name}], bounds: [0, 0.6], start: 0.05}}    # s
   pilot_{own}: {{quantity: pilot_lag, joints: [{name}], bounds: [0, 0.6], start: 0.03}}    # s
-  draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # over its
-  draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # own"""
+  draw_A_{own}: {{quantity: draw_a, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # from the
+  draw_B_{own}: {{quantity: draw_b, joints: [{name}], nominal: {draw}, within: 5, term: pump}}    # pump"""
 ALIKE = """\
   dead_{own}: {{of: {{dead_A_{own}: 1, dead_B_{own}: -1}}, value: 0, sd: 5}}
   exponent_{own}: {{of: {{exponent_A_{own}: 1, exponent_B_{own}: -1}}, value: 0, sd: 0.2}}"""

@@ -14,8 +14,8 @@ from hydroid.words import listed
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
 """of verdicts; all others are a ✗"""
 _NOTE = (
-    "rms errors in deg over the logs that drive the joint. Last three columns: no motion, a table of mean "
-    "speeds and nine numbers a joint, fitted to the same logs, on the unseen logs if there are any."
+    "rms errors in deg over the logs that drive the joint. The last three columns are simple models, fitted "
+    "to the same logs: no motion; mean speeds by command; dead band, exponent, speed and lag."
 )
 
 Verdicts = Mapping[str, Sequence[JointVerdict]]

@@ -37,7 +37,7 @@ def study(seed: int) -> None:
     settings = hydroid.load_settings(FOLDER / "fit.yaml", starts(seed))
     logs = {k: hydroid.read_logs(sorted(FOLDER.glob(f"{k}_*.csv")), settings) for k in ("fit", "check")}
     clock, problem = Clock(), Problem(settings, logs["fit"])
-    searched = search(problem, lambda row: None, lambda simulated, rms: None, {})
+    searched = search(problem, lambda row: None, lambda phase, simulated, rms: None, {})
     theta, result = refined(problem, searched.theta[0])
     simulations = int(searched.history[-1, 2]) + result.evaluations
     model, joints = IdentifiedModel(settings, theta, "a fit"), settings.outputs

@@ -31,7 +31,7 @@ from hydroid.settings.search import RefinementSettings
 DRAWS, BEST = 64, 2
 """candidates drawn for a start, and how many of them are refined for a joint alone"""
 LATE = {"delay": 1.0, "opening_lag": 1.0, "pilot_lag": 1.0, "plunger_damping": 1 / 2000}
-"""what may make a joint late, and the seconds of a unit [s]"""
+"""what may make a joint late, and the seconds of a unit [s]; of a plunger with the default spring"""
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it shows no motion"""
 
@@ -203,12 +203,11 @@ def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:
     late = sum(LATE[name] * float(np.mean(theta[places])) for name, places in own.items())
     starts = list[Array]()
     for name in own:
+        shares = {"delay": 0.5, name: 0.5} if "delay" in own and name != "delay" else {name: 1.0}
         start = theta.copy()
         for other, places in own.items():
-            share = (other == name or other == "delay") / (1 + ("delay" in own and name != "delay"))
-            start[places] = share * late / LATE[other]
-        low, high = ([getattr(p, end) for p in problem.parameters.parameters] for end in ("lower", "upper"))
-        starts.append(np.clip(start, low, high))
+            start[places] = shares.get(other, 0.0) * late / LATE[other]
+        starts.append(np.clip(start, problem.parameters.lower, problem.parameters.upper))
     return starts
 
 

@@ -22,14 +22,12 @@ test: setup  ## the fast tests
 test-slow: setup  ## killed processes, clusters, thousands of files
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m slow
 
-demo: setup  ## both stages on one log of the virtual rig, and the other log to judge them by
+demo: setup  ## the whole chain on one log of the virtual rig, and the other log to judge it by
 	@echo "The logs are a virtual rig's (a simulation), and the geometry of the arm is ours: see README.md."
 	rm -rf runs/demo
-	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm ga --out runs/demo/ga
-	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --algorithm nsga2 --out runs/demo/nsga2
-	$(BIN)/hydroid fit-hyd examples/logs/rig_shoulder_1.csv --mech runs/demo/nsga2 --out runs/demo/hyd
-	$(BIN)/hydroid validate examples/logs/rig_shoulder_1.csv examples/logs/rig_shoulder_2.csv \
-		--fit runs/demo/ga --fit runs/demo/nsga2 --fit runs/demo/hyd --out runs/demo/validation
+	$(BIN)/hydroid fit-mech examples/logs/rig_shoulder_1.csv --out runs/demo/mech
+	$(BIN)/hydroid fit-hyd examples/logs/rig_shoulder_1.csv --mech runs/demo/mech --out runs/demo/hyd
+	$(BIN)/hydroid validate examples/logs/rig_shoulder_2.csv --fit runs/demo/hyd --out runs/demo/validation
 
 excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the other six
 	@echo "The logs are real; the geometry of the arm is ours: see examples/excavator/README.md."

@@ -20,14 +20,14 @@ from hydroid.viewer.motion import simulated_motion
 
 HERE = Path(__file__).parent
 LOG = HERE.parent / "examples" / "logs" / "rig_shoulder_2.csv"
-FITS = {"nsga2": "stage 1, a gain", "hyd": "stage 2, the hydraulics"}
+FITS = {"mech": "stage 1, a gain", "hyd": "stage 2, the hydraulics"}
 SIZE, RATE, SPAN = (400, 330), 8, (3.4, 9.4)
 """of each arm [px]; pictures in a second; from when to when [s]"""
 COLORS = 64
 SHOTS = {
     "report": ("hyd/report.html", "", (1000, 1240), "light"),
     "report_phone": ("hyd/report.html", "", (400, 1000), "dark"),
-    "report_motion": ("nsga2/report.html", "The arm in motion", (1000, 600), "light"),
+    "report_motion": ("mech/report.html", "The arm in motion", (1000, 600), "light"),
 }
 """page, title of the section (the page's beginning without one), width and height [px], and look"""
 TOP = """[...document.querySelectorAll("section, details")]

@@ -96,7 +96,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "fit again": ("Make this fit again.", ""),
     "look for terms": (
         "Find what the model lacks, and what to measure next.",
-        "`suggest` tries the most promising terms and prints the command for the best.",
+        "`suggest` tries the most promising terms.",
     ),
     "term missing": (
         "Free {0}: the rms error on parts of the logs left out falls from {error}° to {freed}°.",
@@ -111,6 +111,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "experiment": ("Run the designed experiment of {0} s (`hydroid design`).", _BRINGS),
     "fit the hydraulics": ("Fit the hydraulics.", "A gain replaces them here: most of the error is theirs."),
     "predict unseen": ("Predict a log that this fit has not seen.", "Only such a log can test the model."),
+    "use the machine": ("Simulate the machine.", "`load_plant` gives it to a controller in Python."),
     "run the experiment": (
         "Run commands.csv on the machine.",
         "The limits were checked only in simulation, at the present estimate; the machine moves differently "

@@ -172,9 +172,8 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
     from hydroid.fitting.verdict import baselines_of, judge
-    from hydroid.reporting.fit_report import next_step
     from hydroid.reporting.parameters_report import parameter_table, warnings
-    from hydroid.reporting.verdict_table import verdict_table
+    from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
 
     settings = problem.settings.of_estimate(fit.final)
     last, baselines = problem.varied(settings), baselines_of(settings, problem.logs)
@@ -185,13 +184,10 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     summary = summary.model_copy(update=changes)
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
-    lines: list[Table | str] = [verdict_table({fit.final: verdict}), *warnings(summary)]
+    lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]
     if folder is not None:
         logs = " ".join(shlex.quote(log.source) for log in problem.logs)
-        lines += [
-            f"Next: {next_step(settings, logs, str(folder)).numbers['command']}",
-            str(folder / "report.html"),
-        ]
+        lines += [*next_lines(next_step(settings, verdict, str(folder), logs)), str(folder / "report.html")]
     details = [parameter_table(settings, summary), *map(str, summary.findings)]
     content = summary.plain() | {"out": folder and str(folder)}
     own = (problem, fit, folder, summary, model, predictions, baselines)

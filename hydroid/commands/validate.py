@@ -10,6 +10,7 @@ from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
 from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
+from hydroid.estimate import NAME
 from hydroid.identified_model import IdentifiedModel
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def validate(
     *,
     fit: "ModelSource | Sequence[ModelSource]",
     leave_one_out: bool = False,
+    tolerance: float | None = None,
     out: "Source | None" = None,
     set: "SettingChanges" = None,
     repair: bool = False,
@@ -47,6 +49,8 @@ def validate(
             Repeat the option for several estimates.
         leave_one_out: Give the fit's own logs. For each of them: refit without it, and predict it. Takes one
             fit.
+        tolerance (0.001 to 90): An rms error [deg] that you accept, of every joint; config.yaml can
+            hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
 
     Raises:
         LogError: a log cannot be used.
@@ -62,7 +66,7 @@ def validate(
     from hydroid.reporting.fit_report import draw
     from hydroid.reporting.page import unique
     from hydroid.reporting.validation_report import validation_page
-    from hydroid.reporting.verdict_table import ordered, verdict_table
+    from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
     from hydroid.run.identity import log_hash, was_fitted
     from hydroid.run.record import fitted_by, keep_validation
 
@@ -84,19 +88,24 @@ def validate(
             if out is not None and (run := keep_validation(model, predictions)):
                 draw(run)
         unseen = [prediction for prediction in predictions if prediction.unseen is not False]
-        verdicts[name] = judge(model.settings, fitted, baselines, unseen)
+        stated = {} if tolerance is None else {"tolerance_deg": tolerance}
+        verdicts[name] = judge(model.settings.model_copy(update=stated), fitted, baselines, unseen)
         results[name] = [replace(prediction, fit=name) for prediction in predictions]
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]
-    page = validation_page(every, fits, arm)
+    best = next(iter(fits))
+    model, steps = models[[*results].index(best)], list[Any]()
+    if Path(model.source).name == NAME:
+        steps.append(next_step(model.settings, fits[best], str(Path(model.source).parent)))
+    page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
         "results": [row for one in every for row in one.plain(arm.joint_names)],
     }
-    best = next(iter(fits))
     few = fits if sum(map(len, fits.values())) <= MOST_ROWS else {best: fits[best]}
     details = [page.tables["verdict"], page.tables["errors"]]
-    return Result([verdict_table(few), *written(page, out)], content, every, page, details=details)
+    lines = [*verdict_lines(few), *(line for step in steps for line in next_lines(step))]
+    return Result([*lines, *written(page, out)], content, every, page, details=details)
 
 
 def _left_out(model: "IdentifiedModel", logs: "Sequence[Log]") -> Any:

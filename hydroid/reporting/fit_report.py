@@ -21,9 +21,8 @@ from hydroid.reporting.predictions import prediction_sections
 from hydroid.reporting.quantities_report import quantity_section, speed_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.table import numbers_csv
-from hydroid.reporting.verdict_table import lead, verdict_section
+from hydroid.reporting.verdict_table import lead, next_step, verdict_section
 from hydroid.run.record import Record, load_record
-from hydroid.settings.fit import FitSettings
 
 
 def draw(run: str | Path, without: Collection[str] = (), *, figures: bool = False) -> Path:
@@ -51,12 +50,13 @@ def fit_page(record: Record) -> Page:
     fits = {final: judge(settings, result.fitted, result.baselines, unseen)}
     # a validation has the name of the run, a fitted log that of the estimate: here both are the fit
     predictions = [replace(p, fit=final) for p in (*unseen, *result.fitted)]
+    step = next_step(settings, fits[final], record.folder, record.given)
     sections = (
-        verdict_section(fits),
+        verdict_section(fits, step),
         *prediction_sections(predictions, settings.arm, fits),
         *quantity_section(settings, summary),
         *unknown_sections(summary),
-        Section("Do next", steps=_steps(record)),
+        Section("Do next", steps=_steps(record, step)),
         parameter_section(settings, summary),
         *speed_section(settings, summary, [p.log for p in result.fitted]),
         search_section(record),
@@ -67,27 +67,15 @@ def fit_page(record: Record) -> Page:
     return Page("report", title, lead(fits), tuple(in_order), warnings(summary), made_by, _data(record))
 
 
-def next_step(settings: FitSettings, logs: str, run: str) -> Finding:
-    """Return what to do after a fit that no unseen log has tested; `logs` are those of the fit."""
-    if settings.stage == "mech":
-        command = f"hydroid fit-hyd {logs} --mech {shlex.quote(run)}"
-        return Finding("fit the hydraulics", "note", (), {"command": command})
-    command = f"hydroid validate OTHER.csv --fit {shlex.quote(run)}"
-    return Finding("predict unseen", "note", (), {"command": command})
-
-
-def _steps(record: Record) -> tuple[Finding, ...]:
-    """Return what to do next, the first things first, and how to make the fit again."""
-    findings, settings, logs = list[Finding](), record.settings, record.given
-    if settings.stage == "mech" or not record.validations:
-        findings.append(next_step(settings, logs, record.folder))
+def _steps(record: Record, first: Finding) -> tuple[Finding, ...]:
+    """Return what to do after the first step, and how to make the fit again."""
     run, config, again = (shlex.quote(f"{record.folder}{end}") for end in ("", "/config.yaml", "-again"))
     commands = {
-        "look for terms": f"hydroid suggest {logs} --fit {run}",
-        "fit again": f"hydroid fit-{settings.stage} {logs} --config {config} --out {again}",
+        "look for terms": f"hydroid suggest --fit {run}",
+        "fit again": f"hydroid fit-{record.settings.stage} {record.given} --config {config} --out {again}",
     }
     more = (Finding(kind, "note", (), {"command": command}) for kind, command in commands.items())
-    return (*findings, *more)
+    return tuple(finding for finding in more if finding.kind != first.kind)
 
 
 def _data(record: Record) -> dict[str, str]:

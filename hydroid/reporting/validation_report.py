@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hydroid.findings import Finding
 from hydroid.fitting.validation import Prediction
 from hydroid.reporting.page import Page
 from hydroid.reporting.parameters_report import status
@@ -16,10 +17,10 @@ from hydroid.settings.arm import Arm
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 
 
-def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm) -> Page:
+def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *steps: Finding) -> Page:
     """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    sections = verdict_section(fits), *prediction_sections(ordered, arm, fits)
+    sections = verdict_section(fits, *steps), *prediction_sections(ordered, arm, fits)
     return Page("validation", "Validation", lead(fits), sections)
 
 

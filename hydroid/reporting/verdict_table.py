@@ -1,14 +1,17 @@
 """The verdict on fits as a terminal and a page show it: one row a joint, beside the baselines."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hydroid.estimate import JointVerdict
+from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
 from hydroid.reporting.page import Section, short_name
-from hydroid.reporting.table import Cell, Given, Table
+from hydroid.reporting.table import Cell, Given, Table, shown
+from hydroid.settings.fit import FitSettings
 from hydroid.words import listed
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
@@ -43,9 +46,9 @@ def _shown(error: float | None, slides: bool) -> Cell:
     return f"{1e3 * np.radians(error):.2g} mm" if slides else Given(f"{error:.2g}")
 
 
-def verdict_section(fits: Verdicts) -> Section:
-    """Return the section that every page of predictions begins with."""
-    return Section("Verdict", tables={"verdict": verdict_table(fits)})
+def verdict_section(fits: Verdicts, *steps: Finding) -> Section:
+    """Return the section that every page of predictions begins with: the verdicts, and what to do next."""
+    return Section("Verdict", tables={"verdict": verdict_table(fits)}, steps=steps)
 
 
 def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
@@ -68,19 +71,64 @@ def horizon_section(fits: Verdicts) -> tuple[Section, ...]:
 
 def ordered(fits: Verdicts) -> Verdicts:
     """Return the fits, the smallest errors first: in parts of the tolerances of the joints."""
+    return {name: fits[name] for name in sorted(fits, key=lambda name: sum(map(_size, fits[name])))}
 
-    def size(one: JointVerdict) -> float:
-        error = one.fitted_deg if one.unseen_deg is None else one.unseen_deg
-        return np.inf if error is None else error / one.tolerance_deg
 
-    return {name: fits[name] for name in sorted(fits, key=lambda name: sum(map(size, fits[name])))}
+def _error(one: JointVerdict) -> float:
+    error = one.fitted_deg if one.unseen_deg is None else one.unseen_deg
+    return np.inf if error is None else error
+
+
+def _size(one: JointVerdict) -> float:
+    return _error(one) / one.tolerance_deg
+
+
+def verdict_lines(fits: Verdicts) -> list[Table | str]:
+    """Return the verdicts as a terminal shows them: the table, and the worst joint of the first fit."""
+    return [verdict_table(fits), *filter(None, [worst(next(iter(fits.values())))])]
+
+
+def next_lines(step: Finding) -> tuple[str, str]:
+    """Return what to do next as a terminal shows it."""
+    return f"Next: {step}", f"  {step.numbers['command']}"
 
 
 def lead(fits: Verdicts) -> str:
-    """Say of the first of the fits which joints it predicts, and what is wrong with the others."""
+    """Say of the first of the fits which joints it predicts, what is wrong with the others, and the worst."""
     name, verdicts = next(iter(fits.items()))
     of = f"{short_name(name)} is best. " if len(fits) > 1 else ""
     by_word: dict[str, list[str]] = {}
     for one in verdicts:
         by_word.setdefault(one.verdict, []).append(one.name)
-    return of + "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items()) + "."
+    said = "; ".join(f"{listed(names)}: {word}" for word, names in by_word.items())
+    return f"{of}{said}. {worst(verdicts)}".strip()
+
+
+def worst(verdicts: Sequence[JointVerdict]) -> str:
+    """Say which of several joints errs most, in parts of its tolerance; nothing of one joint."""
+    if len(verdicts) < 2:
+        return ""
+    one = max(verdicts, key=_size)
+    unit = "" if one.slides else " deg"
+    error, tolerance = (f"{shown(_shown(e, one.slides))}{unit}" for e in (_error(one), one.tolerance_deg))
+    return f"Worst joint: {one.name}, with an error of {error}; its tolerance is {tolerance}."
+
+
+def next_step(
+    settings: FitSettings, verdicts: Sequence[JointVerdict], run: str, logs: str = "LOG.csv"
+) -> Finding:
+    """Return what to do after a fit of `logs` in the folder `run`, and its command."""
+    run, kind = shlex.quote(run), "look for terms"
+    if settings.stage == "mech":
+        kind = "fit the hydraulics"
+    elif any(one.verdict == "not tested" for one in verdicts):
+        kind = "predict unseen"
+    elif all(one.verdict == "predicts" for one in verdicts):
+        kind = "use the machine"
+    commands = {
+        "fit the hydraulics": f"hydroid fit-hyd {logs} --mech {run}",
+        "predict unseen": f"hydroid validate OTHER.csv --fit {run}",
+        "use the machine": f"hydroid simulate COMMANDS.csv --fit {run}",
+        "look for terms": f"hydroid suggest --fit {run}",
+    }
+    return Finding(kind, "note", (), {"command": commands[kind]})

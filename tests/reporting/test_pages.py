@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
+from hydroid import load_settings
 from hydroid.errors import RunError
+from hydroid.estimate import JointVerdict
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting.fit_report import fit_page
@@ -19,7 +21,7 @@ from hydroid.reporting.page import Page, Section
 from hydroid.reporting.page_file import html, write_figures, write_page
 from hydroid.reporting.table import Table
 from hydroid.reporting.validation_report import validation_page
-from hydroid.reporting.verdict_table import horizon_section, ordered, verdict_table
+from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
 
 HOSTILE = "<b>&_%$.csv"
 
@@ -131,6 +133,29 @@ def test_errors_of_a_joint_that_slides_are_in_millimetres():
     assert "20 mm" in verdict_table({"a": [slid]}).rows[0]
     (section,) = horizon_section({"a": [slid]})
     assert section.tables["horizons"].rows[0][2:4] == ("17 mm", None)
+
+
+@pytest.mark.parametrize(
+    ("stage", "words", "command"),
+    [
+        ("mech", ("predicts",), "hydroid fit-hyd LOG.csv --mech 'a run'"),
+        ("hyd", ("predicts", "not tested"), "hydroid validate OTHER.csv --fit 'a run'"),
+        ("hyd", ("predicts", "predicts"), "hydroid simulate COMMANDS.csv --fit 'a run'"),
+        ("hyd", ("predicts", "does not fit"), "hydroid suggest --fit 'a run'"),
+    ],
+)
+def test_what_to_do_next_follows_from_the_verdicts(stage, words, command):
+    verdicts = [JointVerdict(joint=1, name="boom", verdict=word, tolerance_deg=1) for word in words]
+    assert next_step(load_settings(f"fit-{stage}"), verdicts, "a run").numbers == {"command": command}
+
+
+def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
+    boom, swing = (
+        JointVerdict(joint=1, name=name, verdict="predicts", unseen_deg=error, tolerance_deg=tolerance)
+        for name, error, tolerance in (("boom", 2.0, 1.0), ("swing", 3.0, 4.0))
+    )
+    assert worst([swing, boom]) == "Worst joint: boom, with an error of 2 deg; its tolerance is 1 deg."
+    assert not worst([boom])
 
 
 def test_a_fit_that_fails_says_so_in_every_place():

@@ -102,7 +102,7 @@ def load_identified(
     missing = [n for n, p in settings.parameters.items() if n not in values and p.fixed is None]
     if nominal and missing:
         known = {n: p for n, p in settings.parameters.items() if n not in missing}
-        settings = settings.model_copy(update={"parameters": known})
+        settings = settings.changed({"parameters": known})
     origin = str(chosen if file is None else file)
     theta = settings.parameter_set().vector(values, origin)
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))

@@ -138,9 +138,7 @@ def make_tasks(cells: Mapping[str, FitSettings], seeds: int, logs: Sequence[Log]
     tasks: list[Task] = []
     for seed in range(1, seeds + 1):
         for name, settings in cells.items():
-            search = settings.search.model_copy(update={"seed": seed})
-            simulation = settings.simulation.model_copy(update={"threads": 1})
-            seeded = settings.model_copy(update={"search": search, "simulation": simulation})
+            seeded = settings.changed({"search.seed": seed, "simulation.threads": 1})
             tasks.append(Task(name, seed, seeded, tuple(logs)))
     return tasks
 

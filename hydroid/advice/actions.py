@@ -66,9 +66,9 @@ def _experiment(problem: Problem, known: Uncertainty, now: Posterior) -> Iterato
         if channel.quantity == "angle"
     )
     # what the best of a few could measure; hydroid design then looks for one free of collisions
-    changes = {"noise_deg": float(np.degrees(level)), "noise_correlation_s": time, "clearance_m": None}
-    design = problem.settings.design.model_copy(update=changes)
-    settings = problem.settings.model_copy(update={"design": design})
+    noise = {"noise_deg": float(np.degrees(level)), "noise_correlation_s": time}
+    design = problem.settings.design.changed(noise | {"clearance_m": None})
+    settings = problem.settings.changed({"design": design})
     try:
         draws = RandomExperiments(settings, np.random.default_rng(1))
     except SettingsError:

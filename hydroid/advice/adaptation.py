@@ -49,16 +49,14 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
         if name in free:
             nominal = {"nominal": values[name]} if own.has_prior else {}
             changes = {"term": None, "fixed": None, "start": values[name]} | nominal
-        parameters[name] = own.model_copy(update=changes)
+        parameters[name] = own.changed(changes)
     ladder = settings.simulation.model == "ladder"
-    simulation = {"model": "quasi-static" if ladder else settings.simulation.model}
-    once = MultistartSettings(starts=1, horizons=(), iterations=20)
-    search = {"algorithm": "multistart", "multistart": once}
-    return settings.model_copy(
-        update={
+    return settings.changed(
+        {
             "parameters": parameters,
-            "simulation": settings.simulation.model_copy(update=simulation),
-            "search": settings.search.model_copy(update=search),
+            "simulation.model": "quasi-static" if ladder else settings.simulation.model,
+            "search.algorithm": "multistart",
+            "search.multistart": MultistartSettings(starts=1, horizons=(), iterations=20),
             "refinement": settings.refinement or RefinementSettings(),
         }
     )

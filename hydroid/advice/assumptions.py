@@ -124,18 +124,17 @@ def _coarse(log: Log) -> Log:
 
 
 def _quasi_static(settings: FitSettings) -> FitSettings:
-    simulation = settings.simulation.model_copy(update={"model": "quasi-static"})
-    return settings.model_copy(update={"simulation": simulation, "free_start": False})
+    return settings.changed({"simulation.model": "quasi-static", "free_start": False})
 
 
 def _of_joint(settings: FitSettings, joint: int, values: Mapping[str, float]) -> FitSettings:
     """Return the settings of one joint alone, what it shares with others free."""
     others = {n for other in settings.outputs if other != joint for n in settings.acting_on(other)}
-    held = {n: settings.parameters[n].model_copy(update={"fixed": values[n]}) for n in others}
+    held = {n: settings.parameters[n].changed({"fixed": values[n]}) for n in others}
     priors = {n: p for n, p in settings.priors.items() if others.isdisjoint(p.factors)}
     alone = _quasi_static(settings.with_parameters(held))
-    simulation = alone.simulation.model_copy(update={"other_joints": "measured"})
-    return alone.model_copy(update={"outputs": (joint,), "simulation": simulation, "priors": priors})
+    changes = {"outputs": (joint,), "simulation.other_joints": "measured", "priors": priors}
+    return alone.changed(changes)
 
 
 def _begun(settings: FitSettings, logs: Sequence[Log], values: Mapping[str, float]) -> _Refit:
@@ -205,10 +204,9 @@ def _changed(
     ]
     joint = spec.joint(arm.joint_names[doubt.joint - 1])
     joint.range = np.sort(factor * np.array(joint.range) + shift)
-    objective = before.settings.objective
-    weights = {doubt.joint: objective.weights.get(doubt.joint, 1.0) / abs(factor)}
-    objective = objective.model_copy(update={"weights": {**objective.weights, **weights}})
-    settings = before.settings.model_copy(update={"objective": objective})
+    weights = before.settings.objective.weights
+    weights = weights | {doubt.joint: weights.get(doubt.joint, 1.0) / abs(factor)}
+    settings = before.settings.changed({"objective.weights": weights})
     return _refined(replace(before, values=values, cost=np.inf), Problem(settings, logs, spec=spec), how)
 
 

@@ -73,8 +73,7 @@ class ExperimentSimulator:
     def __init__(self, settings: FitSettings, known: Posterior) -> None:
         self._spec = load_model(settings.arm)
         if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
-            simulation = settings.simulation.model_copy(update={"other_joints": "locked"})
-            settings = settings.model_copy(update={"simulation": simulation})
+            settings = settings.changed({"simulation.other_joints": "locked"})
         self._settings, self._outputs = settings, [j - 1 for j in settings.outputs]
         self._period, self._bindings = settings.log.period_s, Bindings(settings)
         self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)

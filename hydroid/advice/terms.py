@@ -67,7 +67,7 @@ def _held(settings: FitSettings) -> Iterator[Term]:
             low, high = p.bounds or CHOICES[p.quantity].span or (p.fixed / 4.0, 4.0 * p.fixed)
             span = min(low, p.fixed), max(high, p.fixed)
             if span[0] < span[1]:
-                free = p.model_copy(update={"fixed": None, "bounds": span})
+                free = p.changed({"fixed": None, "bounds": span})
                 yield Term(name, {name: free}, p.fixed, _atoms(settings, p))
 
 
@@ -76,7 +76,7 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
     settings = problem.settings
     for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
         name, p = parameter.name, settings.parameters[parameter.name]
-        if p.fixed is not None or p.group is not None:
+        if p.fixed is not None:
             continue
         sides, joints = TARGETS[p.quantity], sorted({j for _, j in _atoms(settings, p) if isinstance(j, int)})
         moving = [j for j in joints if j in problem.active_joints]
@@ -86,11 +86,11 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
         if len(moving) > 1:
             others = {joint: tuple(j for j in joints if j != joint) for joint in moving}
             parts += [(str(j), {"joints": rest}, {"joints": (j,)}) for j, rest in others.items()]
-        free = p.model_copy(update={"bounds": (parameter.lower, parameter.upper)})
+        free = p.changed({"bounds": (parameter.lower, parameter.upper)})
         for ending, rest, own in parts:
-            new, entry = f"{name}_{ending}", free.model_copy(update=own)
+            new, entry = f"{name}_{ending}", free.changed(own)
             if new not in settings.parameters:
-                entries = {name: free.model_copy(update=rest), new: entry}
+                entries = {name: free.changed(rest), new: entry}
                 yield Term(new, entries, value, _atoms(settings, entry))
 
 
@@ -123,9 +123,7 @@ def _nominal(problem: Problem) -> Iterator[Term]:
 
 
 def _atoms(settings: FitSettings, p: ParameterSettings) -> tuple[Atom, ...]:
-    """All that a parameter sets; what is added in a group of logs is none of it."""
-    if p.group is not None:
-        return ()
+    """All that a parameter sets."""
     places: Sequence[int | str] = p.joints or range(1, len(settings.arm.joints) + 1)
     places = [p.link] if p.link is not None else [0] if CHOICES[p.quantity].of_the_pump else places
     return tuple((target, place) for target in TARGETS[p.quantity] for place in places)
@@ -164,7 +162,7 @@ class ExtendedModel:
             parameters[f"{target}_of_{place}"] = entry
         self._base = np.array([*values, *atoms.values()])
         self._columns = {atom: len(values) + i for i, atom in enumerate(atoms)}
-        varied = problem.varied(settings.model_copy(update={"parameters": parameters, "priors": {}}))
+        varied = problem.varied(settings.changed({"parameters": parameters, "priors": {}}))
         self._problem = varied.with_open_starts(with_open_start(problem, theta).open_starts)
         self.residual = self.residuals([])[0]
 

@@ -137,7 +137,7 @@ def read_arms(
     logs: dict[str, Log] = {}
     for side in moving if apart else moving[:1]:
         layout = {"log": columns.of_arm(side) if apart else columns} | ({"outputs": ()} if angles else {})
-        (one,) = read_logs(log, settings.model_copy(update=layout), repair=repair, angles=angles)
+        (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
         stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)
         logs[side] = replace(one, angle=stand)
     return {side: logs.get(side, logs[moving[0]]) for side in moving}

@@ -14,6 +14,7 @@ from hydroid.posterior.flags import Flag
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
+from hydroid.settings.parameters import nominal_value
 
 _log = logging.getLogger(__name__)
 
@@ -79,7 +80,10 @@ def with_mechanics(
         if value is None or key in changes or (p.states_start and not mass):
             continue
         held[key] = value
-        nominal, flag = settings.nominal(p), summary and summary.estimate[name].flag
+        nominal, flag = (
+            nominal_value(settings.arm, settings.hydraulics, p),
+            summary and summary.estimate[name].flag,
+        )
         doubtful = mass and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
             _log.warning(

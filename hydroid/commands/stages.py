@@ -170,8 +170,7 @@ def _fit(options: FitOptions) -> FitResult:
     results: list[FitResult] = []
     with options.workers() as workers:
         for seed in range(settings.search.seed, settings.search.seed + runs):
-            search = settings.search.model_copy(update={"seed": seed})
-            seeded = settings.model_copy(update={"search": search})
+            seeded = settings.changed({"search.seed": seed})
             name, folder = ("", out) if runs == 1 else (f"seed {seed}", out and Path(out) / f"seed-{seed}")
             with FitProgress(seeded, name) as watcher:
                 done = fit(seeded, read, folder, resume=options.resume, progress=watcher, workers=workers)

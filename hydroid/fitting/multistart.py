@@ -156,7 +156,7 @@ class Multistart:
         A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
         """
         longest = max(log.duration for log in problem.logs)
-        settings = problem.settings.in_one_segment()
+        settings = problem.settings.changed({"objective.segments": 1})
         parts = [
             problem.varied(settings, [log.first(seconds) for log in problem.logs])
             for seconds in self.settings.horizons

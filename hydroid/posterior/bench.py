@@ -150,6 +150,6 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     rest = Log(
         "a test movement", np.array([0.0, period]), np.zeros((2, len(pose))), np.tile(pose, (2, 1)), period
     )
-    alone = settings.simulation.model_copy(update={"other_joints": "locked"})
+    alone = settings.simulation.changed({"other_joints": "locked"})
     scenario = Scenario(load_model(arm), arm, rest, [joint - 1], alone)
     return Bench(settings, joint, middle, period, scenario)

@@ -18,16 +18,11 @@ from hydroid.simulation import Candidates
 
 @dataclass(frozen=True)
 class Binding:
-    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based, in SI.
-
-    In a group of logs it is added to what is set otherwise.
-    """
+    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based."""
 
     column: int
     quantity: str
     places: list[int]
-    factor: float
-    group: str | None
 
 
 class Bindings:
@@ -44,26 +39,20 @@ class Bindings:
         self._arm, self._stage = settings.arm, settings.stage
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         self._rows = [
-            Binding(column, quantity, _places(settings.arm, name, p), QUANTITIES[quantity].factor, p.group)
+            Binding(column, quantity, _places(settings.arm, name, p))
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
         self._refuse_overlap(list(settings.parameters))
         self.parameters = settings.parameter_set()
 
-    def candidates(self, theta: Array, group: str | None = None) -> Candidates:
-        """Spread theta, shape (n, P), over joints and links, as they are in a group of logs."""
+    def candidates(self, theta: Array) -> Candidates:
+        """Spread theta, shape (n, P), over joints and links, in SI."""
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
-        # what is added comes last
-        for row in sorted(self._rows, key=lambda row: row.group is not None):
+        for row in self._rows:
             target = mass if row.quantity == "mass" else joints[row.quantity]
-            value = theta[:, row.column, None] * row.factor
-            if row.group is None:
-                target[:, row.places] = value
-            elif row.group == group:
-                least = QUANTITIES[row.quantity].lowest * row.factor
-                target[:, row.places] = np.maximum(target[:, row.places] + value, least)
+            target[:, row.places] = theta[:, row.column, None] * QUANTITIES[row.quantity].factor
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
@@ -79,26 +68,24 @@ class Bindings:
             return
         for quantity in ("gain", "damping"):
             served = {place for row in self._rows if row.quantity == quantity for place in row.places}
-            for joint in moved:
-                if joint not in served:
-                    raise SettingsError(
-                        f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
-                        where="parameters",
-                        hint="add one, or leave the joint's command out with log.joints",
-                    )
+            for joint in sorted({*moved} - served)[:1]:
+                raise SettingsError(
+                    f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
+                    where="parameters",
+                    hint="add one, or leave the joint's command out with log.joints",
+                )
 
     def _refuse_overlap(self, names: list[str]) -> None:
-        taken: dict[tuple[str, int, str | None], str] = {}
+        taken: dict[tuple[str, int], str] = {}
         for row in self._rows:
             name = names[row.column]
             for place in row.places:
-                if other := taken.get((row.quantity, place, row.group)):
+                if (other := taken.setdefault((row.quantity, place), name)) != name:
                     raise SettingsError(
                         f"{other} and {name} both set the {row.quantity} of the same joint or link",
                         where=f"parameters.{name}",
                         hint="give each its own joints, or remove one",
                     )
-                taken[row.quantity, place, row.group] = name
 
 
 def _places(arm: Arm, name: str, settings: ParameterSettings) -> list[int]:

@@ -186,10 +186,8 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        groups = [self.settings.log.group(log.source) for log in self.logs]
-        candidates = {group: self.bindings.candidates(theta, group) for group in {*groups}}
-        pairs = zip(self._simulations, groups, strict=True)
-        return [simulation.simulate(candidates[group]) for simulation, group in pairs]
+        candidates = self.bindings.candidates(theta)
+        return [simulation.simulate(candidates) for simulation in self._simulations]
 
     def rms(self, residuals: Array) -> Array:
         """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""
@@ -199,9 +197,8 @@ class Problem:
     @cached_property
     def _on_worker(self) -> "Problem":
         """The same problem as a worker has it."""
-        simulation = self.settings.simulation
-        simulation = simulation.model_copy(update={"threads": simulation.threads or 1})
-        return Problem(self.settings.model_copy(update={"simulation": simulation}), self.logs)
+        threads = self.settings.simulation.threads or 1
+        return Problem(self.settings.changed({"simulation.threads": threads}), self.logs)
 
     def _segments(self, channel: Channel) -> NDArray[np.int64]:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""

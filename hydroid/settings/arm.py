@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from hydroid.settings.load import Settings, load
 if TYPE_CHECKING:
     import mujoco
 
+
+Actuator: TypeAlias = LinearActuator | RotaryActuator
 
 SLIDE = 2
 """MuJoCo's number of a joint that slides"""
@@ -68,7 +70,7 @@ class Joint:
     name: str
     range: tuple[float, float]
     continuous: bool
-    actuator: LinearActuator | RotaryActuator | None
+    actuator: Actuator | None
     slides: bool = False
 
     @property

@@ -14,14 +14,14 @@ from pydantic import (
     model_validator,
 )
 
-from hydroid.parameters import Parameter, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, ArmFile, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, validate
 from hydroid.settings.log import LogSettings
-from hydroid.settings.parameters import expanded, make_parameter, nominal_value
+from hydroid.settings.parameters import expanded, make_parameter
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
 from hydroid.settings.search import RefinementSettings, SearchSettings
 
@@ -95,8 +95,7 @@ class FitSettings(Settings):
             info.context["arm"] = known
         if isinstance(names, dict):
             compared = values.get("outputs", cls.model_fields["outputs"].default)
-            groups = (values.get("log") or {}).get("groups") or ()
-            values = {**values, "parameters": expanded(names, compared, known, groups)}
+            values = {**values, "parameters": expanded(names, compared, known)}
         return {**values, "arm": arm}
 
     @model_validator(mode="after")
@@ -109,12 +108,7 @@ class FitSettings(Settings):
                 raise ValueError(f"parameters.{name}: stage mech has no {own.quantity}; set stage: hyd")
             if self.stage == "hyd" and own.quantity == "gain":
                 raise ValueError(f"parameters.{name}: stage hyd has no gain; the hydraulics take its place")
-            if own.group is not None and own.group not in self.log.groups:
-                raise ValueError(f"parameters.{name}: log.groups has no group {own.group!r}")
-            try:
-                self._parameter(name, own)
-            except ValueError as error:
-                raise ValueError(f"parameters.{name}: {error}") from None
+        self.parameter_set()
         return self
 
     @property
@@ -138,33 +132,27 @@ class FitSettings(Settings):
         settings = self.freed() if model == "joint" else self
         if self.terms != tuple(terms):
             own = {n: p for n, p in settings.parameters.items() if p.term is None or p.term in terms}
-            settings = settings.model_copy(update={"parameters": own})
-        if model != "dynamic":
-            return settings
-        simulation = self.simulation.model_copy(update={"model": "dynamic"})
-        return settings.model_copy(update={"simulation": simulation})
+            settings = settings.changed({"parameters": own})
+        return settings.changed({"simulation.model": model}) if model == "dynamic" else settings
 
     def parameter_set(self) -> ParameterSet:
         """Return the parameters with units, bounds, priors and fixed values, in the order of theta."""
-        found = [self._parameter(name, own) for name, own in self.parameters.items()]
+        log = self.scale == "log"
+        parameters = [
+            make_parameter(name, own, self.arm, self.hydraulics, log=log)
+            for name, own in self.parameters.items()
+        ]
         if not any(own.states_start for own in self.parameters.values() if own.fixed is None):
-            found = [replace(one, start=None) for one in found]
-        return ParameterSet(tuple(found))
-
-    def nominal(self, own: ParameterSettings) -> float | None:
-        """Return the nominal value of a parameter; None: the settings and the arm's file have none."""
-        return nominal_value(self.arm, self.hydraulics, own)
-
-    def _parameter(self, name: str, own: ParameterSettings) -> Parameter:
-        return make_parameter(name, own, self.arm, self.nominal(own), log=self.scale == "log")
+            parameters = [replace(one, start=None) for one in parameters]
+        return ParameterSet(tuple(parameters))
 
     def with_parameters(self, changed: Mapping[str, ParameterSettings]) -> "FitSettings":
         """Return the settings with parameters changed, or further ones behind their own."""
-        return self.model_copy(update={"parameters": self.parameters | dict(changed)})
+        return self.changed({"parameters": self.parameters | dict(changed)})
 
     def freed(self) -> "FitSettings":
         """Return the settings with every parameter free that can be, as a joint refinement has them."""
-        free = {n: p.model_copy(update={"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
+        free = {n: p.changed({"fixed": None}) for n, p in self.parameters.items() if p.can_be_free}
         return self.with_parameters(free)
 
     def acting_on(self, joint: int) -> set[str]:
@@ -177,12 +165,6 @@ class FitSettings(Settings):
         Joints that are not compared then follow their logged motion.
         """
         own = self.acting_on(joint)
-        held = {n: p.model_copy(update={"fixed": values[n]}) for n, p in self.parameters.items()}
-        simulation = self.simulation.model_copy(update={"other_joints": "measured"})
-        changes = {"outputs": (joint,), "simulation": simulation}
-        settings = self.with_parameters({n: p for n, p in held.items() if n not in own})
-        return settings.model_copy(update=changes)
-
-    def in_one_segment(self) -> "FitSettings":
-        """Return the settings with one segment per channel."""
-        return self.model_copy(update={"objective": self.objective.model_copy(update={"segments": 1})})
+        held = {n: p.changed({"fixed": values[n]}) for n, p in self.parameters.items() if n not in own}
+        changes = {"outputs": (joint,), "simulation.other_joints": "measured"}
+        return self.with_parameters(held).changed(changes)

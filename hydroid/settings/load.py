@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -39,6 +39,15 @@ class Settings(BaseModel):
     def _lists_are_tuples(cls, values: Any) -> Any:
         """Take YAML's lists for tuples, which frozen settings hold."""
         return _with_tuples(values)
+
+    def changed(self, changes: Mapping[str, Any]) -> Self:
+        """Return the settings with values replaced by dotted key, such as `search.seed`; none is checked."""
+        settings = self
+        for key, value in changes.items():
+            name, _, inner = key.partition(".")
+            within = getattr(settings, name).changed({inner: value}) if inner else value
+            settings = settings.model_copy(update={name: within})
+        return settings
 
 
 def _with_tuples(values: Any) -> Any:

@@ -9,8 +9,6 @@ log:
 """
 
 from dataclasses import dataclass
-from fnmatch import fnmatch
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
@@ -137,9 +135,6 @@ class LogSettings(Settings):
     """transport delay: commands act this much later than logged [s]"""
     repair_s: Annotated[float, Field(ge=0, le=10)] = 0.1
     """longest gap that --repair fills [s]"""
-    groups: dict[str, str] = Field(default_factory=dict[str, str])
-    """logs recorded alike (on one day, with one oil temperature, by one operator): a pattern of file names by
-    the group's name, such as `tuesday: tue_*.csv`; parameters may have an effect in one group only"""
 
     _prefix: str = PrivateAttr("")
 
@@ -153,11 +148,6 @@ class LogSettings(Settings):
         names = tuple(self._prefix + name.replace(JOINT, str(joint)) for name in given["column"])
         return ColumnMap(names, given["unit"], given["scale"], given["offset"])
 
-    def group(self, source: str) -> str | None:
-        """Return the first group whose pattern a log's file name matches."""
-        name = Path(source).name
-        return next((group for group, pattern in self.groups.items() if fnmatch(name, pattern)), None)
-
     def of_arm(self, side: str) -> "LogSettings":
         """Return the columns of one of two arms: their names begin with its own; the time's is common."""
         copy = self.model_copy()
@@ -167,8 +157,8 @@ class LogSettings(Settings):
     def angles_only(self) -> "LogSettings":
         """Return the columns of a trajectory: whatever commands and pressures it holds are not read."""
         nothing = {"command": None, "pressure": None}
-        joints = {joint: own and own.model_copy(update=nothing) for joint, own in self.joints.items()}
-        return self.model_copy(update=nothing | {"joints": joints})
+        joints = {joint: own and own.changed(nothing) for joint, own in self.joints.items()}
+        return self.changed(nothing | {"joints": joints})
 
 
 def _given(columns: Columns) -> dict[str, Any]:

@@ -6,84 +6,81 @@ from typing import Any
 
 from hydroid.parameters import Parameter, Prior
 from hydroid.quantity_table import CHOICES, MECHANICAL, TARGETS
-from hydroid.settings.arm import Arm
+from hydroid.settings.arm import Actuator, Arm
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.problem import ParameterSettings
 
 
-def expanded(
-    parameters: Mapping[str, Any], compared: Any, arm: Arm | None, groups: Any = ()
-) -> dict[str, Any]:
+def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> dict[str, Any]:
     """Return the settings of parameters, as YAML gives them, with one entry for each joint or link of `each`.
 
     `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
-    mechanical parameter serves all joints, because those that are driven but not compared need it too. An
-    effect of `group: each` is one of each of the groups.
+    mechanical parameter serves all joints, because those that are driven but not compared need it too.
 
     Raises:
         ValueError: a parameter with `joints` or `link` and `each`.
     """
     result: dict[str, Any] = {}
     for name, entry in parameters.items():
-        if not isinstance(entry, dict) or not (each := entry.get("each")):
-            result[name] = {**result.get(name, {}), **entry} if isinstance(entry, dict) else entry
+        each = entry.get("each") if isinstance(entry, dict) else None
+        if not each:
+            result[name] = result.get(name, {}) | entry if isinstance(entry, dict) else entry
             continue
-        mass = entry.get("quantity") == "mass"
-        if entry.get("link" if mass else "joints") is not None:
-            what = "link or each: links" if mass else "joints that share it or each: joints"
+        quantity = entry.get("quantity")
+        key, kind = ("link", str) if quantity == "mass" else ("joints", int | str)
+        if entry.get(key) is not None:
+            what = "link or each: links" if key == "link" else "joints that share it or each: joints"
             raise ValueError(f"{name}: give {what} that have their own, not both")
-        shared = {key: value for key, value in entry.items() if key != "each"}
-        every = [*arm.link_names] if mass and arm else compared
-        chosen = every if each is True else each
-        if not isinstance(chosen, list | tuple) or not all(
-            isinstance(c, str if mass else int | str) for c in chosen
-        ):
+        every = arm.link_names if key == "link" and arm else compared
+        places = every if each is True else each
+        if not isinstance(places, list | tuple) or not all(isinstance(place, kind) for place in places):
             result[name] = entry  # refused as any other wrong value
             continue
-        joints = arm.joint_names if arm and not mass and not all(isinstance(c, int) for c in chosen) else ()
-        places = [joints.index(c) + 1 if c in joints else c for c in chosen]
-        if len(places) == 1 and not mass:
-            everywhere = each is True and entry.get("quantity") in MECHANICAL
-            result[name] = shared | ({} if everywhere else {"joints": tuple(places)})
-            continue
+        shared = {setting: value for setting, value in entry.items() if setting != "each"}
+        if key == "joints":
+            named = arm is not None and any(isinstance(place, str) for place in places)
+            joints = arm.joint_names if arm and named else ()
+            places = [joints.index(place) + 1 if place in joints else place for place in places]
+            if len(places) == 1:
+                everywhere = each is True and quantity in MECHANICAL
+                result[name] = shared | ({} if everywhere else {"joints": places})
+                continue
         for place in places:
             own = f"{name}_{place}"
             changes = result.get(own, parameters.get(own, {}))
-            result[own] = {**shared, **({"link": place} if mass else {"joints": (place,)}), **changes}
-    grouped: dict[str, Any] = {}
-    for name, entry in result.items():
-        every = isinstance(entry, dict) and entry.get("group") == "each"
-        own = {f"{name}_{group}": entry | {"group": group} for group in groups} if every else {name: entry}
-        grouped |= own
-    return grouped
+            result[own] = shared | {key: place if key == "link" else [place]} | changes
+    return result
 
 
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if own.nominal is not None or own.group is not None:
-        return own.nominal or 0.0
+    if own.nominal is not None:
+        return own.nominal
     if own.link is not None:
         return arm.mass_of.get(own.link)
     if own.quantity in MECHANICAL:
         return None
-    actuators = [arm.joints[j - 1].actuator for j in _places(arm, own)]
-    tables = [actuator_values(a, hydraulics) for a in actuators if a is not None]
+    tables = [actuator_values(one, hydraulics) for one in _actuators(arm, own) if one is not None]
     values = {table[side] for table in tables for side in TARGETS[own.quantity]}
     return values.pop() if len(values) == 1 else None
 
 
 def make_parameter(
-    name: str, own: ParameterSettings, arm: Arm, nominal: float | None, *, log: bool
+    name: str, own: ParameterSettings, arm: Arm, hydraulics: HydraulicSettings, *, log: bool
 ) -> Parameter:
-    """Return one parameter with its bounds, prior and start; `nominal` is as `nominal_value` has it.
+    """Return one parameter with its bounds, prior and start.
 
     `log`: on a log scale where it is positive, as one with a log-normal prior always is.
 
     Raises:
-        ValueError: a prior without a nominal value, or one that does not fit.
+        ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
     """
-    prior = _prior(own, nominal)
+    nominal = nominal_value(arm, hydraulics, own)
+    try:
+        prior = _prior(own, nominal)
+    except ValueError as error:
+        raise ValueError(f"parameters.{name}: {error}") from None
     lower, upper = own.bounds or _default_bounds(own, prior)
     start = own.start if own.start is not None else nominal
     start = None if start is None else min(max(start, lower), upper)
@@ -92,10 +89,10 @@ def make_parameter(
 
 
 def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
-    word = "within" if own.sd is None else "sd"
     if not own.has_prior:
         return None
     if nominal is None:
+        word = "within" if own.sd is None else "sd"
         raise ValueError(
             f"{word}: needs a nominal value; the settings and the arm's file have none for this "
             f"{own.quantity}, so add nominal: VALUE, or give bounds: in place of {word}:"
@@ -112,8 +109,6 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
-    if own.group is not None:
-        return prior.value(-4.0), prior.value(4.0)
     quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
     least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
     return max(prior.value(-4.0), least), prior.value(4.0)
@@ -121,13 +116,12 @@ def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float,
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
     """The unit of a parameter; areas and dry friction of rotary actuators have their own."""
-    actuators = [arm.joints[j - 1].actuator for j in _places(arm, own)] if own.joints else []
+    actuators = _actuators(arm, own) if own.joints else []
     rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")
     return {"mm²": "cm³/rad", "N": "N·m"}[own.unit] if rotary and sized else own.unit
 
 
-def _places(arm: Arm, own: ParameterSettings) -> list[int]:
-    """Numbers of the joints that a parameter acts on; those that the arm lacks are refused elsewhere."""
-    every = range(1, len(arm.joints) + 1)
-    return [j for j in (every if own.joints is None else own.joints) if j in every]
+def _actuators(arm: Arm, own: ParameterSettings) -> list[Actuator | None]:
+    """What moves the joints that a parameter acts on; joints that the arm lacks are refused elsewhere."""
+    return [joint.actuator for j, joint in enumerate(arm.joints, 1) if own.joints is None or j in own.joints]

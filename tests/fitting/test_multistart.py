@@ -41,7 +41,7 @@ def unit(problem: Problem, n: int) -> np.ndarray:
 
 def test_a_part_of_a_problem_is_the_same_problem_for_a_shorter_time(exact):
     theta = exact.theta(unit(exact, 1))
-    part = exact.varied(exact.settings.in_one_segment(), [exact.logs[0].first(1.0)])
+    part = exact.varied(exact.settings.changed({"objective.segments": 1}), [exact.logs[0].first(1.0)])
     whole = exact.residuals(theta).reshape(2, -1)
     np.testing.assert_array_equal(part.residuals(theta).reshape(2, -1), whole[:, :151])
 

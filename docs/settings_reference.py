@@ -15,10 +15,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hydroid.quantity_table import HYDRAULIC
 from hydroid.settings.arm import Arm, ArmFile
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.log import JointColumns
 from hydroid.settings.study import StudySettings
 
@@ -77,11 +75,6 @@ def _rows(kind: type[BaseModel]) -> Iterator[tuple[str, str]]:
         unit = _unit(field, meaning)
         text = _UNIT.sub("", meaning, count=1) if unit and f"[{unit}]" in meaning else meaning
         yield key, _line(key, _type(field.annotation), unit, default, text)
-        if field.annotation is HydraulicSettings:
-            for quantity in HYDRAULIC.values():
-                kind_of = "number or null" if quantity.optional or quantity.default is None else "number"
-                named, value = f"hydraulics.{quantity.name}", f"`{_yaml(quantity.default)}`"
-                yield named, _line(named, kind_of, quantity.unit, value, quantity.meaning)
 
 
 def _line(key: str, kind: str, unit: str, default: str, meaning: str) -> str:
@@ -175,7 +168,9 @@ def _unit(field: FieldInfo, meaning: str) -> str:
 
 
 def _docstring(kind: type[BaseModel], name: str) -> str:
-    """The text below a field, or below the same field of a base class, or that of the class it holds."""
+    """The text of a field: its description, what stands below it, or the text of the class that it holds."""
+    if text := kind.model_fields[name].description:
+        return text
     for base in kind.__mro__:
         if base in (BaseModel, object):
             break

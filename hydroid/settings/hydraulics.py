@@ -4,10 +4,9 @@ Each setting holds for every actuator of the arm; a parameter of a fit sets or f
 openings and pivots differ by joint: they stand in the arm's file.
 """
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from hydroid.quantity_table import HYDRAULIC, QUANTITIES, TARGETS, Quantity
 from hydroid.settings.cylinder import LinearActuator
@@ -18,33 +17,26 @@ from hydroid.settings.load import Positive, Settings
 def _field(quantity: Quantity) -> Any:
     number: Any = Annotated[float, *quantity.allowed] if quantity.allowed else float
     optional = quantity.optional or quantity.default is None
-    return number | None if optional else number, quantity.default
+    meaning = f"{quantity.meaning} [{quantity.unit}]" if quantity.unit else quantity.meaning
+    return number | None if optional else number, Field(quantity.default, description=meaning)
 
 
-_Rows: type[Settings] = create_model(
-    "_Rows", __base__=Settings, **{n: _field(q) for n, q in HYDRAULIC.items()}
+_Quantities: type[Any] = create_model(
+    "_Quantities", __base__=Settings, **{n: _field(q) for n, q in HYDRAULIC.items()}
 )
 
 
-class HydraulicSettings(Settings):
+class HydraulicSettings(_Quantities):
     """Values of quantities by name, for all joints; a name without _a or _b sets both sides."""
-
-    model_config = ConfigDict(extra="allow")
-    more: ClassVar[Iterable[str]] = HYDRAULIC
 
     rotary_volume: Positive = 50.0
     """volume of each chamber of a rotary actuator [cm³]"""
     substeps: Annotated[int, Field(ge=1, le=100)] = 3
     """sub-steps of valves and oil in one MuJoCo step"""
 
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """A quantity, by its name in `HYDRAULIC`."""
-
     @model_validator(mode="before")
     @classmethod
-    def _of_the_table(cls, values: Any) -> Any:
+    def _of_both_sides(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
         spread: dict[Any, Any] = {}
@@ -53,8 +45,7 @@ class HydraulicSettings(Settings):
                 if name in spread:
                     raise ValueError(f"{name} is given twice")
                 spread[name] = value
-        others = {name: spread.pop(name) for name in cls.model_fields if name in spread}
-        return others | _Rows.model_validate(spread).model_dump()
+        return spread
 
 
 def actuator_values(

@@ -1,9 +1,9 @@
 """YAML -> checked settings; every error names the file, the line, the setting and what is allowed."""
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -31,8 +31,6 @@ class Settings(BaseModel):
     """Base of all settings: frozen; an unknown key is an error, and so is true for a number or "3" for 3."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
-    more: ClassVar[Iterable[str]] = ()
-    """names besides the fields'"""
 
     @model_validator(mode="before")
     @classmethod
@@ -193,4 +191,4 @@ def _allowed(kind: type[Settings], loc: tuple[Any, ...]) -> list[str]:
         if not (isinstance(inner, type) and issubclass(inner, Settings)):
             return []
         kind = inner
-    return [*kind.model_fields, *kind.more]
+    return [*kind.model_fields]

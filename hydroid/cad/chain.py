@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mujoco
 
 from hydroid.cad.cylinders import is_part_of_cylinder
-from hydroid.cad.notes import Notes
+from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.log.clues import joint_of
 from hydroid.words import listed

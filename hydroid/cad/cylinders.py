@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.cad.notes import Notes
-from hydroid.mjcf import mujoco_errors
-from hydroid.settings.linkage import FourBar, Triangle, four_bar, triangle
+from hydroid.cad.repair import compiled
+from hydroid.cad.source import Notes
+from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
 Array = NDArray[np.float64]
 PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
@@ -40,19 +40,16 @@ class _Pin:
 def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, dict[str, Any]]:
     """Hold the links of cylinders and return what an arm's file says of them, by the joint that they move.
 
-    Pivots become sites of the links; a joint without limits gets those that the rod allows.
+    Pivots become sites of the links. A joint needs limits, or its cylinder might pass a dead centre.
     """
-    bare = spec.copy()
-    for geom in [geom for geom in bare.geoms if geom.meshname]:
-        bare.delete(geom)
-    free = [joint for joint in bare.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
-    for part in (*free, *bare.meshes, *bare.keys, *bare.actuators, *bare.tendons):
+    if not any(one.type == mujoco.mjtEq.mjEQ_CONNECT for one in spec.equalities):
+        return {}
+    bare = spec.copy()  # where bodies are is all that counts, not what the file says of their inertias
+    bare.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    meshed = [geom for geom in bare.geoms if geom.meshname]
+    for part in (*meshed, *bare.meshes, *bare.keys, *bare.actuators, *bare.tendons):
         bare.delete(part)
-    for body in bare.bodies[1:]:  # where bodies are is all that counts
-        body.explicitinertial, body.mass, body.inertia, body.ipos = True, 1.0, [1.0] * 3, [0.0] * 3
-        body.fullinertia, body.iquat, body.ialt.type = [np.nan] * 6, [1, 0, 0, 0], 0
-    with mujoco_errors(spec.modelname):
-        model = bare.compile()
+    model = compiled(bare)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     pins, helpers, found = _pins(spec, data), set[str](), dict[str, dict[str, Any]]()
@@ -64,17 +61,18 @@ def take_cylinders(spec: mujoco.MjSpec, notes: Notes) -> dict[str, dict[str, Any
                 if made is None:
                     continue
                 joint, own, links = made
-                found[joint.name] = own
                 helpers |= {tube, rod, *links}
-                if "triangle" not in own:
+                if not joint.range[0] < joint.range[1]:
+                    notes.add("without limits: the file's cylinder that moves it is not taken", joint.name)
+                    continue
+                found[joint.name] = own
+                if not links:
                     carrier = joint.parent.parent.name
                     ends = (foot, eye) if foot.other(tube) == carrier else (eye, foot)
-                    for end, pin, body in zip(
-                        ("parent", "child"), ends, (carrier, joint.parent.name), strict=True
-                    ):
+                    places = zip(("parent", "child"), ends, (carrier, joint.parent.name), strict=True)
+                    for end, pin, body in places:
                         place = data.body(body).xmat.reshape(3, 3).T @ (pin.at - data.body(body).xpos)
                         spec.body(body).add_site(name=f"{joint.name}_pivot_{end}", pos=place)
-                _limit(joint, slide, own.pop("shape"), degrees=bool(spec.compiler.degree))
                 notes.add("cylinders of the file give these joints' pivots", joint.name)
     for joint in list(spec.joints):
         if any(body in helpers for body in _upwards(joint.parent)):
@@ -135,13 +133,7 @@ def _linkage(
                     bars = _four_bar(data.joint(joint.name), (ground, pin, end, foot, eye))
                     return (joint, bars, (moved, coupler)) if bars else None
     joint = _joint(pins, base, moved)
-    if joint is None:
-        return None
-    at = data.joint(joint.name)
-    ends = (foot, eye) if joint.parent.name == moved else (eye, foot)
-    (a, here), (b, there) = (_polar(at, pin.at) for pin in ends)
-    shape = Triangle.model_construct(a=a, b=b, theta0=math.degrees(_wrapped(there - here - at.qpos[0])))
-    return joint, {"kind": "linear", "shape": (shape, None)}, ()
+    return (joint, {"kind": "linear"}, ()) if joint else None
 
 
 def _joint(pins: Sequence[_Pin], first: str, second: str) -> Any:
@@ -192,29 +184,4 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> dict[str, Any] | None:
         b=round(abs(eye - ground), 6),
         theta0=round(theta0, 6),
     )
-    sides = {"triangle": shape.model_dump(), "four_bar": bars.model_dump()}
-    return {"kind": "linear", **sides, "shape": (shape, bars)}
-
-
-def _limit(
-    joint: mujoco.MjsJoint, slide: mujoco.MjsJoint, shape: tuple[Triangle, FourBar | None], *, degrees: bool
-) -> None:
-    """Give a joint without limits those at which the rod is at an end of its way, or at a dead centre."""
-    if joint.range[0] < joint.range[1]:
-        return
-    sides, bars = shape
-    angle = np.radians(np.arange(-1800, 1801) / 10.0)
-    with np.errstate(all="ignore"):
-        psi, first = four_bar(angle, bars)[:2] if bars else (angle, np.ones_like(angle))
-        length, arm, _ = triangle(psi, sides.a, sides.b, math.radians(sides.theta0))
-        arm = arm * first
-    here = int(np.abs(angle - (math.radians(joint.ref) if degrees else joint.ref)).argmin())
-    change = length - length[here]
-    low, high = (-np.inf, np.inf) if slide.range[0] >= slide.range[1] else np.array(slide.range) - slide.ref
-    least = 0.05 * np.nanmax(np.abs(arm))
-    good = (change >= low) & (change <= high) & (arm * arm[here] > 0) & (np.abs(arm) > least)
-    bad = np.flatnonzero(~good)
-    first_bad, last_bad = bad[bad > here], bad[bad < here]
-    ends = angle[[last_bad[-1] + 1 if len(last_bad) else 0, first_bad[0] - 1 if len(first_bad) else -1]]
-    joint.range = np.degrees(ends) if degrees else ends
-    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+    return {"kind": "linear", "triangle": shape.model_dump(), "four_bar": bars.model_dump()}

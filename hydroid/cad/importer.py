@@ -1,6 +1,5 @@
 """A URDF or MJCF -> the model of a serial arm that hydroid can simulate, and its meshes."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +10,34 @@ import numpy as np
 
 from hydroid.cad.chain import choose_chain
 from hydroid.cad.cylinders import take_cylinders
-from hydroid.cad.notes import Notes
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.scene import SCENE, clear_scene, exclude_contacts, place_scene
-from hydroid.cad.shapes import HIDDEN, SHOWN, read_mesh, shown_stl
-from hydroid.cad.source import read_source
+from hydroid.cad.shapes import convert_meshes, distinct, sort_shapes, word
+from hydroid.cad.source import Notes, read_source
 from hydroid.mjcf import mujoco_errors
 
-MESHES = "links"
-"""folder of the meshes beside the model"""
+SCENE = """
+  <option timestep="0.01" integrator="Euler"/>
+  <visual>
+    <headlight ambient="0.25 0.25 0.25" diffuse="0.2 0.2 0.2"/>
+    <global offwidth="1600" offheight="1200"/>
+  </visual>
+  <asset>
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.86 0.9 0.94" rgb2="0.5 0.57 0.65"
+             width="128" height="128"/>
+    <texture name="floor" type="2d" builtin="checker" rgb1="0.58 0.6 0.62" rgb2="0.52 0.54 0.56"
+             width="256" height="256"/>
+    <material name="floor" texture="floor" texrepeat="10 10"/>
+  </asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 0.1" material="floor"/>
+    <light name="key" type="directional" dir="-0.6 1.6 -3" diffuse="0.5 0.5 0.5" specular="0.15 0.15 0.15"/>
+    <light name="fill" type="directional" dir="-1.2 -2 -2.2" diffuse="0.2 0.2 0.2"
+           specular="0.06 0.06 0.06" castshadow="false"/>
+    <camera name="side" pos="0 -1 0.15" xyaxes="1 0 0 0 0.15 1" fovy="40"/>
+    <camera name="corner" pos="0.75 -0.75 0.5" xyaxes="1 1 0 -0.5 0.5 1.5" fovy="40"/>
+  </worldbody>
+"""
+"""sections of an MJCF; `_in_scene` puts lights and cameras around the arm"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +79,8 @@ def import_arm(
     cylinders = take_cylinders(spec, notes)
     choose_chain(spec, str(path), notes, columns, tip)
     exact = urdf or all(geom.parent.explicitinertial for geom in spec.geoms if geom.meshname)
-    meshes, lost = _convert_meshes(spec, files, exact, notes)
-    _sort_shapes(spec)
+    meshes, lost = convert_meshes(spec, files, exact, notes)
+    sort_shapes(spec)
     with mujoco_errors(str(path)):
         repair_inertias(spec, urdf, notes)
         spec.fuse_static()
@@ -82,15 +100,15 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
     for section in (spec.keys, spec.excludes, spec.pairs):
         for part in list(section):
             spec.delete(part)
-    clear_scene(spec)
-    spec.modelname = _word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
+    _clear_scene(spec)
+    spec.modelname = word(path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname)
     renamed, taken = dict[str, str](), {"world"}
     for number, body in enumerate(spec.bodies[1:], start=1):
-        old, body.name = body.name, _distinct(_word(body.name or f"link{number}"), taken)
+        old, body.name = body.name, distinct(word(body.name or f"link{number}"), taken)
         renamed[old] = body.name
     taken, joints = set(), dict[str, str]()
     for joint in spec.joints:
-        old, joint.name = joint.name, _distinct(_word(joint.name or f"{joint.parent.name}_joint"), taken)
+        old, joint.name = joint.name, distinct(word(joint.name or f"{joint.parent.name}_joint"), taken)
         joints[old] = joint.name
     for one in spec.equalities:
         names = joints if one.type == mujoco.mjtEq.mjEQ_JOINT else renamed
@@ -98,68 +116,14 @@ def _clear(spec: mujoco.MjSpec, path: Path) -> None:
             one.name1, one.name2 = (names.get(name, name) for name in (one.name1, one.name2))
 
 
-def _word(name: str) -> str:
-    """A plain word from any name."""
-    word = re.sub(r"\W", "_", name, flags=re.ASCII) or "arm"
-    return f"_{word}" if word[0].isdigit() else word
-
-
-def _distinct(name: str, taken: set[str]) -> str:
-    """A name that is not taken, which it is from now on."""
-    free = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 10_000))) if n not in taken)
-    taken.add(free)
-    return free
-
-
-def _convert_meshes(
-    spec: mujoco.MjSpec, files: dict[str, Path], exact: bool, notes: Notes
-) -> tuple[dict[str, bytes], set[str]]:
-    """Turn the meshes into STL files in m and delete those that cannot be shown.
-
-    Returns the files, and the bodies that lost a mesh.
-
-    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
-    """
-    read = {name: mesh for name, path in files.items() if (mesh := read_mesh(path, notes)) is not None}
-    used = {geom.meshname for geom in spec.geoms}
-    sizes = [
-        float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
-        for mesh in spec.meshes
-        if mesh.file in read and mesh.name in used
-    ]
-    millimetres = max(sizes, default=0.0) > 50.0  # [m]
-    if millimetres:
-        notes.add(f"meshes up to {max(sizes):.4g} m long: all are taken to be in mm")
-    taken: set[str] = set()
-    names = {name: f"{MESHES}/{_distinct(_word(files[name].stem), taken)}.stl" for name in read}
-    meshes, lost = dict[str, bytes](), set[str]()
-    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
-        shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
-        mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
-        given = read.get(mesh.file) if shapes else None
-        shown = given and shown_stl(given, mesh.scale, files[mesh.file].name, notes)
-        if not shown:
-            lost |= {geom.parent.name for geom in shapes}
-            for part in (*shapes, mesh):
-                spec.delete(part)
-            continue
-        mesh.file = names[mesh.file]
-        meshes[mesh.file] = shown[0]
-        mesh.inertia = shown[1] if exact else mesh.inertia
-    spec.meshdir, spec.strippath, spec.assets = "", False, meshes
-    return meshes, lost
-
-
-def _sort_shapes(spec: mujoco.MjSpec) -> None:
-    """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
-    for body in spec.bodies:
-        visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
-        solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
-        for geom in body.geoms:
-            geom.group = SHOWN if geom in (visual or solid) else HIDDEN
-            geom.contype = geom.conaffinity = int(geom in (solid or visual))
-            if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
-                geom.rgba = (0.94, 0.53, 0.08, 1.0)
+def _clear_scene(spec: mujoco.MjSpec) -> None:
+    """Delete what would stand beside the scene: lights, cameras, floors and the sky."""
+    plane, sky = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    floors = [geom for geom in spec.geoms if geom.type == plane]
+    looks = [*spec.textures, *spec.materials]
+    named = [look for look in looks if look.name in ("floor", "sky") or getattr(look, "type", None) == sky]
+    for part in (*spec.lights, *spec.cameras, *floors, *named):
+        spec.delete(part)
 
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
@@ -169,12 +133,26 @@ def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
     with mujoco_errors(spec.modelname):
         whole = mujoco.MjSpec.from_string(text, assets=meshes)
         model = whole.compile()
-    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
-    home = np.clip(0.0, low, high)
-    whole.add_key(name="home", qpos=home)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    place_scene(whole, data.xanchor[0], data.xanchor[-1])
-    exclude_contacts(whole)
+    # lights and cameras stand around the middle of the stretched arm, as far away as it reaches
+    base, tip = data.xanchor[0], data.xanchor[-1]
+    centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
+    if reach < 0.2 * model.stat.extent:  # one joint, or joints close together: the links reach farther
+        centre, reach = np.round(model.stat.center, 6), round(0.5 * float(model.stat.extent), 6)
+    if reach > 4.0:
+        whole.geom("floor").size = [round(1.25 * reach, 3)] * 2 + [0.1]
+    for light in whole.lights:
+        light.pos = centre - light.dir
+    for camera in whole.cameras:
+        camera.pos = np.round(centre + 2.3 * reach * camera.pos, 3)
+    whole.stat.center, whole.stat.extent = centre, reach
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    data.qpos[:] = home = np.clip(0.0, low, high)
+    whole.add_key(name="home", qpos=home)
+    mujoco.mj_forward(model, data)
+    # what touches in that pose is close by design, or its hull is wide
+    for first, second in np.unique(np.sort(model.geom_bodyid[data.contact.geom]), axis=0).tolist():
+        whole.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)
     whole.compiler.savecompiled = whole.compiler.savecanonical = False
     return whole.to_xml()

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from hydroid.cad.notes import Notes
-from hydroid.cad.shapes import SHOWN, Array, geom_mesh
+from hydroid.cad.shapes import SHOWN, Array
+from hydroid.cad.source import Notes
 from hydroid.mjcf import mujoco_errors
 
 MASSLESS = 1e-6
@@ -23,10 +23,10 @@ NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]
 """MuJoCo's word for a full inertia that is not given"""
 
 
-class Solid(NamedTuple):
-    """Volume [m³], centre [m], (3,), and inertia of 1 kg about it [m²], (3, 3), in the body's frame."""
+class Inertial(NamedTuple):
+    """Mass [kg], centre [m], (3,), and inertia about it [kg·m²], (3, 3), in the body's frame."""
 
-    volume: float
+    mass: float
     centre: Array
     tensor: Array
 
@@ -40,23 +40,22 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
         ModelError: MuJoCo refuses the file for another reason.
     """
     faults = {body.name: _stated_fault(body, urdf) for body in spec.bodies[1:]}
-    model = compiled(spec)
+    model, hulls = compiled(spec), hull_model(spec)
     for body in spec.bodies[1:]:
         number, fault = model.body(body.name).id, faults[body.name]
         if not model.body_weldid[number]:
             continue  # what cannot move
-        mass, centre, turn = float(model.body_mass[number]), model.body_ipos[number].copy(), np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.body_iquat[number])
-        axes = turn.reshape(3, 3)
-        tensor = axes * model.body_inertia[number] @ axes.T
+        mass, centre, tensor = inertial_of(model, number)
+        hull = inertial_of(hulls, number)
+        shaped = hull.mass > MASSLESS
         mass = 0.0 if mass <= MASSLESS or fault == "no mass" else mass
-        solid = solid_of(model, number)
-        if mass and solid and not fault and _width(tensor, mass) > _size(model, number):
+        if mass and shaped and not fault and _gyration(tensor, mass) > 2 * _gyration(hull.tensor, hull.mass):
             fault = "an inertia of a far larger body"
         if mass and fault:
             tensor, what = ball(mass), "a steel ball of its mass is taken"
-            if solid:
-                centre, tensor, what = solid.centre, mass * solid.tensor, "that of its hull is taken"
+            if shaped:
+                centre, tensor = hull.centre, mass / hull.mass * hull.tensor
+                what = "that of its hull is taken"
             notes.add(f"{fault}: {what}", f"link {body.name}")
         set_inertia(body, mass, centre, tensor)
 
@@ -66,7 +65,7 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
 
     The spec has moving bodies alone, with masses and inertias. Those that `lost` a mesh count as shapeless.
     """
-    model = compiled(spec)
+    model, hulls = compiled(spec), hull_model(spec)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     links, lines = [body for body in spec.bodies[1:] if body.joints], list[str]()
@@ -75,18 +74,17 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
     places.append(1.5 * places[-1] - 0.5 * before)
     longest = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max())
     for body, (here, there) in zip(links, pairwise(places), strict=True):
-        solid, least, most = solid_of(model, model.body(body.name).id), LEAST, MOST
-        if (
-            solid is None or body.name in lost
-        ):  # a slender link to the next joint; the last one goes on, half as long
+        usual, least, most = inertial_of(hulls, model.body(body.name).id), LEAST, MOST
+        if usual.mass <= MASSLESS or body.name in lost:
+            # a slender link to the next joint; the last one goes on, half as long
             way = data.body(body.name).xmat.reshape(3, 3).T @ (there - here)
             length, least, most = max(float(np.linalg.norm(way)), 0.4 * longest, 0.1), LEAST / 10, np.inf
-            solid = Solid(SLENDER * length**3, 0.5 * way, length**2 / 12 * np.eye(3))
-        if least <= body.mass / solid.volume <= most:
+            mass = USUAL * SLENDER * length**3
+            usual = Inertial(mass, 0.5 * way, mass * length**2 / 12 * np.eye(3))
+        if least <= USUAL * body.mass / usual.mass <= most:
             continue
-        mass = USUAL * solid.volume
-        lines.append(f"{body.name} {f'{body.mass:.2g}' if body.mass else 'none'} -> {mass:.3g}")
-        set_inertia(body, mass, solid.centre, mass * solid.tensor)
+        lines.append(f"{body.name} {f'{body.mass:.2g}' if body.mass else 'none'} -> {usual.mass:.3g}")
+        set_inertia(body, *usual)
     if lines:
         notes.add(
             f"MASSES THAT NO MACHINE HAS [kg]: {', '.join(lines)} ({USUAL:g} kg/m³ of hull is taken). Say "
@@ -110,26 +108,27 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return model
 
 
-def solid_of(model: mujoco.MjModel, body: int) -> Solid | None:
-    """Return the hulls of a body's shapes together; None: it has none with a volume."""
-    parts = list[Solid]()
-    for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_group == SHOWN)).tolist():
-        mesh, place, turn = geom_mesh(model, geom), np.eye(4), np.empty(9)
-        if mesh is None or np.linalg.matrix_rank(mesh.vertices - mesh.vertices[0], tol=1e-9) < 3:
-            continue
-        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-        place[:3, :3], place[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
-        hull = mesh.convex_hull.apply_transform(place)
-        parts.append(Solid(hull.volume, hull.center_mass, np.array(hull.moment_inertia) / hull.volume))
-    volume = sum(part.volume for part in parts)
-    if not volume:
-        return None
-    centre = np.sum([part.volume / volume * part.centre for part in parts], axis=0)
-    tensor = np.zeros((3, 3))
-    for part in parts:
-        away = part.centre - centre
-        tensor += part.volume / volume * (part.tensor + away @ away * np.eye(3) - np.outer(away, away))
-    return Solid(float(volume), centre, tensor)
+def hull_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile with the USUAL mass of the hulls of what is shown of each body."""
+    hulls, kinds = spec.copy(), mujoco.mjtMeshInertia
+    hulls.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    hulls.compiler.inertiagrouprange = [SHOWN, SHOWN]
+    solid = [mesh for mesh in hulls.meshes if mesh.inertia != kinds.mjMESH_INERTIA_SHELL]
+    for mesh in solid:
+        mesh.inertia = kinds.mjMESH_INERTIA_CONVEX
+    names = {"", *(mesh.name for mesh in solid)}
+    for geom in hulls.geoms:
+        geom.mass, geom.density = np.nan, USUAL if geom.meshname in names else 0.0
+    return compiled(hulls)
+
+
+def inertial_of(model: mujoco.MjModel, body: int) -> Inertial:
+    """Return mass, centre and inertia of a body of a model."""
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[body])
+    axes = turn.reshape(3, 3)
+    tensor = axes * model.body_inertia[body] @ axes.T
+    return Inertial(float(model.body_mass[body]), model.body_ipos[body].copy(), tensor)
 
 
 def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array) -> None:
@@ -166,12 +165,6 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
     return fault
 
 
-def _width(tensor: Array, mass: float) -> float:
-    return 2 * float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))
-
-
-def _size(model: mujoco.MjModel, body: int) -> float:
-    """Length of a body's shapes [m]."""
-    geoms = np.flatnonzero((model.geom_bodyid == body) & (model.geom_group == SHOWN))
-    away = np.linalg.norm(model.geom_pos[geoms] - model.body_ipos[body], axis=1)
-    return 2 * float(np.max(away + model.geom_rbound[geoms], initial=0.0))
+def _gyration(tensor: Array, mass: float) -> float:
+    """Return the largest radius of gyration [m]."""
+    return float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))

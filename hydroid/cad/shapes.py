@@ -1,5 +1,6 @@
-"""Mesh files and MuJoCo's shapes -> triangles in m."""
+"""The shapes of a robot: meshes of any format -> STL files in m; what is shown, and what collides."""
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -8,16 +9,84 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from hydroid.cad.notes import Notes
+from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
 
 Array = NDArray[np.float64]
+MESHES = "links"
+"""folder of the meshes beside the model"""
 SHOWN, HIDDEN = 2, 3
 """groups of shapes that are seen, and of those that only collide"""
 
 
-def read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
+def convert_meshes(
+    spec: mujoco.MjSpec, files: dict[str, Path], exact: bool, notes: Notes
+) -> tuple[dict[str, bytes], set[str]]:
+    """Turn the meshes into STL files in m and delete those that cannot be shown.
+
+    `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
+
+    Returns:
+        The files by their path from the model, and the bodies that lost a mesh.
+    """
+    read = {name: mesh for name, path in files.items() if (mesh := _read_mesh(path, notes)) is not None}
+    used = {geom.meshname for geom in spec.geoms}
+    sizes = [
+        float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
+        for mesh in spec.meshes
+        if mesh.file in read and mesh.name in used
+    ]
+    millimetres = max(sizes, default=0.0) > 50.0  # [m]
+    if millimetres:
+        notes.add(f"meshes up to {max(sizes):.4g} m long: all are taken to be in mm")
+    taken: set[str] = set()
+    names = {name: f"{MESHES}/{distinct(word(files[name].stem), taken)}.stl" for name in read}
+    meshes, lost = dict[str, bytes](), set[str]()
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
+        shapes = [geom for geom in spec.geoms if geom.meshname == mesh.name]
+        mesh.scale = mesh.scale * (1e-3 if millimetres else 1.0)
+        source = read.get(mesh.file) if shapes else None
+        shown = source and _shown_stl(source, mesh.scale, files[mesh.file].name, notes)
+        if not shown:
+            lost |= {geom.parent.name for geom in shapes}
+            for part in (*shapes, mesh):
+                spec.delete(part)
+            continue
+        mesh.file = names[mesh.file]
+        meshes[mesh.file] = shown[0]
+        flat = shown[1] == mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        mesh.inertia = shown[1] if exact or flat else mesh.inertia
+    spec.meshdir, spec.strippath, spec.assets = "", False, meshes
+    return meshes, lost
+
+
+def sort_shapes(spec: mujoco.MjSpec) -> None:
+    """Show what the file shows, or else what collides; let collide what collides, or else what is shown."""
+    for body in spec.bodies:
+        visual = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
+        solid = [geom for geom in body.geoms if geom.contype or geom.conaffinity]
+        for geom in body.geoms:
+            geom.group = SHOWN if geom in (visual or solid) else HIDDEN
+            geom.contype = geom.conaffinity = int(geom in (solid or visual))
+            if not geom.material and np.allclose(geom.rgba, (0.5, 0.5, 0.5, 1.0)):
+                geom.rgba = (0.94, 0.53, 0.08, 1.0)
+
+
+def word(name: str) -> str:
+    """Return a plain word from any name."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "arm"
+    return f"_{plain}" if plain[0].isdigit() else plain
+
+
+def distinct(name: str, taken: set[str]) -> str:
+    """Return a name that is not taken, which it is from now on."""
+    free = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 10_000))) if n not in taken)
+    taken.add(free)
+    return free
+
+
+def _read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
     """Read a mesh file of any format that trimesh knows; None, with a note: it cannot be read."""
     try:
         mesh = trimesh.load(path, force="mesh")
@@ -32,7 +101,7 @@ def read_mesh(path: Path, notes: Notes) -> trimesh.Trimesh | None:
     return mesh
 
 
-def shown_stl(
+def _shown_stl(
     mesh: trimesh.Trimesh, scale: Array, name: str, notes: Notes
 ) -> tuple[bytes, mujoco.mjtMeshInertia] | None:
     """Return a mesh as a binary STL, and how MuJoCo takes its inertia; None, with a note: it refuses both.
@@ -55,26 +124,3 @@ def shown_stl(
             return content, kind
     notes.add("refused by MuJoCo: not shown", f"mesh {name}")
     return None
-
-
-def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
-    """Return a shape of a model as triangles in its own frame [m]; None: it has no volume."""
-    number, size = int(model.geom_dataid[geom]), model.geom_size[geom]
-    kinds = mujoco.mjtGeom
-    match kinds(int(model.geom_type[geom])):
-        case kinds.mjGEOM_MESH:
-            vertices = model.mesh_vert[model.mesh_vertadr[number] :][: model.mesh_vertnum[number]]
-            faces = model.mesh_face[model.mesh_faceadr[number] :][: model.mesh_facenum[number]]
-            return trimesh.Trimesh(vertices, faces)
-        case kinds.mjGEOM_BOX:
-            return trimesh.creation.box(extents=2 * size)
-        case kinds.mjGEOM_SPHERE:
-            return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
-        case kinds.mjGEOM_CYLINDER:
-            return trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=24)
-        case kinds.mjGEOM_CAPSULE:
-            return trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[16, 16])
-        case kinds.mjGEOM_ELLIPSOID:
-            return trimesh.creation.icosphere(subdivisions=2, radius=1.0).apply_scale(size)
-        case _:
-            return None

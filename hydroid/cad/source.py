@@ -1,16 +1,16 @@
 """A URDF or MJCF file -> MuJoCo's spec of it, and where its meshes are."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
 
-from hydroid.cad.notes import Notes
 from hydroid.errors import ModelError
 from hydroid.files import is_file
 from hydroid.mjcf import mujoco_errors
+from hydroid.words import listed
 
 URDF_OPTIONS = {"discardvisual": "false", "fusestatic": "false", "strippath": "true"}
 """keep what MuJoCo drops from a URDF by default: visuals, and links that no joint moves"""
@@ -33,6 +33,22 @@ IGNORED = (
     "size",
 )
 """elements of an MJCF that the arm does not need, whose files or libraries are often missing"""
+
+
+class Notes:
+    """What an import assumed, left out or mended: sentences with the names of what they are about."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[str]] = {}
+
+    def add(self, sentence: str, *parts: str) -> None:
+        """Say a sentence about parts of the robot; the parts of equal sentences stand in one line."""
+        names = self._parts.setdefault(sentence, [])
+        names += [part for part in parts if part not in names]
+
+    def lines(self) -> Sequence[str]:
+        """Return a line for each sentence."""
+        return [f"{listed(parts, 4)}: {what}" if parts else what for what, parts in self._parts.items()]
 
 
 def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path], bool]:

@@ -5,8 +5,7 @@ from typing import Any
 
 import yaml
 
-from hydroid.cad.importer import ImportedArm
-from hydroid.cad.scene import SCENE
+from hydroid.cad.importer import SCENE, ImportedArm
 from hydroid.project.sizes import LIFT, JointSize
 from hydroid.settings.arm import Arm
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hydroid.cad.importer import MESHES, ImportedArm, import_arm
+from hydroid.cad.importer import ImportedArm, import_arm
+from hydroid.cad.shapes import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table

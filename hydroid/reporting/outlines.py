@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import trimesh
 
-from hydroid.cad.shapes import SHOWN, geom_mesh
+from hydroid.cad.shapes import SHOWN
 from hydroid.parameters import Array
 
 
@@ -68,3 +68,26 @@ def _lines(model: mujoco.MjModel) -> list[Shape]:
         ends = ends if len(ends) else model.body_ipos[[body]]
         found += [Shape(body, np.stack([np.zeros(3), end])) for end in ends]
     return found
+
+
+def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
+    """Return a shape of a model as triangles in its own frame [m]; None: it has no volume."""
+    number, size = int(model.geom_dataid[geom]), model.geom_size[geom]
+    kinds = mujoco.mjtGeom
+    match kinds(int(model.geom_type[geom])):
+        case kinds.mjGEOM_MESH:
+            vertices = model.mesh_vert[model.mesh_vertadr[number] :][: model.mesh_vertnum[number]]
+            faces = model.mesh_face[model.mesh_faceadr[number] :][: model.mesh_facenum[number]]
+            return trimesh.Trimesh(vertices, faces)
+        case kinds.mjGEOM_BOX:
+            return trimesh.creation.box(extents=2 * size)
+        case kinds.mjGEOM_SPHERE:
+            return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
+        case kinds.mjGEOM_CYLINDER:
+            return trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=24)
+        case kinds.mjGEOM_CAPSULE:
+            return trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[16, 16])
+        case kinds.mjGEOM_ELLIPSOID:
+            return trimesh.creation.icosphere(subdivisions=2, radius=1.0).apply_scale(size)
+        case _:
+            return None

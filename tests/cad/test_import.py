@@ -8,7 +8,7 @@ import trimesh
 from robots import LIMIT, joint, link, write_robot
 
 from hydroid.cad.importer import import_arm
-from hydroid.cad.shapes import SHOWN, geom_mesh
+from hydroid.cad.shapes import SHOWN
 from hydroid.errors import ModelError
 
 
@@ -33,10 +33,9 @@ def joints(model):
 
 
 def extents(model, body):
-    """Size of what is seen of a body, in its frame [m]."""
+    """Size of what is seen of a body [m], ascending."""
     geoms = np.flatnonzero((model.geom_bodyid == model.body(body).id) & (model.geom_group == SHOWN))
-    (mesh,) = (geom_mesh(model, int(geom)) for geom in geoms)
-    return np.sort(mesh.extents)
+    return np.sort(2 * model.geom_aabb[geoms.item(), 3:])
 
 
 def tensor(model, body):

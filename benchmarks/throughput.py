@@ -49,7 +49,7 @@ def bare_rollout(problem: Problem) -> Callable[[], object]:
     candidates = problem.bindings.candidates(population(problem))
     passive = problem.settings.simulation.other_joints == "passive"
     moving = np.arange(log.joints) if passive else np.array([1])
-    reduced = lock(load_model(arm), arm, [arm.joint_names[j] for j in moving], log.angle[0])
+    reduced = lock(load_model(arm), arm, np.isin(range(log.joints), moving), log.angle[0])
     reduced.model.qpos_spring[:] = log.angle[0, moving]
     batch = Batch(reduced.model, nsim=CANDIDATES)
     for name, value in reduced.inertials(candidates.mass).items():

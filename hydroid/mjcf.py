@@ -65,8 +65,13 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
             for picture in pictures:
                 picture.file = picture.file and str(home / place / picture.file)  # these stay where they are
         spec.modelfiledir, spec.meshdir = str(folder.resolve()), "meshes"
-        spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
-        write_atomic(folder / name, spec.to_xml())
+        write_atomic(folder / name, mjcf_text(spec))
+
+
+def mjcf_text(spec: mujoco.MjSpec) -> str:
+    """Return a spec as XML to the last bit, as it is written and not as it compiles."""
+    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
+    return spec.to_xml()
 
 
 @contextmanager

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 import trimesh
 
-from hydroid.cad.scene import SCENE, exclude_contacts, place_scene
+from hydroid.cad.importer import SCENE, arrange
 
 ROOT = Path(__file__).parents[1]
 ARM, DUAL = ROOT / "models" / "hydrolek.xml", ROOT / "models" / "hydrolek_dual.xml"
@@ -79,11 +79,10 @@ def two_arms(arm: Path) -> str:
     alone = mujoco.MjModel.from_xml_path(str(arm))
     for key in range(alone.nkey):
         machine.add_key(name=alone.key(key).name, qpos=np.tile(alone.key_qpos[key], 2))
-    exclude_contacts(machine)
     data = mujoco.MjData(alone)
     mujoco.mj_kinematics(alone, data)
     middle = AT * [1.0, 0.0, 1.0]
-    place_scene(machine, middle, middle + data.xanchor[-1] - data.xanchor[0])
+    arrange(machine, middle, middle + data.xanchor[-1] - data.xanchor[0])
     text = machine.to_xml()
     for mesh in machine.meshes:
         text = text.replace(f'"{mesh.file}"', f'"{Path(os.path.relpath(mesh.file, DUAL.parent)).as_posix()}"')

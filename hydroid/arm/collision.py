@@ -3,10 +3,6 @@
 Bodies collide with the shapes that the MJCF makes collide; a mesh counts as its convex hull. Distances are
 MuJoCo's (`mj_geomDistance`). As in MuJoCo a body is not held against the one that it hangs on, nor against
 one that the model excludes; `hydroid init` excludes bodies that touch in the pose `home`.
-
-Most distances need no computing. When the joints turn by dq, no point of a body moves farther than the sum of
-|dq_j| times its greatest distance from joint j; so a known distance is a lower bound for some time
-(conservative advancement: B. Mirtich, 1996).
 """
 
 from collections.abc import Generator
@@ -14,11 +10,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.errors import ModelError
-
-Array = NDArray[np.float64]
+from hydroid.parameters import Array
 
 FARTHEST = 100.0
 """distance beyond which MuJoCo need not look [m]"""
@@ -60,11 +54,6 @@ class Clearance:
     checked: int
     excluded: tuple[tuple[str, str], ...]
 
-    @property
-    def smallest(self) -> int:
-        """The sample at which bodies are nearest, or deepest inside each other."""
-        return int(np.argmin(self.distance))
-
 
 class CollisionChecker:
     """Distances between the bodies of a compiled model whose joints are all hinges or slides.
@@ -80,20 +69,11 @@ class CollisionChecker:
     def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:
         self._model, self._data = model, mujoco.MjData(model)
         self._pairs = _pairs(model)
-        if not len(self._pairs):
+        if not self._pairs:
             hint = "give bodies geoms with contype and conaffinity 1"
             raise ModelError("no two of its bodies can collide", where=source, hint=hint)
-        self._sweep = _sweep(model, self._pairs)
-        self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs.tolist()]
+        self.names = [(_name(model, first), _name(model, second)) for first, second in self._pairs]
         """of the bodies of each pair of shapes"""
-
-    @property
-    def excluded(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of bodies that the model excludes and that could collide otherwise."""
-        m = self._model
-        solid = set(m.geom_bodyid[(m.geom_contype | m.geom_conaffinity) > 0].tolist())
-        pairs = [(s >> 16, s & 0xFFFF) for s in m.exclude_signature.tolist()]
-        return tuple((m.body(a).name, m.body(b).name) for a, b in pairs if {a, b} <= solid)
 
     def clearance(self, time: Array, angle: Array) -> Clearance:
         """Return how near bodies come along a trajectory.
@@ -102,55 +82,37 @@ class CollisionChecker:
             time: [s], shape (T,).
             angle: of all joints in the model's order [rad], shape (T, nq).
         """
-        distance, nearest = np.empty(len(time)), list[tuple[str, str]]()
+        distance = np.stack([self._distances(pose, FARTHEST) for pose in angle])
         depths: dict[tuple[str, str], Array] = {}
-        for sample, (near, least, which) in enumerate(self._walk(angle, FARTHEST)):
-            distance[sample] = least
-            nearest.append(self.names[which])
-            for pair, here in near:
-                if here < 0:
-                    depth = depths.setdefault(self.names[pair], np.zeros(len(time)))
-                    depth[sample] = max(depth[sample], -here)
+        for pair in np.flatnonzero(distance.min(axis=0) < 0):
+            inside = np.maximum(-distance[:, pair], 0.0)
+            depths[self.names[pair]] = np.maximum(depths.get(self.names[pair], 0.0), inside)
         meetings = [meeting for names, depth in depths.items() for meeting in _meetings(names, time, depth)]
         meetings.sort(key=lambda meeting: meeting.begins)
-        checked = len({tuple(sorted(pair)) for pair in self.names})
-        return Clearance(time, distance, tuple(nearest), tuple(meetings), checked, self.excluded)
+        nearest = tuple(self.names[pair] for pair in distance.argmin(axis=1))
+        checked = len({*map(frozenset, self.names)})
+        pairs = [(s >> 16, s & 0xFFFF) for s in self._model.exclude_signature.tolist()]
+        excluded = tuple((self._model.body(a).name, self._model.body(b).name) for a, b in pairs)
+        return Clearance(time, distance.min(axis=1), nearest, tuple(meetings), checked, excluded)
 
     def first_below(self, angle: Array, margin: float) -> tuple[int, tuple[str, str]] | None:
         """Return the first sample of a trajectory [rad], (T, nq), with two bodies nearer than a margin [m].
 
         Returns:
-            The sample and the names of the bodies; None where every distance keeps the margin.
+            The sample and the names of the bodies; None where every distance keeps the margin, 0 or more.
         """
-        for sample, (_, least, which) in enumerate(self._walk(angle, margin)):
-            if least < margin:
-                return sample, self.names[which]
+        for sample, pose in enumerate(angle):
+            distance = self._distances(pose, margin)
+            if distance.min() < margin:
+                return sample, self.names[distance.argmin()]
         return None
 
-    def _walk(self, angle: Array, within: float) -> Generator[tuple[list[tuple[int, float]], float, int]]:
-        """Yield of each sample the pairs looked at with their distances [m], the least, and whose it is.
-
-        Pairs farther apart than `within` [m] are not looked for, and where there are none nearer it is the
-        least. All pairs inside each other are looked at.
-        """
-        known = np.full(len(self._pairs), -np.inf)  # lower bounds of the distances
-        turned = np.abs(np.diff(angle, axis=0, prepend=angle[:1]))
-        for pose, change in zip(angle, turned, strict=True):
-            known -= change @ self._sweep
-            near, least, which = list[tuple[int, float]](), within, 0
-            if known.min() < max(within, 0.0):
-                self._data.qpos[:] = pose
-                mujoco.mj_kinematics(self._model, self._data)
-            for pair in np.argsort(known).tolist():
-                if known[pair] >= max(least, 0.0):
-                    break
-                first, second = self._pairs[pair].tolist()
-                here = mujoco.mj_geomDistance(self._model, self._data, first, second, FARTHEST, None)
-                known[pair] = here
-                near.append((pair, here))
-                if here < least:
-                    least, which = here, pair
-            yield near, least, which
+    def _distances(self, pose: Array, within: float) -> Array:
+        """Distances of all pairs of shapes in a pose [m], shape (P,); farther than `within` they are that."""
+        self._data.qpos[:] = pose
+        mujoco.mj_kinematics(self._model, self._data)
+        here = self._model, self._data
+        return np.array([mujoco.mj_geomDistance(*here, *pair, within, None) for pair in self._pairs])
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
@@ -159,38 +121,16 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
     return model.body(body).name if body else model.geom(geom).name or "world"
 
 
-def _pairs(model: mujoco.MjModel) -> NDArray[np.intp]:
-    """Pairs of geoms that MuJoCo would let collide, shape (P, 2)."""
-    weld, parent = model.body_weldid, model.body_weldid[model.body_parentid[model.body_weldid]]
-    excluded = set(model.exclude_signature.tolist())
+def _pairs(model: mujoco.MjModel) -> list[list[int]]:
+    """Pairs of geoms that MuJoCo would let collide."""
+    g, h = np.triu_indices(model.ngeom, 1)
     kinds, masks, bodies = model.geom_contype, model.geom_conaffinity, model.geom_bodyid
-
-    def collide(g: int, h: int) -> bool:
-        a, b = int(bodies[g]), int(bodies[h])
-        adjacent = weld[a] and weld[b] and (weld[a] == parent[b] or weld[b] == parent[a])
-        apart = weld[a] != weld[b] and not adjacent
-        seen = bool(kinds[g] & masks[h] or kinds[h] & masks[g])
-        return seen and apart and (min(a, b) << 16) + max(a, b) not in excluded
-
-    found = [(g, h) for g in range(model.ngeom) for h in range(g + 1, model.ngeom) if collide(g, h)]
-    return np.array(found, np.intp).reshape(-1, 2)
-
-
-def _sweep(model: mujoco.MjModel, pairs: NDArray[np.intp]) -> Array:
-    """How far two geoms approach at most when a joint turns by 1 rad or slides by 1 m, shape (nq, P)."""
-    reach = np.zeros((model.nq, model.ngeom))
-    for geom in range(model.ngeom):
-        body = int(model.geom_bodyid[geom])
-        far = float(np.linalg.norm(model.geom_pos[geom]) + model.geom_rbound[geom])
-        while body:
-            for joint in np.flatnonzero(model.jnt_bodyid == body):
-                slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
-                reach[joint, geom] = 1.0 if slides else far + np.linalg.norm(model.jnt_pos[joint])
-            far += float(np.linalg.norm(model.body_pos[body]))
-            body = int(model.body_parentid[body])
-    first, second = reach[:, pairs[:, 0]], reach[:, pairs[:, 1]]
-    # a joint that carries both moves them as one
-    return np.where((first > 0) & (second > 0), 0.0, first + second)
+    weld, parent = model.body_weldid, model.body_weldid[model.body_parentid[model.body_weldid]]
+    a, b = bodies[g], bodies[h]
+    jointed = (weld[a] * weld[b] > 0) & ((weld[a] == parent[b]) | (weld[b] == parent[a]))
+    meant = (kinds[g] & masks[h] | kinds[h] & masks[g]) != 0
+    excluded = np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), model.exclude_signature)
+    return np.stack([g, h], axis=1)[meant & (weld[a] != weld[b]) & ~jointed & ~excluded].tolist()
 
 
 def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Meeting]:

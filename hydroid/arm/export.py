@@ -13,9 +13,9 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
-from hydroid.arm.locked import LockedArm, copy_joints
+from hydroid.arm.locked import LockedArm
 from hydroid.files import write_atomic
-from hydroid.mjcf import quiet_mujoco
+from hydroid.mjcf import mjcf_text, quiet_mujoco
 
 _MECHANICAL_README = """\
 fitted.xml is the fitted arm for MuJoCo alone. Set ctrl to the commands [%] and call mj_step once per
@@ -41,7 +41,11 @@ mechanics.xml is the fitted arm without its hydraulics: masses, dampers and spri
 moving joints are {joints}; the others are fused in the start pose, which is the keyframe `start`.
 actuators.yaml lists the hydraulic parameters of each joint. arm.xml is the arm before the fit.
 """
-_BODY_FIELDS = ("pos", "quat", "ipos", "iquat", "mass", "inertia", "simple", "sameframe")
+_FIELDS = (
+    *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "body_simple"),
+    *("body_sameframe", "jnt_pos", "jnt_axis", "dof_simplenum"),
+)
+"""of a model, whose last bits depend on how its bodies were fused"""
 
 
 def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
@@ -50,25 +54,19 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
     It steps as `locked.model` does, bit for bit: motors are switched off, and their controls are free to hold
     commands in %.
     """
-    source, home = spec.copy(), Path(spec.modelfiledir).resolve()
-    source.meshdir, source.texturedir = str(home / spec.meshdir), str(home / spec.texturedir)
-    text = arm_mjcf(source, locked, locked.model, np.zeros((2, len(locked.joints))))
+    source = locked_spec(spec, locked, locked.model, np.zeros((2, len(locked.joints))))
     with quiet_mujoco():
-        model = mujoco.MjModel.from_xml_string(text)
-    for name in (*("body_" + field for field in _BODY_FIELDS), "jnt_pos", "jnt_axis", "dof_simplenum"):
+        model = source.compile()
+    for name in _FIELDS:
         getattr(model, name)[:] = getattr(locked.model, name)
-    copy_joints(locked.model, model)
     model.opt.disableflags = locked.model.opt.disableflags
     return model
 
 
-def arm_mjcf(
-    spec: mujoco.MjSpec,
-    locked: LockedArm,
-    model: mujoco.MjModel,
-    motors: ArrayLike | None = None,
-) -> str:
-    """Return the MJCF of an arm with locked joints.
+def locked_spec(
+    spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: ArrayLike | None = None
+) -> mujoco.MjSpec:
+    """Return an arm with locked joints.
 
     Args:
         spec: the arm's MJCF, for its looks.
@@ -92,7 +90,6 @@ def arm_mjcf(
     compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = False, 0.0, 0.0
     compiler.settotalmass, compiler.fusestatic = -1.0, False
-    compiler.savecompiled = compiler.savecanonical = False  # canonical is six digits
     source.option.timestep = model.opt.timestep
     source.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     for j, name in enumerate(locked.joints):
@@ -110,7 +107,7 @@ def arm_mjcf(
                 ctrlrange=[-100.0, 100.0],
             )
     source.add_key(name="start", qpos=model.qpos_spring)
-    return source.to_xml()
+    return source
 
 
 def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees: bool) -> None:
@@ -137,13 +134,13 @@ def _draw_tendons(spec: mujoco.MjSpec) -> None:
 
 
 def write_fitted(
-    folder: Path, mjcf: str, timestep: float, joints: str, actuators: dict[str, Any] | None
+    folder: Path, fitted: mujoco.MjSpec, timestep: float, joints: str, actuators: dict[str, Any] | None
 ) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
     Args:
         folder: `model/`.
-        mjcf: the fitted arm.
+        fitted: the fitted arm.
         timestep: MuJoCo's [s].
         joints: names of the joints that take commands.
         actuators: hydraulic parameters by joint (stage 2); None: the MJCF has motors (stage 1).
@@ -156,5 +153,5 @@ def write_fitted(
         name, words = "mechanics.xml", _HYDRAULIC_README
         text = yaml.safe_dump(actuators, sort_keys=False, allow_unicode=True)
         write_atomic(folder / "actuators.yaml", text)
-    write_atomic(folder / name, mjcf)
+    write_atomic(folder / name, mjcf_text(fitted))
     write_atomic(folder / "README.txt", words.format(timestep=timestep, joints=joints))

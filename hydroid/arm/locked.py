@@ -8,17 +8,16 @@ moving nothing but the fixed parts is fused, and the result is the whole arm wit
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hydroid.errors import ModelError
 from hydroid.mjcf import quiet_mujoco
+from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
-
-Array = NDArray[np.float64]
 
 _OPTIONS = (
     "timestep", "gravity", "integrator", "solver", "iterations", "tolerance", "jacobian", "enableflags"
@@ -31,20 +30,12 @@ _JOINT_FIELDS = (
 )
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A link, or another body of the model, as a rigid part of a fused body and in its frame."""
-
-    body: int
-    """the fused body"""
-    column: int | None
-    """of its mass in `masses`; None where no setting names it"""
-    mass: float
-    """in the model [kg]"""
-    centre: Array
-    """[m], shape (3,)"""
-    inertia: Array
-    """about its centre, for 1 kg [m²], shape (3, 3)"""
+PART = np.dtype(
+    [("body", int), ("column", int), ("mass", float), ("centre", float, 3), ("inertia", float, (3, 3))]
+)
+"""a link, or another body of the model, as a rigid part of a fused body and in its frame: that body; the
+column of its mass in `masses`, -1 where no setting names it; its mass in the model [kg]; its centre [m]; its
+inertia about that for 1 kg [m²]"""
 
 
 @dataclass(frozen=True)
@@ -59,7 +50,8 @@ class LockedArm:
     """the same among the arm's joints, 0-based, shape (V,)"""
     pose: Array
     """where they start [rad], shape (V,)"""
-    parts: tuple[_Part, ...]
+    parts: Any
+    """what the bodies consist of, (P,) of PART"""
     held: dict[str, tuple[Array, Array]]
     """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y, z)"""
 
@@ -71,66 +63,46 @@ class LockedArm:
             body_ipos [m], shape (n, B, 3); body_iquat (w, x, y, z), shape (n, B, 4); body_inertia [kg·m²],
             shape (n, B, 3).
         """
-        n, bodies = len(masses), self.model.nbody
-        weights = [np.full(n, p.mass) if p.column is None else masses[:, p.column] for p in self.parts]
-        mass = np.zeros((n, bodies))
-        ipos = np.zeros((n, bodies, 3))
-        tensor = np.zeros((n, bodies, 3, 3))
-        for part, weight in zip(self.parts, weights, strict=True):
-            mass[:, part.body] += weight
-            ipos[:, part.body] += weight[:, None] * part.centre
+        shapes = (len(masses), self.model.nbody)
+        mass, ipos, tensor = np.zeros(shapes), np.zeros((*shapes, 3)), np.zeros((*shapes, 3, 3))
+        part, at = self.parts, cast(Any, (slice(None), self.parts.body))
+        weight = np.where(part.column < 0, part.mass, masses[:, part.column])
+        np.add.at(mass, at, weight)
+        np.add.at(ipos, at, weight[..., None] * part.centre)
         ipos[:, 1:] /= mass[:, 1:, None]
-        for part, weight in zip(self.parts, weights, strict=True):
-            away = part.centre - ipos[:, part.body]
-            tensor[:, part.body] += weight[:, None, None] * (part.inertia + _steiner(away))
+        unit = part.inertia + _steiner(part.centre - ipos[:, part.body])
+        np.add.at(tensor, at, weight[..., None, None] * unit)
         inertia, iquat = _principal(tensor)
         return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
 
 
-def lock(spec: mujoco.MjSpec, arm: Arm, moving: Sequence[str], pose: Array) -> LockedArm:
+def lock(spec: mujoco.MjSpec, arm: Arm, moving: NDArray[np.bool_], pose: Array) -> LockedArm:
     """Lock all joints but the moving ones.
 
     Args:
         spec: the arm's model, as `load_model` returns it.
         arm: its settings, which name joints and links.
-        moving: names of the joints that stay, in any order.
+        moving: which joints stay, shape (J,), one at least.
         pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
-
-    Raises:
-        ModelError: nothing to move, or a name that is no joint.
     """
-    joints = tuple(name for name in arm.joint_names if name in moving)
-    if not joints or len(joints) < len(set(moving)):
-        wrong = sorted(set(moving) - set(joints))
-        what = f"no joint is named {wrong[0]!r}" if wrong else "no joint is left to move"
-        raise ModelError(what, where=arm.name, hint=f"joints: {', '.join(arm.joint_names)}")
-    columns = np.array([arm.joint_names.index(name) for name in joints])
+    names, columns = np.array(arm.joint_names), np.flatnonzero(moving)
     with quiet_mujoco():
         full = spec.compile()
-    data = mujoco.MjData(full)
-    fixed = [name for name in arm.joint_names if name not in joints]
-    for name in fixed:
-        data.joint(name).qpos[0] = pose[arm.joint_names.index(name)]
+    data, places = mujoco.MjData(full), dict[str, tuple[Array, Array]]()
+    fixed = np.flatnonzero(~moving)
+    for joint in fixed:
+        data.joint(names[joint]).qpos[0] = pose[joint]
     mujoco.mj_kinematics(full, data)
-    held = [int(full.joint(name).bodyid[0]) for name in fixed]
-    places = {full.body(b).name: _place(data, b, int(full.body_parentid[b])) for b in held}
+    for body in [int(full.joint(name).bodyid[0]) for name in names[fixed]]:
+        places[full.body(body).name] = _place(data, body, int(full.body_parentid[body]))
+    joints = tuple(names[columns].tolist())
     model, parts = _fused(full, data, arm, joints)
     locked = LockedArm(model, joints, columns, pose[columns], parts, places)
-    masses = np.array([full.body(name).mass[0] for name in arm.link_names])
-    for name, value in locked.inertials(masses[None]).items():
+    for name, value in locked.inertials(arm.masses[None]).items():
         getattr(model, name)[:] = value[0]
     with quiet_mujoco():
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return locked
-
-
-def copy_joints(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
-    """Give a model the options of another, and the properties of its joints by their names."""
-    joints = [source.joint(target.joint(j).name).id for j in range(target.njnt)]
-    for name in _JOINT_FIELDS:
-        getattr(target, name)[:] = getattr(source, name)[joints]
-    for name in _OPTIONS:
-        setattr(target.opt, name, getattr(source.opt, name))
 
 
 def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
@@ -142,12 +114,12 @@ def _place(data: mujoco.MjData, body: int, above: int) -> tuple[Array, Array]:
 
 def _fused(
     full: mujoco.MjModel, data: mujoco.MjData, arm: Arm, joints: Sequence[str]
-) -> tuple[mujoco.MjModel, tuple[_Part, ...]]:
+) -> tuple[mujoco.MjModel, Any]:
     """The chain of bodies that joints move, without what they weigh, and every body that is part of them."""
-    spec, kept, carriers, parts = mujoco.MjSpec(), [0], list[int](), list[_Part]()
+    spec, kept, carriers, parts = mujoco.MjSpec(), [0], list[int](), list[tuple[Any, ...]]()
     bodies = [spec.worldbody]
     column = {full.body(name).id: place for place, name in enumerate(arm.link_names)}
-    moved = {int(full.joint(name).bodyid[0]): full.joint(name) for name in joints}
+    moved = {int(joint.bodyid[0]): joint for joint in map(full.joint, joints)}
     for number, parent in enumerate(full.body_parentid):
         above = carriers[parent] if number else 0
         if number in moved:
@@ -172,21 +144,25 @@ def _fused(
             axes = inverse @ data.ximat[number].reshape(3, 3)
             centre = inverse @ (data.xipos[number] - data.xpos[kept[above]])
             inertia = (axes * (full.body_inertia[number] / mass)) @ axes.T
-            parts.append(_Part(above, column.get(number), mass, centre, inertia))
+            parts.append((above, column.get(number, -1), mass, centre, inertia))
     with quiet_mujoco():
         model = spec.compile()
-    copy_joints(full, model)
+    ids = [moved[number].id for number in kept[1:]]
+    for name in _JOINT_FIELDS:
+        getattr(model, name)[:] = getattr(full, name)[ids]
+    for name in _OPTIONS:
+        setattr(model.opt, name, getattr(full.opt, name))
     off = mujoco.mjtDisableBit
     # looking for what the chain lacks takes a tenth of a step; a diverged candidate must stay diverged
     idle = off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR | off.mjDSBL_EQUALITY | off.mjDSBL_ISLAND
     model.opt.disableflags = full.opt.disableflags | off.mjDSBL_CONTACT | off.mjDSBL_AUTORESET | idle
-    return model, tuple(parts)
+    return model, np.array(parts, PART).view(np.recarray)
 
 
 def _steiner(away: Array) -> Array:
-    """Inertia of 1 kg at `away` [m], shape (n, 3), about the origin [m²], shape (n, 3, 3)."""
-    square = np.sum(away * away, axis=-1)[:, None, None]
-    return square * np.eye(3) - away[:, :, None] * away[:, None, :]
+    """Inertia of 1 kg at `away` [m], shape (..., 3), about the origin [m²], shape (..., 3, 3)."""
+    square = np.sum(away * away, axis=-1)[..., None, None]
+    return square * np.eye(3) - away[..., :, None] * away[..., None, :]
 
 
 def _principal(tensor: Array) -> tuple[Array, Array]:

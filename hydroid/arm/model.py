@@ -6,14 +6,12 @@ from functools import cached_property
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.arm.collision import CollisionChecker
 from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
+from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
-
-Array = NDArray[np.float64]
 
 ALONE = "alone"
 """the name of the arm that is not one of two"""

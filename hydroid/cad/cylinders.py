@@ -14,13 +14,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.cad.repair import compiled
 from hydroid.cad.source import Notes
+from hydroid.parameters import Array
 from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
-Array = NDArray[np.float64]
 PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}
 """words in the names of a cylinder's links and joints"""
 

@@ -11,9 +11,9 @@ import numpy as np
 from hydroid.cad.chain import choose_chain
 from hydroid.cad.cylinders import take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.shapes import convert_meshes, distinct, sort_shapes, word
+from hydroid.cad.shapes import Array, convert_meshes, distinct, sort_shapes, word
 from hydroid.cad.source import Notes, read_source
-from hydroid.mjcf import mujoco_errors
+from hydroid.mjcf import mjcf_text, mujoco_errors
 
 SCENE = """
   <option timestep="0.01" integrator="Euler"/>
@@ -37,7 +37,7 @@ SCENE = """
     <camera name="corner" pos="0.75 -0.75 0.5" xyaxes="1 1 0 -0.5 0.5 1.5" fovy="40"/>
   </worldbody>
 """
-"""sections of an MJCF; `_in_scene` puts lights and cameras around the arm"""
+"""sections of an MJCF; `arrange` puts lights and cameras around the arm"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,31 +128,40 @@ def _clear_scene(spec: mujoco.MjSpec) -> None:
 
 def _in_scene(spec: mujoco.MjSpec, meshes: dict[str, bytes]) -> str:
     """Return the arm's MJCF with light, floor and cameras, and the pose nearest to 0 as `home`."""
-    spec.compiler.savecompiled = spec.compiler.savecanonical = False  # canonical is six digits
-    text = spec.to_xml().replace("<worldbody>", f"{SCENE}<worldbody>", 1)
+    text = mjcf_text(spec).replace("<worldbody>", f"{SCENE}<worldbody>", 1)
     with mujoco_errors(spec.modelname):
         whole = mujoco.MjSpec.from_string(text, assets=meshes)
         model = whole.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    # lights and cameras stand around the middle of the stretched arm, as far away as it reaches
-    base, tip = data.xanchor[0], data.xanchor[-1]
+    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
+    whole.add_key(name="home", qpos=np.clip(0.0, low, high))
+    arrange(whole, data.xanchor[0], data.xanchor[-1])
+    return mjcf_text(whole)
+
+
+def arrange(spec: mujoco.MjSpec, base: Array, tip: Array) -> None:
+    """Put lights and cameras around the stretched arm, as far away as it reaches; exclude contacts by design.
+
+    `base` and `tip` are its ends in the world [m], shape (3,). What touches in a named pose is close by
+    design, or its hull is wide.
+    """
+    with mujoco_errors(spec.modelname):
+        model = spec.compile()
     centre, reach = np.round(0.5 * (base + tip), 6), round(0.8 * float(np.linalg.norm(tip - base)), 6)
     if reach < 0.2 * model.stat.extent:  # one joint, or joints close together: the links reach farther
         centre, reach = np.round(model.stat.center, 6), round(0.5 * float(model.stat.extent), 6)
     if reach > 4.0:
-        whole.geom("floor").size = [round(1.25 * reach, 3)] * 2 + [0.1]
-    for light in whole.lights:
+        spec.geom("floor").size = [round(1.25 * reach, 3)] * 2 + [0.1]
+    for light in spec.lights:
         light.pos = centre - light.dir
-    for camera in whole.cameras:
+    for camera in spec.cameras:
         camera.pos = np.round(centre + 2.3 * reach * camera.pos, 3)
-    whole.stat.center, whole.stat.extent = centre, reach
-    low, high = np.where(model.jnt_limited, model.jnt_range.T, 0.0)
-    data.qpos[:] = home = np.clip(0.0, low, high)
-    whole.add_key(name="home", qpos=home)
-    mujoco.mj_forward(model, data)
-    # what touches in that pose is close by design, or its hull is wide
-    for first, second in np.unique(np.sort(model.geom_bodyid[data.contact.geom]), axis=0).tolist():
-        whole.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)
-    whole.compiler.savecompiled = whole.compiler.savecanonical = False
-    return whole.to_xml()
+    spec.stat.center, spec.stat.extent = centre, reach
+    data, pairs = mujoco.MjData(model), set[tuple[int, int]]()
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        mujoco.mj_forward(model, data)
+        pairs |= {(int(pair.min()), int(pair.max())) for pair in model.geom_bodyid[data.contact.geom]}
+    for first, second in sorted(pairs):
+        spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)

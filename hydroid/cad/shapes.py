@@ -7,13 +7,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
+from hydroid.parameters import Array
 
-Array = NDArray[np.float64]
 MESHES = "links"
 """folder of the meshes beside the model"""
 SHOWN, HIDDEN = 2, 3

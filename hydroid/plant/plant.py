@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from hydroid.arm.export import arm_mjcf, dressed_model, write_fitted
+from hydroid.arm.export import dressed_model, locked_spec, write_fitted
 from hydroid.arm.locked import lock
 from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import RunError, SettingsError
@@ -17,14 +17,13 @@ from hydroid.hydraulics.actuator import observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
+from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.chain import Chain
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import model_values
-
-Array = NDArray[np.float64]
 
 
 class Plant:
@@ -69,8 +68,7 @@ class Plant:
         if stray := wanted.difference(numbers, arm.joint_names):
             what = f"the arm has joints 1 to {len(arm.joints)}: {', '.join(arm.joint_names)}"
             raise SettingsError(what, where=f"joints {[*stray]}")
-        moving = self._active | (settings.simulation.other_joints == "passive")
-        self._moving = [name for name, moves in zip(arm.joint_names, moving, strict=True) if moves]
+        self._moving = self._active | (settings.simulation.other_joints == "passive")
         self.timestep = settings.log.period_s / settings.simulation.steps
         self.period = settings.log.period_s if period is None else period
         self._steps = round(self.period / self.timestep)
@@ -143,7 +141,7 @@ class Plant:
             self._pose = np.array(start, float)
             if self._pose.shape != self._active.shape or not np.isfinite(self._pose).all():
                 raise SettingsError(f"a pose needs {len(self._active)} finite angles [rad]", where=f"{start}")
-        locked = np.where(np.isin(settings.arm.joint_names, self._moving), 0.0, self._pose)
+        locked = np.where(self._moving, 0.0, self._pose)
         if self._locked_pose is None or not np.array_equal(locked, self._locked_pose):
             self._lock(locked)
         start_angle = self._pose[self._columns]
@@ -221,8 +219,8 @@ class Plant:
             motors, actuators = None, {"units": {name: q.unit for name, q in hydraulic.items()}}
             for joint, values in zip(names, candidate.joints[0, self._active], strict=True):
                 actuators[joint] = {name: float(values[name] / q.factor) for name, q in hydraulic.items()}
-        text = arm_mjcf(spec, self._locked, model, motors)
-        write_fitted(folder, text, self.timestep, ", ".join(names), actuators)
+        fitted = locked_spec(spec, self._locked, model, motors)
+        write_fitted(folder, fitted, self.timestep, ", ".join(names), actuators)
 
     def _advance(self, command: Array) -> None:
         commands, torque, _ = self._course

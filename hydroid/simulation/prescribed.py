@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.log import Log
+from hydroid.parameters import Array
 from hydroid.settings.problem import SimulationSettings
-
-Array = NDArray[np.float64]
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than 1e-6 of a radian"""

@@ -71,7 +71,7 @@ class Scenario:
         self.active = log.driven.copy()
         self.active[outputs] = True
         moving = self.active | (settings.other_joints != "locked")
-        self.arm: LockedArm = lock(spec, arm, np.array(arm.joint_names)[moving].tolist(), log.start)
+        self.arm: LockedArm = lock(spec, arm, moving, log.start)
         self.arm.model.opt.timestep = log.period / settings.steps
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)

@@ -53,7 +53,8 @@ def test_its_cylinder_lies_along_it(settings: FitSettings) -> None:
 
 def test_locking_the_boom_leaves_a_mass_on_a_slope(settings: FitSettings) -> None:
     """Free of its cylinder it slides down at g sin: the reduced model is the whole one."""
-    locked = lock(load_model(settings.arm), settings.arm, ["telescope"], settings.arm.pose("up"))
+    moving = np.array(settings.arm.joint_names) == "telescope"
+    locked = lock(load_model(settings.arm), settings.arm, moving, settings.arm.pose("up"))
     data = mujoco.MjData(locked.model)
     data.qpos[:] = 0.9
     mujoco.mj_forward(locked.model, data)

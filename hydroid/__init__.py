@@ -18,23 +18,23 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hydroid.commands.adapt import adapt as adapt
+    from hydroid.commands.analyse import QuantityResult as QuantityResult
     from hydroid.commands.analyse import analyse as analyse
+    from hydroid.commands.analyse import quantity as quantity
     from hydroid.commands.check import check as check
-    from hydroid.commands.convert import convert as convert
-    from hydroid.commands.design import design as design
+    from hydroid.commands.check import convert as convert
     from hydroid.commands.fit import FitResult as FitResult
     from hydroid.commands.fit import fit as fit
     from hydroid.commands.init import init as init
     from hydroid.commands.inputs import load_settings as load_settings
     from hydroid.commands.logs import read_logs as read_logs
-    from hydroid.commands.quantity import QuantityResult as QuantityResult
-    from hydroid.commands.quantity import quantity as quantity
-    from hydroid.commands.report import report as report
+    from hydroid.commands.plan import design as design
+    from hydroid.commands.plan import suggest as suggest
     from hydroid.commands.simulate import simulate as simulate
     from hydroid.commands.stages import fit_hyd as fit_hyd
     from hydroid.commands.stages import fit_mech as fit_mech
     from hydroid.commands.study import study as study
-    from hydroid.commands.suggest import suggest as suggest
+    from hydroid.commands.validate import report as report
     from hydroid.commands.validate import validate as validate
     from hydroid.commands.view import view as view
     from hydroid.errors import HydroidError as HydroidError

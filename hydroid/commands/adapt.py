@@ -56,7 +56,7 @@ def adapt(
         hint = "name parameters with --free, or fit anew with --start RUN"
         raise SettingsError("no parameter lowers the error on parts left out", where=model.source, hint=hint)
     settings = adapted(model, chosen)
-    with FitProgress(settings, "") as watcher:
+    with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out and Path(out), progress=watcher)
     rows = [vars(step) | {"parameter": step.parameter or "none"} for step in path]
     columns = {"parameter": "freed", "rms_deg": "rms [deg]", "left_out_deg": "left out [deg]"}

@@ -1,10 +1,16 @@
-"""`hydroid analyse`: what the logs determine, and what each parameter does to the response."""
+"""`hydroid analyse` and `hydroid.quantity`: what logs determine of the parameters, and of what follows."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ConfigSource,
+    LogSources,
     ModelSource,
     SettingChanges,
     Source,
@@ -14,13 +20,14 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import problem_of
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, written
+from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
-    from hydroid.commands.logs import LogSources
+    from hydroid.parameters import Array
+    from hydroid.plant import Plant
     from hydroid.posterior.profile import Profile
     from hydroid.posterior.uncertainty import Identifiability, Uncertainty
 
@@ -32,6 +39,23 @@ class Analysis:
     uncertainty: "Uncertainty"
     identifiability: "Identifiability"
     profiles: "dict[str, Profile]"
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityResult:
+    """A quantity with what a fit knows of it.
+
+    Attributes:
+        value: at the estimate, of the shape S that the function returns.
+        sd: standard deviation, shape S; infinite where the logs do not determine it.
+        interval: of 95 %, shape (S, 2).
+        unit: as given.
+    """
+
+    value: "Array"
+    sd: "Array"
+    interval: "Array"
+    unit: str = ""
 
 
 @command
@@ -56,6 +80,7 @@ def analyse(
         print(analysed.result.uncertainty.interval)
 
     Args:
+        logs (LOG): Logs of commands and joint angles [default: those of the run].
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the start values of the
             parameters].
         profile (K,D): Parameters to profile. Each point of a profile takes a refinement.
@@ -95,3 +120,45 @@ def analyse(
         parameter["profile_interval"] = [*map(finite, intervals[name])] if name in intervals else None
     lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(every, out)]
     return Result(lines, content, Analysis(known, identified, profiles))
+
+
+def quantity(
+    model: ModelSource, function: "Callable[[Plant], ArrayLike]", *, unit: str = "", positive: bool = False
+) -> QuantityResult:
+    """Compute a quantity of one's own from a fit, with its 95 % interval.
+
+        def speed(plant):
+            before = plant.reset("study")[1]
+            for _ in range(50):
+                after = plant.step({"shoulder": 50})[1]
+            return (after - before) / 0.5
+        found = hydroid.quantity("runs/a", speed, unit="rad/s")
+        print(found.value, found.interval, found.unit)
+
+    Args:
+        model: the run folder of a fit, or a plant saved from one.
+        function: takes a `Plant` and returns a number or an array. It is called with 2 p + 1 plants, p free
+            parameters, and should be smooth in them: interpolate an event between two samples.
+        unit: of the value, for the reader.
+        positive: the quantity cannot be negative; its interval is then multiplicative.
+
+    Raises:
+        RunError: the folder has no covariance of these parameters, or a simulation diverged.
+    """
+    from hydroid.plant import Plant
+    from hydroid.posterior.posterior import stored_posterior
+
+    opened = open_model(model)
+    known = stored_posterior(opened)
+    if known is None:
+        hint = "name the folder of a fit, with the settings that it used"
+        raise RunError("holds no covariance of these parameters", where=opened.source, hint=hint)
+    shape = np.shape(function(Plant(opened)))
+
+    def values(theta: "Array") -> "Array":
+        plants = (Plant(replace(opened, theta=row)) for row in theta)
+        return np.stack([np.ravel(np.asarray(function(plant), float)) for plant in plants])
+
+    found = known.propagate(values, positive)
+    ends = found.interval.reshape(*shape, 2)
+    return QuantityResult(found.value.reshape(shape), found.sd.reshape(shape), ends, unit)

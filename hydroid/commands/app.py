@@ -13,8 +13,8 @@ from typer.core import TyperGroup
 
 import hydroid
 from hydroid.commands.console import log_lines, show, show_error
-from hydroid.commands.options import COMMAND_LINES, NAMED
-from hydroid.commands.progress import listen, shown, stopped
+from hydroid.commands.options import COMMAND_LINES
+from hydroid.commands.progress import VISIBLE, listen, stopped
 from hydroid.errors import HydroidError
 
 if TYPE_CHECKING:
@@ -46,18 +46,6 @@ GROUPS = {
 }
 """every command with a summary, by the heading of its group"""
 COMMANDS = [name for commands in GROUPS.values() for name in commands]
-OUT = {
-    "fit-mech": NAMED,
-    "fit-hyd": NAMED,
-    "adapt": "runs/adapt",
-    "validate": "runs/validate",
-    "analyse": "runs/analyse",
-    "report": "runs/report",
-    "suggest": "runs/suggest",
-    "design": "runs/design",
-    "simulate": "runs/simulated.csv",
-}
-"""where a command writes without --out; in Python nothing is written then"""
 PLAIN: Any = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 """of typer's apps; plain help: importing rich would triple the time it takes"""
 PRINTING = {
@@ -95,8 +83,10 @@ def click_command(command: str) -> "TyperCommand":
     text, example, parameters = COMMAND_LINES[function]
 
     def run(json: bool, quiet: bool, verbose: bool, **given: Any) -> None:
-        with log_lines(verbose=verbose, quiet=quiet), shown(not (quiet or json)):
-            given |= {"out": given["out"] or OUT[command]} if command in OUT else {}
+        if given.get("out", "") is None and command != "view":  # in Python nothing is written then
+            given["out"] = "runs/simulated.csv" if command == "simulate" else f"runs/{command}"
+        VISIBLE.set(not (quiet or json))
+        with log_lines(verbose=verbose, quiet=quiet):
             result = function(**given)
         if json or not quiet:
             show(result, as_json=json, verbose=verbose)

@@ -1,18 +1,29 @@
-"""`hydroid check`: what is wrong or unusual about logs."""
+"""`hydroid check` and `hydroid convert`: what is wrong or unusual about logs, and logs as plain CSV."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from hydroid.commands.inputs import ConfigSource, SettingChanges, as_list, load_settings
+import numpy as np
+
+from hydroid.commands.console import Result
+from hydroid.commands.inputs import (
+    ConfigSource,
+    LogSources,
+    SettingChanges,
+    Source,
+    as_list,
+    load_settings,
+    refuse_overwriting,
+)
 from hydroid.commands.logs import check_file, named, plain_findings
 from hydroid.commands.options import command
-from hydroid.commands.result import Result
+from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
-    from hydroid.commands.logs import LogSources
-    from hydroid.log import Log, LogFinding
+    from hydroid.log import ColumnGuess, Log, LogFinding
 
 
 class LogCheck(NamedTuple):
@@ -29,6 +40,13 @@ class LogCheck(NamedTuple):
     log: "Log | None"
     findings: "Sequence[LogFinding]"
     moved_deg: Mapping[str, float]
+
+
+class Converted(NamedTuple):
+    """What was written, and what each column was taken for; None where settings say it."""
+
+    log: "Log"
+    guess: "ColumnGuess | None"
 
 
 @command
@@ -50,31 +68,98 @@ def check(
     settings = load_settings(config, set)
     from hydroid.log import driven_joints, grouped, motion_findings
 
-    names, checks = settings.arm.joint_names, list[LogCheck]()
+    names, slides = settings.arm.joint_names, settings.arm.slides
+    checks, rows, sizes = list[LogCheck](), list[dict[str, Any]](), list[str]()
     for path in map(Path, as_list(logs)):
-        log, faults = check_file(path, settings, repair=repair)
-        moved, found = {}, list(faults)
+        log, findings = check_file(path, settings, repair=repair)
+        moved, driven, samples, duration = dict[str, float](), list[str](), None, None
         if log is not None:
-            moved = {names[joint - 1]: motion.travel for joint, motion in driven_joints(log).items()}
-            found += named(motion_findings(log), names)
-        checks.append(LogCheck(path, log, found, moved))
-    findings = [finding for one in checks for finding in one.findings]
-    findings.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
-    lines = [f"{level}: {line}" for level, line in grouped(findings)]
-    content: dict[str, Any] = {"logs": []}
-    for one in checks:
-        size = {"samples": one.log and len(one.log.time), "duration_s": one.log and float(one.log.duration)}
-        driven = [] if one.log is None else [n for n, d in zip(names, one.log.driven, strict=True) if d]
-        content["logs"].append(
-            {"log": str(one.path), "usable": one.log is not None, **size, "driven_joints": driven}
-            | {"moved_deg": dict(one.moved_deg), "findings": plain_findings(one.findings)}
-        )
-        if one.log is not None:
-            ways = one.moved_deg.items()
-            slides = {names[j - 1] for j in settings.arm.slides}
-            shown = [f"{n} by {f'{radians(d):.3g} m' if n in slides else f'{d:.3g} deg'}" for n, d in ways]
-            moved = ", ".join(shown) or "nothing"
-            length = f"{len(one.log.time)} samples, {one.log.duration:.2f} s"
-            lines.append(f"{one.path}: {length}; driven and moved: {moved}")
-    exit_status = 0 if all(one.log for one in checks) else 2
-    return Result(lines, content, checks, exit_status=exit_status)
+            findings = [*findings, *named(motion_findings(log), names)]
+            travels = {joint: motion.travel for joint, motion in driven_joints(log).items()}
+            moved = {names[joint - 1]: travel for joint, travel in travels.items()}
+            driven = [name for name, one in zip(names, log.driven, strict=True) if one]
+            samples, duration = len(log.time), float(log.duration)
+            ways = [
+                f"{names[j - 1]} by {f'{radians(d):.3g} m' if j in slides else f'{d:.3g} deg'}"
+                for j, d in travels.items()
+            ]
+            moves = ", ".join(ways) or "nothing"
+            sizes.append(f"{path}: {samples} samples, {duration:.2f} s; driven and moved: {moves}")
+        row = {"log": str(path), "usable": log is not None, "samples": samples, "duration_s": duration}
+        rows.append(row | {"driven_joints": driven, "moved_deg": moved, "findings": plain_findings(findings)})
+        checks.append(LogCheck(path, log, findings, moved))
+    every = [finding for one in checks for finding in one.findings]
+    every.sort(key=lambda finding: ("error", "warning", "note").index(finding.level))
+    lines = [f"{level}: {line}" for level, line in grouped(every)]
+    exit_status = 0 if len(sizes) == len(checks) else 2
+    return Result([*lines, *sizes], {"logs": rows}, checks, exit_status=exit_status)
+
+
+@command
+def convert(
+    log: "Source",
+    *,
+    out: "Source",
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
+) -> Result[Converted]:
+    """Write a log of any format as the CSV that every command reads: time [s], commands [%], angles [deg].
+
+    With --config the CSV holds the data as a fit uses them: resampled to log.period_s, commands delayed by
+    log.delay_s, signs and units applied. Joints that are measured but not commanded have commands of 0 %.
+
+    Example: hydroid convert LOG.mat --out LOG.csv
+
+        hydroid.convert("a.mat", out="a.csv", config="my-fit.yaml")
+
+    Args:
+        log (LOG): CSV, .mat, Parquet, ROS bag or MCAP.
+        out (OUT.csv): The CSV to write.
+        config (YAML): Settings that map the columns (`log`): a file, or the name of a shipped config
+            [default: the columns are guessed, and each guess is printed].
+        set (KEY=VALUE): Replace a setting of --config.
+
+    Raises:
+        LogError: the log cannot be used.
+        SettingsError: `out` would overwrite the log, or a setting that is not allowed.
+        RunError: `out` cannot be written.
+    """
+    from hydroid.log import guess_columns, open_table, read_log, write_log
+
+    path, guess, lines = Path(log), None, list[str]()
+    refuse_overwriting(path, out)
+    if config is not None or set:
+        settings = load_settings(config or "fit-mech", set)
+        layout, ranges = settings.log, settings.arm.ranges
+    else:
+        most = [f"joint{number}" for number in range(1, 13)]  # more joints than an arm has
+        guess = guess_columns(open_table(path, LogSettings()), most)
+        layout = LogSettings.model_validate(guess.log)
+        ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
+        lines = [*guess.reasons] + ([f"not used: {', '.join(guess.unused)}"] if guess.unused else [])
+    read, findings = read_log(path, layout, ranges, repair=repair)
+    write_log(Path(out), read, _plain_layout(read), exact=True)
+    lines += [f"{finding.level}: {finding}" for finding in findings]
+    lines.append(f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s")
+    content = {
+        "out": str(out),
+        "samples": len(read.time),
+        "duration_s": read.duration,
+        "period_s": read.period,
+        "findings": plain_findings(findings),
+        "log": guess and guess.log,
+        "reasons": [*guess.reasons] if guess else [],
+    }
+    return Result(lines, content, Converted(replace(read, source=str(out)), guess))
+
+
+def _plain_layout(log: "Log") -> LogSettings:
+    """Return the default columns of what a log holds: commands, angles, pressures of both chambers."""
+    columns: dict[int, dict[str, None] | None] = {}
+    for joint, measured in enumerate(log.measured):
+        absent: dict[str, None] = {} if measured else {"angle": None}
+        if log.pressure is None or np.isnan(log.pressure[0, joint]).any():
+            absent["pressure"] = None
+        columns[joint + 1] = absent if measured or log.driven[joint] else None
+    return LogSettings.model_validate({"pressure": {}, "joints": columns})

@@ -1,17 +1,22 @@
-"""What a command prints: tables and lines, or JSON; log lines and errors."""
+"""What a command returns, and how a terminal, JSON and a notebook show it; log lines and errors."""
 
 import json
 import logging
 import sys
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import typer
 
 from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
-    from hydroid.commands.result import Printed
+    from hydroid.reporting.page import Page
+    from hydroid.reporting.table import Table
 
 OPTIONS = {
     "search.algorithm": "--algorithm",
@@ -24,8 +29,77 @@ OPTIONS = {
 }
 """settings that have an option of their own"""
 
+T_co = TypeVar("T_co", covariant=True)
 
-def show(result: "Printed", *, as_json: bool, verbose: bool = False) -> None:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Printed:
+    """What prints itself.
+
+    Attributes:
+        lines: what a terminal and a notebook show: tables and sentences.
+        content: what JSON holds (docs/json.md): mappings, lists, text and finite numbers.
+        details: further lines that -v adds.
+    """
+
+    lines: "Sequence[Table | str]"
+    content: Mapping[str, Any]
+    details: "Sequence[Table | str]" = field(default=(), kw_only=True)
+    exit_status = 0
+
+    def plain(self) -> dict[str, Any]:
+        """Return what JSON holds."""
+        return dict(self.content)
+
+    def __repr__(self) -> str:
+        text = next((line for line in self.lines if isinstance(line, str)), "")
+        return f"<{type(self).__name__}: {text}>"
+
+    def _repr_html_(self) -> str:
+        return "".join(_html(line) for line in (*self.lines, *self.details))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Printed, Generic[T_co]):
+    """The result of a command.
+
+    Attributes:
+        result: the numbers.
+        page: the report, with its tables by name in `page.tables`, of a command that has one.
+        exit_status: of the command; 0 for success.
+    """
+
+    result: T_co
+    page: "Page | None" = None
+    exit_status: int = 0
+
+
+def written(report: "Page | Mapping[str, Table]", out: str | Path | None) -> list[str]:
+    """Write a report, or tables by name, to a folder, if there is one; return the file that is written last.
+
+    Raises:
+        RunError: the folder cannot be written.
+    """
+    if out is None:
+        return []
+    from hydroid.reporting.page_file import write_page, write_tables
+
+    write = write_tables if isinstance(report, Mapping) else write_page
+    return [*map(str, write(report, Path(out))[-1:])]  # pyright: ignore[reportArgumentType]
+
+
+def _html(line: "Table | str") -> str:
+    if isinstance(line, str):
+        return f"<p>{escape(line)}</p>"
+
+    def row(kind: str, cells: Sequence[str]) -> str:
+        return f"<tr>{''.join(f'<{kind}>{escape(cell)}</{kind}>' for cell in cells)}</tr>"
+
+    body = "".join(row("td", cells) for cells in line.shown)
+    return f"<table><caption>{escape(line.title)}</caption>{row('th', line.header)}{body}</table>"
+
+
+def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
     """Print a result: as JSON, or as tables and lines, with its details if `verbose`."""
     if as_json:
         _print_json(result.plain())

@@ -1,16 +1,15 @@
 """Fit one problem, with settings and logs that are read: `hydroid.fit`."""
 
-import logging
 import shlex
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.commands.inputs import Source
+from hydroid.commands.console import Printed
+from hydroid.commands.inputs import LogSource, LogSources, Source
 from hydroid.commands.logs import read_logs
-from hydroid.commands.result import Printed
-from hydroid.errors import RunError, SettingsError, Stopped
+from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
@@ -18,8 +17,7 @@ from hydroid.settings.fit import FitSettings
 if TYPE_CHECKING:
     import pandas
 
-    from hydroid.commands.logs import LogSource, LogSources
-    from hydroid.commands.result import Result
+    from hydroid.commands.console import Result
     from hydroid.fitting.fit import Fit, Watcher
     from hydroid.fitting.validation import Prediction
     from hydroid.fitting.verdict import Baselines
@@ -27,8 +25,6 @@ if TYPE_CHECKING:
     from hydroid.problem.problem import Problem, Spread
     from hydroid.reporting.table import Table
     from hydroid.run.folder import RunFolder
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,7 +39,6 @@ class FitResult(Printed):
         model: at the final estimate.
         predictions: what its estimates make of its logs.
         baselines: fitted to the same logs, by joint and name.
-        runs: of several seeds all results, of which this is the best.
     """
 
     problem: "Problem"
@@ -53,7 +48,6 @@ class FitResult(Printed):
     model: IdentifiedModel
     predictions: "tuple[Prediction, ...]"
     baselines: "Baselines"
-    runs: "tuple[FitResult, ...]" = ()
 
     def plant(self, **how: Any) -> "Plant":
         """Return the identified arm to be stepped; the keywords are those of `Plant`."""
@@ -153,18 +147,7 @@ def fit(
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)
     with folder.owned():
-        began = time.monotonic()
-        try:
-            result = _fit_in(folder, problem, progress)
-        except KeyboardInterrupt:
-            _log.info("interrupted after %.0f s", time.monotonic() - began)
-            kept = folder.interrupt()
-            raise Stopped(kept and f"{kept}; the same command with --resume continues") from None
-        except Exception as error:
-            _log.error("ended by %s: %s", type(error).__name__, error)
-            raise
-        _log.info("done in %.0f s", time.monotonic() - began)
-    return result
+        return _fit_in(folder, problem, progress)
 
 
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
@@ -201,9 +184,8 @@ def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None")
     from hydroid.run.process import log_start
     from hydroid.run.record import fit_result, save_result
 
-    log_start(problem.settings, problem.logs)
-    checkpoints = folder.begin_or_continue(problem.settings, problem.logs)
-    fit = run_fit(problem, progress, checkpoints)
+    log_start()
+    fit = run_fit(problem, progress, folder.begin(problem.settings, problem.logs))
     result = _result(problem, fit, folder.path)
     folder.write_estimate(problem.logs[0], fit.best.theta, result.summary)
     began = time.monotonic()

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hydroid.commands.console import Result
 from hydroid.commands.inputs import Source, as_list
 from hydroid.commands.options import command, names
-from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
 

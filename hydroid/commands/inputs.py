@@ -3,9 +3,10 @@
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hydroid.errors import SettingsError
+from hydroid.estimate import FitSummary, read_values
 from hydroid.files import find_config
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.progress import NOTE
@@ -13,38 +14,14 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
 if TYPE_CHECKING:
-    from hydroid.fitting.validation import Prediction
-    from hydroid.fitting.verdict import Baselines
-    from hydroid.problem.problem import Problem
-
-
-class Fitted(Protocol):
-    """What a fit returns, as far as commands read it (`commands.fit.FitResult`)."""
-
-    @property
-    def model(self) -> IdentifiedModel:
-        """At the final estimate."""
-        ...
-
-    @property
-    def problem(self) -> "Problem":
-        """The logs and the model."""
-        ...
-
-    @property
-    def predictions(self) -> "tuple[Prediction, ...]":
-        """Of its own logs."""
-        ...
-
-    @property
-    def baselines(self) -> "Baselines":
-        """Fitted to the same logs."""
-        ...
-
+    from hydroid.commands.fit import FitResult
+    from hydroid.log import Log
 
 Source = str | Path
 ConfigSource = str | Path | FitSettings
-ModelSource = str | Path | IdentifiedModel | Fitted
+LogSource: TypeAlias = "str | Path | Log"
+LogSources: TypeAlias = "LogSource | Sequence[LogSource] | None"
+ModelSource: TypeAlias = "str | Path | IdentifiedModel | FitResult"
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 
@@ -82,7 +59,7 @@ def load_settings(config: ConfigSource, overrides: SettingChanges = None) -> Fit
 
 
 def open_model(
-    fit: ModelSource | None,
+    fit: "ModelSource | None",
     config: ConfigSource | None = None,
     overrides: SettingChanges = None,
     *,
@@ -99,19 +76,26 @@ def open_model(
         return fit if isinstance(fit, IdentifiedModel) else fit.model
     if isinstance(config, FitSettings):
         raise SettingsError("settings that are read make a model with `identified`", where="config")
-    default = {"default": "fit-hyd"} if nominal else {}
-    model = load_identified(fit, config, setting_changes(overrides), nominal=nominal, **default)
+    default = "fit-hyd" if nominal else "fit-mech"
+    model = load_identified(fit, config, setting_changes(overrides), nominal=nominal, default=default)
     if model.nominal:
-        require_hydraulics(model)
+        if model.settings.stage != "hyd":
+            hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
+            raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
         _log.log(NOTE, "note: nominal values for %s", ", ".join(model.nominal) if fit else "all parameters")
     return model
 
 
-def require_hydraulics(model: IdentifiedModel) -> None:
-    """Refuse a model of stage 1."""
-    if model.settings.stage != "hyd":
-        hint = "give a fit of stage 2 with --fit, or use --config fit-hyd"
-        raise SettingsError("stage 1 (mech) does not model the actuators", where=model.source, hint=hint)
+def open_values(fit: ModelSource) -> tuple[dict[str, Any], FitSummary | None]:
+    """Return the values of an estimate by name, and the fit's own account of them where there is one.
+
+    Raises:
+        RunError, SettingsError: as of `read_values`.
+    """
+    if isinstance(fit, str | Path):
+        return read_values(Path(fit))
+    model = open_model(fit)
+    return model.values, model.summary
 
 
 def refuse_overwriting(source: Any, out: Source | None) -> None:

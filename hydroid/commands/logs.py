@@ -9,25 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydroid.commands.inputs import as_list
+from hydroid.commands.inputs import LogSource, LogSources, as_list
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file
 from hydroid.identified_model import IdentifiedModel
 from hydroid.progress import NOTE
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:
     from hydroid.log import Log, LogFinding
     from hydroid.problem.problem import Problem
 
-    LogSource = str | Path | Log
-    LogSources = LogSource | Sequence[LogSource] | None
-
 _log = logging.getLogger(__name__)
 
 
 def read_logs(
-    logs: "LogSources", settings: FitSettings, *, repair: bool = False, angles: bool = True
+    logs: LogSources, settings: FitSettings, *, repair: bool = False, angles: bool = True
 ) -> "list[Log]":
     """Read logs as the settings map them; warnings and notes go to the `hydroid` logger.
 
@@ -75,11 +73,10 @@ def check_file(
 
 
 def named(findings: "Sequence[LogFinding]", names: Sequence[str]) -> "list[LogFinding]":
-    """Return findings that call joints by their names."""
+    """Return findings that call joints by their names, as subjects and after the word joint."""
     by_number = {str(number): name for number, name in enumerate(names, start=1)}
 
     def name(text: Any) -> Any:
-        """Name a joint's number, and those that follow the word joint in what a finding states."""
         if not isinstance(text, str):
             return text
         return re.sub(r"(?<=joint )\d+", lambda found: by_number.get(found[0], found[0]), text)
@@ -101,7 +98,7 @@ def plain_findings(findings: "Sequence[LogFinding]") -> list[dict[str, str]]:
 
 
 def read_arms(
-    log: "LogSource",
+    log: LogSource,
     settings: FitSettings,
     arm: str | None,
     *,
@@ -133,23 +130,24 @@ def read_arms(
     moving = (ALONE,) if arm is None else SIDES if arm == "both" else (arm,)
     columns = settings.log.angles_only() if angles else settings.log
     names = open_table(Path(log), settings.log).names if isinstance(log, str | Path) and arm else ()
-    apart = any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names)
-    logs: dict[str, Log] = {}
-    for side in moving if apart else moving[:1]:
-        layout = {"log": columns.of_arm(side) if apart else columns} | ({"outputs": ()} if angles else {})
+
+    def read(columns: LogSettings) -> "Log":
+        layout = {"log": columns} | ({"outputs": ()} if angles else {})
         (one,) = read_logs(log, settings.changed(layout), repair=repair, angles=angles)
         stand = one.angle if pose is None else np.zeros_like(one.angle) + settings.arm.pose(pose)
-        logs[side] = replace(one, angle=stand)
-    return {side: logs.get(side, logs[moving[0]]) for side in moving}
+        return replace(one, angle=stand)
+
+    if any(name.startswith(tuple(f"{side}_" for side in SIDES)) for name in names):
+        return {side: read(columns.of_arm(side)) for side in moving}
+    return dict.fromkeys(moving, read(columns))
 
 
-def run_logs(run: str | Path | IdentifiedModel) -> list[Path]:
+def run_logs(folder: Path) -> list[Path]:
     """Return the logs that a run folder was fitted to.
 
     Raises:
         SettingsError: it is no run folder. RunError: a log is not there.
     """
-    folder = Path(run.source).parent if isinstance(run, IdentifiedModel) else Path(run)
     if not is_file(folder / "run.json"):
         hint = "name one, as in hydroid suggest LOG.csv --fit RUN, or give a run folder as --fit"
         raise SettingsError("no log is given", hint=hint)
@@ -162,13 +160,13 @@ def run_logs(run: str | Path | IdentifiedModel) -> list[Path]:
     return logs
 
 
-def problem_of(model: IdentifiedModel, logs: "LogSources", *, repair: bool = False) -> "Problem":
+def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given.
 
     Raises:
         RunError: the simulation diverges at the model's parameters.
     """
-    read = read_logs(logs or run_logs(model), model.settings, repair=repair)
+    read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
     from hydroid.problem.problem import Problem
 
     problem = Problem(model.settings, read)

@@ -7,42 +7,33 @@ parameters of several commands are stands in `SHARED`. Those before `*` need no 
 import inspect
 import re
 from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, TypeVar
 
 import typer
 
 P = ParamSpec("P")
-T = TypeVar("T")
 R = TypeVar("R")
 
-NAMED = "runs/LOG-STAGE-ALGORITHM"
-"""run folder named after its log, stage and algorithm"""
-
 SHARED = """
-    logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP [default: those of the
-        run that is judged or resumed].
+    logs (LOG): Logs of commands and joint angles: CSV, .mat, Parquet, ROS bags, MCAP.
     fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), an estimate.yaml, or a
         YAML file of values by name.
     out (DIR): Folder for page and tables [default: runs/COMMAND on the command line; in Python nothing is
         written].
-    config (YAML): Settings: a file, or the name of a shipped config [default: config.yaml in the folder of
-        the estimate, or else fit-mech; fit-hyd for stage 2].
+    config (YAML): Settings: a file, or the name of a shipped config. A run brings its own.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files themselves
         stay as they are.
     seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
     dask (local[:N]|ADDRESS): Simulate in N processes of this machine, or on the workers of the Dask
         scheduler at ADDRESS. The result is the same.
-    dask_insecure: Accept a scheduler without TLS. Anyone who can reach its port can then run code as you.
     arm (right|left|both): Simulate the two-arm machine of the arm's file; the value names the arms that move.
         Columns such as right_u2_pct and left_q2_deg belong to one arm. All others apply to every arm that
         moves.
     pose (NAME): The start pose, one of the arm's file [default: the first angles of the log].
 
     algorithm (NAME): Search: ga, nsga2 or multistart.
-    runs (1 to 10000): Number of runs, with the seeds SEED, SEED + 1, ...
     start (RUN|YAML): Start the search from the values of an estimate.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
@@ -81,20 +72,6 @@ def command(function: Callable[P, R]) -> Callable[P, R]:
     return function
 
 
-def taking(options: Callable[P, T]) -> Callable[[Callable[[T], R]], Callable[P, R]]:
-    """Let the fields of a dataclass be the parameters of a function that takes it."""
-
-    def with_fields(function: Callable[[T], R]) -> Callable[P, R]:
-        @wraps(function)
-        def called(*arguments: P.args, **named: P.kwargs) -> R:
-            return function(options(*arguments, **named))
-
-        called.__signature__ = inspect.signature(options)  # pyright: ignore[reportAttributeAccessIssue]
-        return called
-
-    return with_fields
-
-
 def _entries(text: str) -> dict[str, tuple[str, str]]:
     """Return VALUE and text of the parameters that a docstring describes."""
     found = re.findall(r"^ {4}(\w+)(?: \((.+?)\))?: (.*(?:\n {8}.*)*)", text, re.MULTILINE)
@@ -103,8 +80,7 @@ def _entries(text: str) -> dict[str, tuple[str, str]]:
 
 def _typed(parameter: inspect.Parameter, value: str, text: str) -> inspect.Parameter:
     """Return a parameter as typer takes it."""
-    given = parameter.annotation
-    names = re.findall(r"\w+", given.__name__ if isinstance(given, type) else str(given))
+    names = re.findall(r"\w+", inspect.formatannotation(parameter.annotation))
     one = next(TERMINAL[name] for name in names if name in TERMINAL)
     kind = list[one] if {"Sequence", "LogSources", "SettingChanges"} & {*names} else one
     default = None if parameter.default == () else parameter.default

@@ -8,8 +8,6 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Generator
-from contextlib import contextmanager
 from contextvars import ContextVar
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
@@ -22,7 +20,9 @@ if TYPE_CHECKING:
 
 NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))
 
-_visible: ContextVar[bool] = ContextVar("visible", default=False)
+VISIBLE: ContextVar[bool] = ContextVar("visible", default=False)
+"""whether progress is shown: the command line sets it"""
+
 _stopped = False
 
 
@@ -49,26 +49,11 @@ def _stop(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-@contextmanager
-def shown(visible: bool) -> Generator[None]:
-    """Show progress, as the command line does."""
-    token = _visible.set(visible)
-    try:
-        yield
-    finally:
-        _visible.reset(token)
-
-
 class Progress:
-    """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context.
+    """Shows the progress of a command, as `hydroid.progress.Progress`; use it as a context."""
 
-    Args:
-        label: stands before each line.
-    """
-
-    def __init__(self, label: str = "") -> None:
-        self._label, self._bar = label, None
-        self._shown = time.monotonic()
+    def __init__(self) -> None:
+        self._bar, self._shown = None, time.monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -81,9 +66,9 @@ class Progress:
         """Show what is being done, how much of it is done, and how much there is."""
         if _stopped:
             raise KeyboardInterrupt
-        if not _visible.get():
+        if not VISIBLE.get():
             return
-        line = f"{self._label} {what} {done:.0f}".strip()
+        line = f"{what} {done:.0f}"
         if sys.stderr.isatty():
             self._bar = self._bar or _new_bar()
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=line, text=text)
@@ -94,31 +79,21 @@ class Progress:
 
 
 class FitProgress(Progress):
-    """Shows the progress of a fit, as `fitting.fit.Watcher`.
+    """Shows the progress of a fit with its settings, as `fitting.fit.Watcher`."""
 
-    Args:
-        settings: of the fit.
-        label: stands before each line, where several runs follow each other.
-    """
-
-    def __init__(self, settings: "FitSettings", label: str) -> None:
+    def __init__(self, settings: "FitSettings") -> None:
+        super().__init__()
         search, self._joints = settings.search, settings.arm.joint_names
-        names = {"ga": "GA", "nsga2": "NSGA-II", "multistart": "multi-start"}
-        super().__init__(label)
-        what = "start" if search.algorithm == "multistart" else "population"
-        self._step = f"{names[search.algorithm]} {what}"
+        names = {"ga": "GA population", "nsga2": "NSGA-II population", "multistart": "multi-start start"}
+        self._step = names[search.algorithm]
         self._total = 1 + getattr(search, search.algorithm).generations
         self._scale, self._unit = (1.0, "") if settings.objective.relative else (math.degrees(1), " deg")
-        self._began, self._before = time.monotonic(), -1.0
 
     def generation(self, row: "Array") -> None:
         """Take a row of `fitting.search.HISTORY`."""
         number, _, simulated, _, best, _ = map(float, row)
-        if self._before < 0:  # a resumed run's rate counts from here
-            self._before = simulated if number > 1 else 0.0
-        rate = (simulated - self._before) / max(time.monotonic() - self._began, 1e-9)
-        best_text = f"best {best * self._scale:.4g}{self._unit}"
-        self(self._step, number, self._total, f"{best_text}, {rate:.0f} simulations/s")
+        text = f"best {best * self._scale:.4g}{self._unit}, {simulated:.0f} simulations"
+        self(self._step, number, self._total, text)
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
@@ -130,12 +105,11 @@ class FitProgress(Progress):
 
 def _new_bar() -> Any:
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
+    from rich.progress import TextColumn
 
-    texts = TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.fields[text]}")
-    times = TimeElapsedColumn(), TimeRemainingColumn()
-    bar = Bar(*texts, *times, console=Console(stderr=True), transient=True)
+    text = TextColumn("{task.fields[text]}")
+    bar = Bar(*Bar.get_default_columns(), text, console=Console(stderr=True), transient=True)
     bar.add_task("", total=None, text="")
     bar.start()
     return bar

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
     ModelSource,
@@ -16,7 +17,6 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import read_arms
 from hydroid.commands.options import command
-from hydroid.commands.result import Result
 
 if TYPE_CHECKING:
     from hydroid.log import Log

@@ -1,17 +1,16 @@
 """`hydroid study`: settings compared over many seeds."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import Source
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, written
 from hydroid.errors import Stopped
 from hydroid.settings.study import load_study
 
@@ -25,8 +24,6 @@ def study(
     *,
     out: "Source" = "runs/study",
     processes: int = 0,
-    dask: str | None = None,
-    dask_insecure: bool = False,
 ) -> "Result[tuple[Row, ...]]":
     """Compare settings over many seeds.
 
@@ -50,21 +47,17 @@ def study(
     path, folder = Path(file), Path(out)
     load_study(path)  # a wrong file is refused before anything heavy is imported
     from hydroid.estimate import finite
-    from hydroid.parallel.cluster import open_workers
     from hydroid.reporting.table import Table
     from hydroid.run.process import locked
     from hydroid.studies import processes as open_processes
     from hydroid.studies import run_study
 
-    with locked(folder), open_workers(dask, insecure=dask_insecure) as workers:
-        pool = nullcontext(workers.executor()) if workers else open_processes(processes)
-        try:
-            with pool as executor, Progress() as progress:
-                runs = run_study(path, folder, read_logs, executor, progress)
-        except KeyboardInterrupt:
-            count = len(list(folder.glob("runs/*.json")))
-            kept = f"{folder} holds {count} runs that have ended; the same command goes on"
-            raise Stopped(kept) from None
+    try:
+        with locked(folder), open_processes(processes) as executor, Progress() as progress:
+            runs = run_study(path, folder, read_logs, executor, progress)
+    except KeyboardInterrupt:
+        count = len(list(folder.glob("runs/*.json")))
+        raise Stopped(f"{folder} holds {count} runs that have ended; the same command goes on") from None
     each = [
         {"cell": row.cell, "seed": row.seed, "failed": row.failed or None}
         | {name: finite(value) for name, value in row.values.items()}

@@ -1,23 +1,21 @@
-"""`hydroid validate`: fits on logs that they were not fitted to."""
+"""`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to; reports drawn anew."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.commands.inputs import ModelSource, SettingChanges, Source, as_list, open_model
+from hydroid.commands.console import Result, written
+from hydroid.commands.fit import FitResult
+from hydroid.commands.inputs import LogSources, ModelSource, SettingChanges, Source, as_list, open_model
 from hydroid.commands.logs import read_logs
 from hydroid.commands.options import command
-from hydroid.commands.result import Result, written
 from hydroid.errors import SettingsError
-from hydroid.estimate import NAME
 from hydroid.identified_model import IdentifiedModel
 
 if TYPE_CHECKING:
-    from hydroid.commands.logs import LogSources
     from hydroid.fitting.validation import Prediction
     from hydroid.log import Log
-
+    from hydroid.run.record import Record
 
 MOST_ROWS = 12
 """joints of all fits that a terminal shows; of more those of the best fit"""
@@ -67,8 +65,8 @@ def validate(
     from hydroid.reporting.page import unique
     from hydroid.reporting.validation_report import validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
-    from hydroid.run.identity import log_hash, was_fitted
-    from hydroid.run.record import fitted_by, keep_validation
+    from hydroid.run.identity import log_hash
+    from hydroid.run.record import fitted_by, keep_validation, run_of
 
     results, verdicts = dict[str, Any](), dict[str, Any]()
     for one, model, own in zip(given, models, read, strict=True):
@@ -76,14 +74,10 @@ def validate(
         if leave_one_out:
             fitted, baselines, predictions = _left_out(model, own)
         else:
-            if isinstance(one, str | Path | IdentifiedModel):
-                fitted, baselines = fitted_by(model)
-                seen = [was_fitted(Path(model.source).parent, log) for log in own]
-            else:
-                fitted, baselines = one.predictions, one.baselines
-                hashes = {log_hash(log) for log in one.problem.logs}
-                seen = [log_hash(log) in hashes for log in own]
-            new = [None if known is None else not known for known in seen]
+            fitted, baselines, hashes = fitted_by(model)
+            if isinstance(one, FitResult):
+                fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
+            new = [None if hashes is None else log_hash(log) not in hashes for log in own]
             predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
             if out is not None and (run := keep_validation(model, predictions)):
                 draw(run)
@@ -95,8 +89,8 @@ def validate(
     every = [prediction for name in fits for prediction in results[name]]
     best = next(iter(fits))
     model, steps = models[[*results].index(best)], list[Any]()
-    if Path(model.source).name == NAME:
-        steps.append(next_step(model.settings, fits[best], str(Path(model.source).parent)))
+    if run := run_of(model):
+        steps.append(next_step(model.settings, fits[best], str(run)))
     page = validation_page(every, fits, arm, *steps)
     content = {
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
@@ -117,3 +111,55 @@ def _left_out(model: "IdentifiedModel", logs: "Sequence[Log]") -> Any:
     predictions = [predicted(fold, log, unseen=True) for fold, log in zip(folds, logs, strict=True)]
     fitted = [predicted(model, log, unseen=False) for log in logs]
     return fitted, baselines_of(model.settings, logs), predictions
+
+
+@command
+def report(
+    runs: "Source | Sequence[Source]",
+    *,
+    merge: bool = False,
+    without: Sequence[str] = (),
+    figures: bool = False,
+    out: "Source | None" = None,
+) -> "Result[tuple[Record, ...]]":
+    """Draw the reports of finished runs anew, or merge runs of one fit with different seeds.
+
+    Nothing is simulated, and no log is needed: a run stores all that its report shows, which is written again
+    in its folder. `hydroid validate` compares several fits.
+
+    Example: hydroid report runs/mech runs/hyd
+
+        hydroid.report(["runs/mech", "runs/hyd"])
+        print(hydroid.report("runs/array/seed-*", merge=True).content["best"])
+
+    Args:
+        runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
+        merge: The folders are runs of one fit with different seeds: show median and spread of their
+            estimates. Runs that are not finished or damaged are left out, with a warning.
+        without (NAME): Leave out a validation of the run; repeat for several.
+        figures: Also write every chart as PNG and SVG, to figures/.
+        out (DIR): Folder for the tables of --merge.
+
+    Raises:
+        RunError: a folder holds no finished run of this version, runs to be merged differ in more than their
+            seeds, or the page cannot be written.
+    """
+    if not merge:
+        from hydroid.reporting.fit_report import draw
+
+        files = [str(draw(run, without or (), figures=figures)) for run in as_list(runs)]
+        return Result(files, {"files": files}, ())
+    from hydroid.reporting.validation_report import merged_tables
+    from hydroid.run.collection import read_runs
+
+    collected = read_runs([str(run) for run in as_list(runs)], out)
+    tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)
+    line = f"smallest error: {best.folder} (seed {best.seed}, rms {best.rms_deg:.4g} deg)"
+    spread = tables["spread"]
+    content = {
+        "out": out and str(out),
+        "best": best.folder,
+        "runs": {run.folder: {"seed": run.seed, "rms_deg": run.rms_deg} for run in collected},
+        "parameters": [dict(zip(spread.header, row, strict=True)) for row in spread.rows],
+    }
+    return Result([spread, line, *written(tables, out)], content, collected)

@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hydroid.commands.console import Result
 from hydroid.commands.inputs import (
     ConfigSource,
     ModelSource,
@@ -15,7 +16,6 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_arms, run_logs
 from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result
 from hydroid.errors import SettingsError
 from hydroid.files import is_file, write_atomic
 from hydroid.viewer import choose_platform
@@ -69,7 +69,7 @@ def view(
         if fit is not None:
             hint = f"name a log, or leave out --fit {fit}"
             raise SettingsError("is a run itself", where=str(source), hint=hint)
-        fit, log = source, run_logs(source)[0]
+        fit, log = source, run_logs(Path(source))[0]
     wanting = {"--collisions": collisions, "--arm": arm, "--out": out}
     if log is None and (where := next((name for name, given in wanting.items() if given), None)):
         raise SettingsError("needs a log or a run", where=where, hint="name the log")

@@ -31,13 +31,12 @@ CONNECT = 20.0
 
 
 @contextmanager
-def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskWorkers | None]:
+def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
     """Connect to workers; at the end, stop those that were started here.
 
     Args:
         dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything else is
             the address of a scheduler, or its scheduler file. None: no workers.
-        insecure: accept an address without TLS that other machines can reach.
 
     Raises:
         SettingsError: Dask is not installed, or the address is refused.
@@ -62,7 +61,7 @@ def open_workers(dask: str | None, *, insecure: bool = False) -> Generator[DaskW
             stack.enter_context(config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}))
             target = _start_local(stack, int(own[1] or os.cpu_count() or 1))
         else:
-            target = _address(dask, insecure)
+            target = _address(dask)
         client: Any = Client.__new__(Client)
         try:
             client.__init__(target, timeout=CONNECT)
@@ -132,7 +131,7 @@ def _signals_blocked() -> Generator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _address(given: str, insecure: bool) -> str:
+def _address(given: str) -> str:
     """The address that is given itself or by a scheduler file, if code may be sent there."""
     from distributed.comm.addressing import get_address_host, parse_address
 
@@ -146,13 +145,13 @@ def _address(given: str, insecure: bool) -> str:
     except (OSError, ValueError, TypeError, KeyError):
         hint = "give local[:N], tls://HOST:PORT, or a scheduler file"
         raise SettingsError("is no Dask scheduler", where=where, hint=hint) from None
+    local = host == "localhost"
     with suppress(ValueError):
-        insecure |= ipaddress.ip_address(host).is_loopback
-    if scheme != "tls" and host != "localhost" and not insecure:
-        hint = (
-            "start it with TLS as examples/cluster/dask.sbatch does, or accept the risk with --dask-insecure"
-        )
-        raise SettingsError("without TLS anyone who reaches it can run code as you", where=where, hint=hint)
+        local |= ipaddress.ip_address(host).is_loopback
+    if scheme != "tls" and not local:
+        what = "without TLS anyone who reaches it can run code as you"
+        hint = "start it with TLS as examples/cluster/dask.sbatch does"
+        raise SettingsError(what, where=where, hint=hint)
     return address
 
 

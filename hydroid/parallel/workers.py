@@ -4,7 +4,7 @@ import logging
 import pickle
 import threading
 from collections.abc import Generator, Sequence
-from concurrent.futures import CancelledError, Executor
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import version
@@ -80,17 +80,6 @@ class DaskWorkers:
                     result[i] = rows[0]
         return result
 
-    def executor(self) -> Executor:
-        """Return the workers as an executor of whole functions.
-
-        Raises:
-            RunError: a worker has other VERSIONS, or the scheduler is gone.
-        """
-        with _lost_scheduler(self.client):
-            for versions in self.client.run(_versions).values():
-                _refuse_others(versions)
-            return self.client.get_executor()
-
     def _map(self, target: object, method: str, chunks: Sequence[Float]) -> list[Float | None]:
         """Results in the chunks' order; None for a chunk that Dask has given up."""
         import distributed
@@ -130,20 +119,12 @@ class DaskWorkers:
 
 def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Float) -> Float:
     """Compute a chunk in a worker, one at a time however many threads it has."""
-    _refuse_others(VERSIONS, versions)
+    for name, ours in versions.items():
+        if VERSIONS[name] != ours:
+            words = f"a Dask worker has {name} {VERSIONS[name]}, here is {ours}"
+            raise RunError(words, hint="install the same everywhere: others may compute other bits")
     with _lock:
         return getattr(_loaded(pickled), method)(theta)
-
-
-def _versions() -> dict[str, str]:
-    return VERSIONS
-
-
-def _refuse_others(workers: dict[str, str], here: dict[str, str] = VERSIONS) -> None:
-    for name, ours in here.items():
-        if workers[name] != ours:
-            words = f"a Dask worker has {name} {workers[name]}, here is {ours}"
-            raise RunError(words, hint="install the same everywhere: others may compute other bits")
 
 
 @lru_cache(maxsize=8)

@@ -4,6 +4,7 @@ import glob
 import logging
 import os
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from hydroid.errors import HydroidError, RunError
@@ -15,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
-    """Read finished runs that differ in nothing but their seeds; those that cannot be used are left out.
+    """Read finished runs that differ in nothing but their seeds; those that are not finished are left out.
 
     Args:
         names: run folders, or patterns of them, in any order.
@@ -25,14 +26,13 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         One run for each seed, in the order of the seeds.
 
     Raises:
-        RunError: no run is left, runs differ in more than their seeds, or `out` is a run itself.
+        RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", where=str(out), hint="name another folder")
     runs: list[Record] = []
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
-    paths = {Path(path).resolve(): path for group in groups for path in group}
-    for _, path in sorted(paths.items()):
+    for path in sorted({path for group in groups for path in group}):
         try:
             runs.append(_read(path))
         except HydroidError as error:
@@ -40,18 +40,14 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     if not runs:
         hint = "resume those that were stopped"
         raise RunError("no finished run is there", where=" ".join(names), hint=hint)
-    runs.sort(key=lambda run: (run.seed, run.folder))
-    others = {run.folder: difference(run.identity, runs[0].identity, but="search.seed") for run in runs}
-    if differing := {folder: text for folder, text in others.items() if text}:
-        for folder, text in differing.items():
-            _log.warning("%s: %s", folder, text)
-        what = f"{len(differing)} of {len(runs)} runs differ from {runs[0].folder} in more than the seed"
-        raise RunError(what, hint="collect them apart")
-    once: dict[int, Record] = {}
-    for run in runs:
-        if (kept := once.setdefault(run.seed, run)) is not run:
-            _log.warning("left out: %s: has seed %d, as %s has", run.folder, run.seed, kept.folder)
-    return tuple(once.values())
+    runs.sort(key=lambda run: run.seed)
+    for before, run in pairwise(runs):
+        other = difference(run.identity, before.identity, but="search.seed")
+        if run.seed == before.seed:
+            other = f"has seed {run.seed}, as {before.folder} has"
+        if other:
+            raise RunError(other, where=run.folder, hint="leave it out, or merge it apart")
+    return tuple(runs)
 
 
 def _read(path: str) -> Record:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hydroid.errors import RunError
+from hydroid.errors import RunError, Stopped
 from hydroid.estimate import NAME, FitSummary, write_estimate
 from hydroid.files import remove_parts, write_atomic
-from hydroid.identified_model import CONFIG, MODEL, IdentifiedModel, write_settings
+from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.plant import Plant
@@ -42,50 +42,45 @@ class RunFolder:
 
         Raises:
             RunError: another process holds it, it holds other files, or it cannot be written.
+            Stopped: the run was interrupted; says what is kept.
         """
-        self._refuse_other_files()
+        # it is the run's if it is empty, or holds a run's description or at least its lock
+        other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
+        if other and (not self.path.is_dir() or any(self.path.iterdir())):
+            hint = "choose another folder with --out"
+            raise RunError("exists and holds no run", where=str(self.path), hint=hint)
         with locked(self.path), run_log(self.path / "run.log"):
             remove_parts(self.path)
-            yield
+            try:
+                yield
+            except KeyboardInterrupt:
+                _log.info("interrupted")
+                raise Stopped(self.interrupt()) from None
+            except Exception as error:
+                _log.error("ended by %s: %s", type(error).__name__, error)
+                raise
+            _log.info("done")
 
-    def begin_or_continue(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
+    def begin(self, settings: FitSettings, logs: Sequence[Log]) -> CheckpointFile:
         """Describe a new run, or check that the run here is the same; return its checkpoints.
 
         Raises:
-            RunError: the run here is another one, no checkpoint is whole, or the folder cannot be written.
+            RunError: the run here had other settings, another arm, another log or another version, one of its
+                files was changed, no checkpoint is whole, or the folder cannot be written.
         """
+        own = identity(settings, logs)
         if not self.exists:
-            self.begin(settings, logs)
+            write_settings(self.path, settings)
+            self._describe(own | {"files": own_hashes(self.path), "status": "running"})
             return self.checkpoints()
-        self.check(settings, logs)
+        self.refuse_changes()
+        if other := difference(self.identity(), own):
+            hint = "continue it with the command that began it, or choose another folder"
+            raise RunError(f"the run here {other}", where=str(self.path), hint=hint)
         checkpoints = self.checkpoints()
         self.status("running")
         _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
         return checkpoints
-
-    def begin(self, settings: FitSettings, logs: Sequence[Log]) -> None:
-        """Write the settings, the arm, versions, seed, and hashes of the logs.
-
-        Raises:
-            RunError: the folder cannot be written, or holds other files.
-        """
-        self._refuse_other_files()
-        write_settings(self.path, settings)
-        self._describe(identity(settings, logs) | {"files": own_hashes(self.path), "status": "running"})
-
-    def check(self, settings: FitSettings, logs: Sequence[Log]) -> None:
-        """Refuse to continue a run that was another one.
-
-        Raises:
-            RunError: other settings, another arm, another log, another version, or a file that was changed.
-        """
-        self.refuse_changes()
-        then, now = self.identity(), identity(settings, logs)
-        if settings.arm.model.resolve() == (self.path / MODEL).resolve():  # the run's own copy
-            now["origin"] = then.get("origin")
-        if other := difference(then, now):
-            hint = "continue it as it is with only --resume and --out, or choose another folder"
-            raise RunError(f"the run here {other}", where=str(self.path), hint=hint)
 
     def refuse_changes(self) -> None:
         """Refuse a run whose settings or model were changed since it began.
@@ -115,22 +110,21 @@ class RunFolder:
             raise RunError("is not a run's description", where=str(file))
         return content
 
-    def settings(self, overrides: dict[str, Any] | None = None) -> FitSettings:
-        """Read back the resolved settings, some of them replaced.
+    def settings(self) -> FitSettings:
+        """Read back the resolved settings.
 
         Raises:
             RunError, SettingsError: they are missing or damaged.
         """
         self.identity()  # raises the clearer error where the folder holds no run
-        return load(self.path / CONFIG, FitSettings, overrides)
+        return load(self.path / CONFIG, FitSettings)
 
     def write_estimate(self, log: Log, theta: Array, summary: FitSummary) -> None:
         """Write `estimate.yaml`, and the fitted arm in `model/` as it began a log."""
         write_estimate(self.path, summary)
-        model = IdentifiedModel(
-            self.settings().of_estimate(summary.final), theta, str(self.path / NAME), summary
-        )
-        plant = Plant(model, payload=model.settings.payloads.get(Path(log.source).name, 0.0))
+        settings = self.settings().of_estimate(summary.final)
+        model = IdentifiedModel(settings, theta, str(self.path / NAME), summary)
+        plant = Plant(model, payload=settings.payloads.get(Path(log.source).name, 0.0))
         plant.reset(log.start)
         plant.export(self.path / "model")
 
@@ -143,9 +137,8 @@ class RunFolder:
         if not self.exists:
             return ""
         self.status("interrupted")
-        if self.checkpoints():
-            return f"{self.path} holds a checkpoint to resume from"
-        return f"{self.path} holds no checkpoint yet, and resuming begins again"
+        kept = "a checkpoint" if self.checkpoints() else "no checkpoint yet"
+        return f"{self.path} holds {kept}; the same command with --resume continues"
 
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name.
@@ -160,11 +153,3 @@ class RunFolder:
 
     def _describe(self, content: dict[str, Any]) -> None:
         write_atomic(self.path / DESCRIPTION, json.dumps(content, indent=2) + "\n")
-
-    def _refuse_other_files(self) -> None:
-        """A folder is the run's if it is empty, or holds a run's description or at least its lock."""
-        if not self.path.exists() or self.exists or (self.path / LOCK).exists():
-            return
-        if not self.path.is_dir() or any(self.path.iterdir()):
-            hint = "choose another folder with --out"
-            raise RunError("exists and holds no run", where=str(self.path), hint=hint)

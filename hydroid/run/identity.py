@@ -1,7 +1,6 @@
 """What makes a run that run: settings, arm, logs and versions."""
 
 import hashlib
-import json
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -60,15 +59,6 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
         if one.get(key) != two.get(key) and key != but:
             return f"has {key} = {one.get(key)}, not {two.get(key)}"
     return "" if run.get("origin") == other.get("origin") else "has another model of the arm"
-
-
-def was_fitted(run: Path, log: Log) -> bool | None:
-    """Return whether the run in a folder was fitted to a log; None where the folder holds no run."""
-    try:
-        known = json.loads((run / DESCRIPTION).read_text(encoding="utf-8"))["logs"]
-    except (OSError, ValueError, LookupError, TypeError):
-        return None
-    return log_hash(log) in known.values() if isinstance(known, dict) else None
 
 
 def own_hashes(folder: Path) -> dict[str, str]:

@@ -10,16 +10,14 @@ import platform
 import shlex
 import socket
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO
 
 from hydroid.errors import RunError
-from hydroid.log import Log
 from hydroid.progress import logging_to
-from hydroid.settings.fit import FitSettings
 
 try:
     import fcntl
@@ -45,14 +43,13 @@ def locked(folder: Path) -> Generator[None]:
     Raises:
         RunError: another process holds it, or nothing can be written there.
     """
-    path = folder / LOCK
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = path.open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
+        file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
+        _take(file, folder)
     except OSError as error:
         raise RunError(f"cannot be written ({error.strerror})", where=str(folder)) from None
     with file:  # to close it ends the lock
-        _take(file, folder)
         yield
 
 
@@ -63,20 +60,14 @@ def _take(file: IO[bytes], folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+            file.seek(0)
+            holder = file.read(200).decode(errors="replace").strip() or "another process"
             hint = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {_holder(file)}", where=str(folder), hint=hint) from None
+            raise RunError(f"is in use by {holder}", where=str(folder), hint=hint) from None
         _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
         return
-    try:
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-    except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=str(folder)) from None
-
-
-def _holder(file: IO[bytes]) -> str:
-    file.seek(0)
-    return file.read(200).decode(errors="replace").strip() or "another process"
+    file.truncate(0)
+    file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
 
 
 @contextmanager
@@ -96,14 +87,11 @@ def run_log(file: Path) -> Generator[None]:
         yield
 
 
-def log_start(settings: FitSettings, logs: Sequence[Log]) -> None:
+def log_start() -> None:
     """Log what runs, where, with what."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("hydroid", "mujoco", "numpy", "numba"))
     _log.info("%s, Python %s", versions, platform.python_version())
     _log.info("process %d on %s: %s", os.getpid(), socket.gethostname(), shlex.join(sys.argv))
-    search = f"search {settings.search.algorithm}, seed {settings.search.seed}"
-    _log.info("stage %s, %s; settings in config.yaml", settings.stage, search)
-    _log.info("logs: %s", ", ".join(log.source for log in logs))
 
 
 class _File(logging.FileHandler):

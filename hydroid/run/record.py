@@ -129,6 +129,12 @@ def save_result(folder: Path, result: FitResult) -> None:
     write_atomic(folder / RESULT, pack(result))
 
 
+def run_of(model: IdentifiedModel) -> Path | None:
+    """Return the folder of the finished run that a model is from."""
+    file = Path(model.source)
+    return file.parent if file.name == NAME and (file.parent / RESULT).is_file() else None
+
+
 def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -> Path | None:
     """Store predictions of unseen logs, under the logs' names, in the run that a model is from; return it.
 
@@ -138,12 +144,8 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
     Raises:
         RunError: the folder cannot be written.
     """
-    source = Path(model.source)
-    folder = source.parent
-    unseen = [p for p in predictions if p.unseen]
-    if source.name != NAME or not (folder / RESULT).is_file() or not unseen:
-        return None
-    if load_identified(source).settings != model.settings:
+    folder, unseen = run_of(model), [p for p in predictions if p.unseen]
+    if folder is None or not unseen or load_identified(folder).settings != model.settings:
         return None
     taken: set[str] = set()
     for one in unseen:
@@ -151,17 +153,16 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
     return folder
 
 
-def fitted_by(model: IdentifiedModel) -> tuple[tuple[Prediction, ...], Baselines]:
-    """Return what the run that a model is from made of its own logs, and the baselines; none of other models.
+def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
+    """Return what the run of a model made of its logs, the baselines, and the logs' hashes; of no run None.
 
     Raises:
         RunError: what the run stored is damaged, or of another version.
     """
-    source = Path(model.source)
-    if source.name != NAME or not (source.parent / RESULT).is_file():
-        return (), {}
-    result = _read(source.parent / RESULT, FitResult)
-    return result.fitted, result.baselines
+    if (folder := run_of(model)) is None:
+        return (), {}, None
+    result = _read(folder / RESULT, FitResult)
+    return result.fitted, result.baselines, {*RunFolder(folder).identity().get("logs", {}).values()}
 
 
 def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:

@@ -34,8 +34,9 @@ def array(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[int, hyd
     (folder / "a.csv").write_text("\n".join(LOG.read_text().splitlines()[:401]) + "\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page_file, "write_page", lambda *_: [])  # figures take longest
-        done = hydroid.fit_mech(folder / "a.csv", runs=3, set=SMALL, out=folder)
-    return folder, {one.problem.settings.search.seed: one for one in done.runs}
+        log = folder / "a.csv"
+        runs = {n: hydroid.fit_mech(log, seed=n, set=SMALL, out=folder / f"seed-{n}") for n in (1, 2, 3)}
+    return folder, runs
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ FILES = {
 }
 WRONG = [
     ("fit-mech nowhere.csv", "log", "nowhere.csv"),
-    ("fit-mech", "settings", "no log is given"),
+    ("fit-mech", "usage", "LOG"),
     ("fit-mech {log} --config nonsense", "settings", "nonsense"),
     ("fit-mech {log} --set search.seed=x", "settings", "--set search.seed"),
     ("fit-mech {log} --algorithm pso", "settings", "hydroid: --algorithm: must be 'ga', 'nsga2'"),

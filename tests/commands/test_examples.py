@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import hydroid
-from hydroid.commands import stage_one
+from hydroid.commands import stages
 from hydroid.reporting import page_file
 
 ROOT = Path(__file__).parents[2]
@@ -77,7 +77,7 @@ def test_an_example_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatc
     def quick(config: str, overrides: dict[str, object] | None = None):
         return original(config, QUICK | (overrides or {}))
 
-    monkeypatch.setattr(stage_one, "load_settings", quick)
+    monkeypatch.setattr(stages, "load_settings", quick)
     monkeypatch.setattr("hydroid.load_settings", quick)
     monkeypatch.setattr(page_file, "write_page", lambda *_: [])
     exec(compile(code, name, "exec"), {"hydroid": hydroid})

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import hydroid
-from hydroid.commands.stage_one import with_mechanics
+from hydroid.commands.stages import with_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 from hydroid.identified_model import write_settings
 
@@ -35,13 +35,12 @@ def test_a_mass_that_stage_1_moved_without_knowing_it_is_said(
     )
 
 
-def test_stage_two_takes_masses_and_says_what_else_differs(tmp_path: Path, caplog):
+def test_stage_two_takes_masses(tmp_path: Path):
     mech = tmp_path / "mech"
     write_settings(mech, hydroid.load_settings("fit-mech", {"start_pose": "study"}))
     estimate = {name: ParameterEstimate(value=v, unit="?") for name, v in VALUES.items()}
     write_estimate(mech, FitSummary(stage="mech", estimate=estimate, final="best"))
     changes = with_mechanics(mech, "fit-hyd", {"log.delay_s": 0.2})
-    assert "had another start_pose than fit-hyd" in caplog.text
     settings = hydroid.load_settings("fit-hyd", changes)
     assert settings.log.delay_s == 0.2
     # the masses hold; the damping and the spring of stage 2 have a start and a value of their own

@@ -317,7 +317,8 @@ def run_kinds(folder: Path) -> Iterator[Kind]:
         def arguments(room: Path, data: bytes) -> Sequence[str]:
             (copied(room) / name).write_bytes(data)
             if name == "checkpoint.npz":
-                return ("fit-mech", "--resume", "--out", str(room / "run"), "--quiet")
+                log = str(folder / "log.csv")
+                return ("fit-mech", log, "--resume", "--out", str(room / "run"), "--quiet", *TINY)
             log, out = str(folder / "log.csv"), f"--out={room / 'v'}"
             return ("validate", log, f"--fit={room / 'run'}", "--json", out)
 

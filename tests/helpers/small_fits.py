@@ -65,7 +65,7 @@ class Study:
 
     def fit_in(self, folder: RunFolder, watcher: Watcher) -> Fit:
         """A fit in a folder, continued where the folder has a checkpoint."""
-        checkpoints = folder.begin_or_continue(self.settings, read_logs([self.path], self.settings))
+        checkpoints = folder.begin(self.settings, read_logs([self.path], self.settings))
         result = fit(self.problem, watcher, checkpoints)
         folder.write_estimate(self.problem.logs[0], result.best.theta, summarise(self.problem, result))
         return result

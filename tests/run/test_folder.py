@@ -187,11 +187,11 @@ def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
 @pytest.mark.parametrize("name", ["config.yaml", "arm.yaml", "model/arm.xml"])
 def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, made, name):
     settings, _arm, path, _ = made
-    folder.check(settings, read_logs([path], settings))
+    folder.begin(settings, read_logs([path], settings))
     file = folder.path / name
     file.write_text(file.read_text() + "\n")
     with pytest.raises(RunError, match=f"{name}: has changed since the run began"):
-        folder.check(settings, read_logs([path], settings))
+        folder.begin(settings, read_logs([path], settings))
 
 
 def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
@@ -202,24 +202,24 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
         return settings.model_copy(update={"arm": changed}), read_logs([path], settings)
 
     with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
-        folder.check(*other(actuators={}))
+        folder.begin(*other(actuators={}))
     model = tmp_path / "model.xml"
     text = arm.model.read_text().replace('meshdir="', f'meshdir="{arm.model.parent}/')
     model.write_text(text)
     with pytest.raises(RunError, match="another model"):
-        folder.check(*other(model=model))
+        folder.begin(*other(model=model))
 
 
 def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, made, tmp_path):
     settings, _, path, _ = made
     moved = tmp_path / "moved.csv"
     moved.write_bytes(path.read_bytes())
-    folder.check(settings, read_logs(moved, settings))
+    folder.begin(settings, read_logs(moved, settings))
     with pytest.raises(RunError, match=r"other logs, .*log.csv, not .*moved.csv, .*log.csv"):
-        folder.check(settings, read_logs([moved, path], settings))
+        folder.begin(settings, read_logs([moved, path], settings))
     moved.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
     with pytest.raises(RunError, match=r"other logs, or others' contents: .*log.csv, not .*moved.csv"):
-        folder.check(settings, read_logs(moved, settings))
+        folder.begin(settings, read_logs(moved, settings))
 
 
 def test_two_in_one_folder_the_second_is_refused(made, tmp_path):

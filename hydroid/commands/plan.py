@@ -1,27 +1,45 @@
-"""`hydroid design`: the next experiment."""
+"""`hydroid suggest` and `hydroid design`: what the model lacks, and the next experiment."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ConfigSource,
+    LogSources,
     ModelSource,
     SettingChanges,
     Source,
     open_model,
     setting_changes,
 )
-from hydroid.commands.logs import read_logs
+from hydroid.commands.logs import problem_of, read_logs
 from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
-from hydroid.commands.result import Result, written
+from hydroid.files import is_file
 from hydroid.findings import Finding
+from hydroid.identified_model import CONFIG
 
 if TYPE_CHECKING:
     from hydroid.advice.design import Design
-    from hydroid.commands.logs import LogSources
 
-COLUMNS = {
+TERMS = {
+    "name": "quantity",
+    "held": "held at",
+    "gain_percent": "promised [%]",
+    "freed": "freed",
+    "rms_deg": "rms [deg]",
+    "left_out_deg": "rms left out [deg]",
+    "verdict": "verdict",
+}
+ACTIONS = {
+    "action": "action",
+    "of": "of",
+    "parameter": "improves most",
+    "before_percent": "from ± [%]",
+    "after_percent": "to ± [%]",
+}
+PRECISION = {
     "parameter": "name",
     "estimate": "estimate",
     "before_percent": "before [%]",
@@ -29,7 +47,65 @@ COLUMNS = {
     "designed_percent": "designed [%]",
     "flag": "flag",
 }
-"""of the table of predicted standard deviations, by their keys in JSON"""
+"""columns of tables by their keys in JSON"""
+
+
+@command
+def suggest(
+    logs: "LogSources" = (),
+    *,
+    fit: "ModelSource",
+    out: "Source | None" = None,
+    config: "ConfigSource | None" = None,
+    set: "SettingChanges" = None,
+    repair: bool = False,
+) -> "Result[tuple[Finding, ...]]":
+    """Find what the model lacks, and what to do next.
+
+    Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
+    most promising ones are freed: does that lower the error on parts of the logs left out? Tests whether the
+    logs contradict the sign, zero or scale of an angle, and predicts for the best actions, from weighing a
+    link to a new experiment, how much each would reduce the uncertainty.
+
+    Example: hydroid suggest --fit runs/hyd
+
+        suggested = hydroid.suggest(fit="runs/a").plain()
+        print([(term["name"], term["gain_percent"]) for term in suggested["terms"]])
+
+    Args:
+        logs (LOG): Logs of commands and joint angles [default: those of the run].
+
+    Raises:
+        LogError: a log cannot be used.
+        SettingsError: no log is given, and the estimate is not in a run folder.
+        RunError: the simulation diverged, a log of the run is not there, or the folder cannot be written.
+    """
+    model = open_model(fit, config, set)
+    problem = problem_of(model, logs, repair=repair)
+    from hydroid.advice.suggestions import advice
+    from hydroid.posterior.uncertainty import uncertainty
+    from hydroid.reporting.table import Table
+
+    folder = Path(model.source).parent
+    run = str(folder) if is_file(folder / CONFIG) else "RUN"
+    with Progress() as progress:
+        content, findings = advice(problem, uncertainty(problem, model.theta), run, progress)
+    none = {"name": "none of them", "rms_deg": content["rms_deg"], "left_out_deg": content["left_out_deg"]}
+    note = (
+        f"Of {content['tested']} quantities that the fit holds. promised: part of the rms error that freeing "
+        "it saves. left out: the error on parts of the logs, each predicted by a fit without it."
+    )
+    terms = [none, *(term | {"verdict": _verdict(term)} for term in content["terms"])]
+    tables = {"missing_terms": Table.of("Quantities that the fit holds", TERMS, terms, note)}
+    if actions := content["actions"]:
+        title = "Predicted effect of each action on standard deviations"
+        tables["next_actions"] = Table.of(title, ACTIONS, actions)
+    lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(tables, out)]
+    return Result(lines, content, findings)
+
+
+def _verdict(term: dict[str, Any]) -> str:
+    return "free it" if "command" in term else "leave it" if "freed" in term else "others first"
 
 
 @command
@@ -60,6 +136,7 @@ def design(
         commands = hydroid.design("a.csv", fit="runs/a", duration=30).result.log
 
     Args:
+        logs (LOG): Logs that there are already: what they determine need not be measured again.
         duration (S): Length of the experiment [s].
         joints (2,3): Joints to drive, by number or name [default: the compared joints].
 
@@ -93,7 +170,7 @@ def design(
         f"random: median of {len(result.random)} experiments of the same length and limits. "
     )
     safety = Finding("run the experiment", "note").hint
-    table = Table.of("Predicted relative standard deviations", COLUMNS, rows, note + safety)
+    table = Table.of("Predicted relative standard deviations", PRECISION, rows, note + safety)
     files = written({"design": table}, out)
     if out is not None:
         write_log(Path(out) / "commands.csv", result.log, settings.log)

@@ -1,6 +1,7 @@
 """Forty machines that hydroid has not seen, through the commands that `hydroid init` prints.
 
     python benchmarks/strangers.py [--machines 40] [--first 0] [--seed 1]
+    python benchmarks/strangers.py --worlds --machines 12    # the arms of tests/helpers/worlds.py
 
 Every machine is random: three to six joints, 0.2 to 20 t, rotary actuators and cylinders, dead bands to 60 %,
 exponents of 0.7 to 3, delays to 0.4 s, lags, asymmetries, friction; half of them share a pump that droops, a
@@ -12,8 +13,10 @@ travel. A joint that is not good must be named by the verdict.
 """
 
 import shutil
+import sys
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import hydroid
+
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "helpers"))
+import worlds
 
 Array = NDArray[np.float64]
 STEP = 0.002
@@ -280,7 +286,7 @@ def urdf(m: Machine) -> str:
     return "\n".join([*parts, "</robot>\n"])
 
 
-def run_commands(folder: Path, logs: list[Path]) -> tuple[list[float], list[int], float]:
+def run_commands(folder: Path, robot: Path, logs: list[Path]) -> tuple[list[float], list[int], float]:
     """Run what `hydroid init` prints.
 
     Returns:
@@ -288,7 +294,7 @@ def run_commands(folder: Path, logs: list[Path]) -> tuple[list[float], list[int]
         numbered from 1, and the seconds to the end of the fit.
     """
     mine, began = folder / "mine", time.perf_counter()
-    hydroid.init(mine, arm=folder / "robot.urdf", log=[*logs])
+    hydroid.init(mine, arm=robot, log=[*logs])
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
     seconds = time.perf_counter() - began
     judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").plain()
@@ -296,28 +302,49 @@ def run_commands(folder: Path, logs: list[Path]) -> tuple[list[float], list[int]
     return errors, [one["joint"] for one in judged["verdict"] if one["verdict"] != "predicts"], seconds
 
 
+def stranger(seed: int, number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
+    """Make a random machine: its name, its URDF and logs, and the errors that are good [deg], (J,)."""
+    rng = np.random.default_rng([seed, number])
+    machine = random_machine(rng, number)
+    logs = write_machine(folder, machine, rng)
+    angles = np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -len(machine.names) :]
+    return (
+        str(number),
+        folder / "robot.urdf",
+        logs,
+        2 * np.degrees(machine.noise) + 0.02 * np.ptp(angles, axis=0),
+    )
+
+
+def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
+    """Make one of the twelve arms as the world has them; errors are good up to twice the noise."""
+    name, one = [*worlds.WORLDS.items()][number]
+    folder.mkdir(parents=True)
+    logs = [worlds.write_log(one, folder / f"log_{k}.csv", 60.0, k) for k in (1, 2)]
+    noise = [np.degrees(worlds.NOISE_M) if j == "telescope" else worlds.NOISE_DEG for j in one.joints]
+    return name, one.write(one, folder), logs, 2 * np.array(noise)
+
+
 def main() -> None:
     """Make the machines, run the commands, and print the table."""
-    given = options(__doc__, machines=40, first=0, seed=1, folder="build/strangers")
+    given = options(__doc__, machines=40, first=0, seed=1, worlds=False, folder="build/strangers")
     home = Path(given.folder)
     shutil.rmtree(home, ignore_errors=True)
     good, silent = 0, 0
     table("machine | joints | unseen rms [deg] | good at most | named joints | s")
     for number in range(given.first, given.first + given.machines):
-        rng = np.random.default_rng([given.seed, number])
-        machine, folder = random_machine(rng, number), home / f"{number:02d}"
-        logs = write_machine(folder, machine, rng)
-        angles = np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -len(machine.names) :]
-        most = 2 * np.degrees(machine.noise) + 0.02 * np.ptp(angles, axis=0)
+        folder = home / f"{number:02d}"
+        make = world if given.worlds else partial(stranger, given.seed)
+        name, robot, logs, most = make(number, folder)
         try:
-            errors, blamed, seconds = run_commands(folder, logs)
+            errors, blamed, seconds = run_commands(folder, robot, logs)
         except hydroid.HydroidError as error:
-            row(f"{number} | {len(most)} | refused: {error} | | |")
+            row(f"{name} | {len(most)} | refused: {error} | | |")
             continue
         missed = {j for j, (error, limit) in enumerate(zip(errors, most, strict=True), 1) if error > limit}
         good, silent = good + (not missed), silent + bool(missed - set(blamed))
         figures = (" ".join(f"{x:.2f}" for x in values) for values in (errors, most))
-        row(f"{number} | {len(most)} | {' | '.join(figures)} | {blamed or ''} | {seconds:.0f}")
+        row(f"{name} | {len(most)} | {' | '.join(figures)} | {blamed or ''} | {seconds:.0f}")
     print(f"\n{good} of {given.machines} good; {silent} with a missed joint that the verdict does not name")
 
 

@@ -168,22 +168,53 @@ WORLDS = {
 }  # fmt: skip
 
 
-def write_log(world: World, path: Path, seconds: float = 30.0) -> Path:
-    """Write a log of the world's columns, in the order of `columns`: each joint follows its command."""
-    rng, time = np.random.default_rng(3), np.arange(0, seconds, 0.02)
-    parts = {name: limits for name, *_, limits in world.parts}
-    columns = {"time_s": time}
-    measured: dict[str, np.ndarray] = {}
-    for joint, (command, angle) in world.columns.items():
-        levels = np.where(np.arange(15) % 2, 1, -1) * rng.uniform(30, 90, 15)
-        drive = np.repeat(np.r_[0, levels], len(time) // 16 + 1)[: len(time)]
-        low, high = map(float, (parts[joint] or "-1 1").split())
-        way = np.cumsum(np.roll(drive, 6))
-        place = low + (high - low) * (0.2 + 0.6 * (way - way.min()) / np.ptp(way))
-        columns[command] = drive / 10 if "V" in command else drive
-        measured[angle] = place if angle.endswith("_m") else np.degrees(place)
-    columns |= measured
-    np.savetxt(
-        path, np.stack([*columns.values()], axis=1), "%.6g", ",", header=",".join(columns), comments=""
+NOISE_DEG, NOISE_M = 0.05, 0.001
+"""of the angles and places in a log"""
+
+
+def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) -> Path:
+    """Write a log of the world's columns, in the order of `columns`, as a person drives the machine.
+
+    Its valves are of their own equations: each joint has a dead band, an exponent and a full speed in each
+    direction, a lag behind the valve, a delay, and no load that slows it. `number` is that of the log.
+    """
+    machine, drive = np.random.default_rng(3), np.random.default_rng([3, number])
+    joints, step, every = list(world.columns), 0.005, 4
+    limits = {name: limits for name, *_, limits in world.parts}
+    low, high = np.array([[float(end) for end in (limits[joint] or "-1 1").split()] for joint in joints]).T
+    both = len(joints), 2
+    dead, exponent = machine.uniform(5, 35, both), machine.uniform(1, 2.2, both)
+    full = (high - low)[:, None] / machine.uniform(5, 12, both)
+    late, lag = (
+        np.round(machine.uniform(0.05, 0.3, both[0]) / step).astype(int),
+        machine.uniform(0.03, 0.2, both[0]),
     )
+    steps, each = round(seconds / step), np.arange(both[0])
+    command, place = np.zeros((steps, both[0])), np.empty((steps, both[0]))
+    now, opening, until = (
+        low + (high - low) * drive.uniform(0.3, 0.7, both[0]),
+        np.zeros(both[0]),
+        np.ones(both[0]),
+    )
+    for k in range(steps):
+        command[k] = command[k - 1]
+        for j in np.flatnonzero(until <= k * step):
+            until[j] += drive.uniform(0.5, 3)
+            part = (now[j] - low[j]) / (high[j] - low[j])
+            way = -1 if part > 0.7 else 1 if part < 0.3 else drive.choice([-1, 1])
+            command[k, j] = way * drive.uniform(40, 100) * (drive.random() < 0.7)
+        u = command[k - late, each] * (k >= late)
+        side = (u < 0).astype(int)
+        beyond = np.maximum(np.abs(u) - dead[each, side], 0) / (100 - dead[each, side])
+        opening += step / lag * (np.sign(u) * beyond ** exponent[each, side] * full[each, side] - opening)
+        now = np.clip(now + step * opening, low, high)
+        place[k] = now
+    columns = {"time_s": np.arange(0, seconds, every * step)[: len(place[::every])]}
+    names = world.columns.values()
+    columns |= {c: u / 10 if "V" in c else u for (c, _), u in zip(names, command[::every].T, strict=True)}
+    for (_, angle), q in zip(names, place[::every].T, strict=True):
+        noise = drive.normal(size=len(q))
+        columns[angle] = q + NOISE_M * noise if angle.endswith("_m") else np.degrees(q) + NOISE_DEG * noise
+    text = ",".join(columns)
+    np.savetxt(path, np.stack([*columns.values()], axis=1), "%.6g", ",", header=text, comments="")
     return path

@@ -76,7 +76,7 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
     settings = problem.settings
     for parameter, value in zip(problem.parameters.parameters, theta.tolist(), strict=True):
         name, p = parameter.name, settings.parameters[parameter.name]
-        if p.fixed is not None:
+        if p.fixed is not None or p.logs is not None:
             continue
         sides, joints = TARGETS[p.quantity], sorted({j for _, j in _atoms(settings, p) if isinstance(j, int)})
         moving = [j for j in joints if j in problem.active_joints]
@@ -123,7 +123,9 @@ def _nominal(problem: Problem) -> Iterator[Term]:
 
 
 def _atoms(settings: FitSettings, p: ParameterSettings) -> tuple[Atom, ...]:
-    """All that a parameter sets."""
+    """All that a parameter sets; what is added in some logs is none of it."""
+    if p.logs is not None:
+        return ()
     places: Sequence[int | str] = p.joints or range(1, len(settings.arm.joints) + 1)
     places = [p.link] if p.link is not None else [0] if CHOICES[p.quantity].of_the_pump else places
     return tuple((target, place) for target in TARGETS[p.quantity] for place in places)

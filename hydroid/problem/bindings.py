@@ -1,7 +1,9 @@
 """Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +20,15 @@ from hydroid.simulation import Candidates
 
 @dataclass(frozen=True)
 class Binding:
-    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based."""
+    """One column of theta sets one quantity of some joints, or the mass of a link, 0-based.
+
+    With a pattern of logs it is added to what is set otherwise, in these logs alone.
+    """
 
     column: int
     quantity: str
     places: list[int]
+    logs: str | None
 
 
 class Bindings:
@@ -38,21 +44,32 @@ class Bindings:
     def __init__(self, settings: FitSettings) -> None:
         self._arm, self._stage = settings.arm, settings.stage
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
-        self._rows = [
-            Binding(column, quantity, _places(settings.arm, name, p))
+        rows = [
+            Binding(column, quantity, _places(settings.arm, name, p), p.logs)
             for column, (name, p) in enumerate(settings.parameters.items())
             for quantity in TARGETS[p.quantity]
         ]
+        self._rows = sorted(rows, key=lambda row: row.logs is not None)  # what is added comes last
         self._refuse_overlap(list(settings.parameters))
         self.parameters = settings.parameter_set()
 
-    def candidates(self, theta: Array) -> Candidates:
-        """Spread theta, shape (n, P), over joints and links, in SI."""
+    def effects(self, source: str) -> tuple[str, ...]:
+        """Return the patterns of effects that match a log's file name."""
+        patterns = dict.fromkeys(row.logs for row in self._rows if row.logs is not None)
+        return tuple(pattern for pattern in patterns if fnmatch(Path(source).name, pattern))
+
+    def candidates(self, theta: Array, effects: Collection[str] = ()) -> Candidates:
+        """Spread theta, shape (n, P), over joints and links, in SI, with the effects of a log."""
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for row in self._rows:
             target = mass if row.quantity == "mass" else joints[row.quantity]
-            target[:, row.places] = theta[:, row.column, None] * QUANTITIES[row.quantity].factor
+            value, factor = theta[:, row.column, None], QUANTITIES[row.quantity].factor
+            if row.logs is None:
+                target[:, row.places] = value * factor
+            elif row.logs in effects:
+                least = QUANTITIES[row.quantity].lowest
+                target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
@@ -76,11 +93,11 @@ class Bindings:
                 )
 
     def _refuse_overlap(self, names: list[str]) -> None:
-        taken: dict[tuple[str, int], str] = {}
+        taken: dict[tuple[str, int, str | None], str] = {}
         for row in self._rows:
             name = names[row.column]
             for place in row.places:
-                if (other := taken.setdefault((row.quantity, place), name)) != name:
+                if (other := taken.setdefault((row.quantity, place, row.logs), name)) != name:
                     raise SettingsError(
                         f"{other} and {name} both set the {row.quantity} of the same joint or link",
                         where=f"parameters.{name}",

@@ -55,8 +55,8 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> d
 
 def nominal_value(arm: Arm, hydraulics: HydraulicSettings, own: ParameterSettings) -> float | None:
     """Return what its settings, `hydraulics` or the arm's file say of a parameter; None: no one value."""
-    if own.nominal is not None:
-        return own.nominal
+    if own.nominal is not None or own.logs is not None:
+        return own.nominal or 0.0
     if own.link is not None:
         return arm.mass_of.get(own.link)
     if own.quantity in MECHANICAL:
@@ -109,6 +109,8 @@ def _prior(own: ParameterSettings, nominal: float | None) -> Prior | None:
 def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float, float]:
     if prior is None:
         return own.fixed or 0.0, own.fixed or 0.0
+    if own.logs is not None:
+        return prior.value(-4.0), prior.value(4.0)
     quantity = CHOICES[own.quantity]  # one that must be above 0 is not searched below 1 % of its value
     least = 0.01 * prior.nominal if quantity.positive else quantity.lowest
     return max(prior.value(-4.0), least), prior.value(4.0)

@@ -43,6 +43,9 @@ class ParameterSettings(Settings):
     """where the search starts; null: nominal, else the middle of the bounds on the parameter's scale"""
     fixed: float | None = None
     """value at which the parameter is held, in the unit of the quantity; null: it is estimated"""
+    logs: str | None = None
+    """pattern of file names, such as tuesday_*.csv: in these logs the value is added to what the quantity is
+    otherwise, around 0 with standard deviation `sd`. All other logs are predicted without it"""
     term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it after the
     refinement, and keeps it where it brings the model clearly nearer to the logs; null: always there"""
@@ -58,6 +61,8 @@ class ParameterSettings(Settings):
             raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
         if self.link is not None and (self.joints is not None or self.each):
             raise ValueError("a mass belongs to a link, not to joints")
+        if self.logs is not None and (self.sd is None or self.quantity == "mass"):
+            raise ValueError("an effect in some logs needs sd: standard deviation, around 0, and is no mass")
         if self.within is not None and self.sd is not None:
             raise ValueError("give within: factor or sd: standard deviation, not both")
         if not self.can_be_free and self.fixed is None:
@@ -65,7 +70,8 @@ class ParameterSettings(Settings):
         if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
             raise ValueError("bounds must be [lower, upper] with lower < upper")
         values = [v for v in (*(self.bounds or ()), self.nominal, self.start, self.fixed) if v is not None]
-        lowest, least = min(values, default=1.0), CHOICES[self.quantity].lowest
+        least = CHOICES[self.quantity].lowest if self.logs is None else -math.inf
+        lowest = min(values, default=1.0)
         if self.quantity == "mass" and lowest <= 0:
             raise ValueError("a mass must be above 0 kg")
         if lowest < least:

@@ -34,9 +34,9 @@ class ParameterEstimate(Settings):
     interval_by_log: tuple[float | None, float | None] = (None, None)
     """the same from `sd_by_log`"""
     flag: str | None = None
-    """how well the logs determine it: a value of `posterior.flags.Flag`"""
+    """how well the logs determine it: a value of `posterior.uncertainty.Flag`"""
     source: str | None = None
-    """from what it is known: a value of `posterior.flags.Source`; null: it is not known, or fixed"""
+    """from what it is known: a value of `posterior.uncertainty.Source`; null: it is not known, or fixed"""
     data_share: float | None = None
     """part of the information that the logs gave: 1 - posterior / prior variance; 1 without a prior"""
     at_bound: Literal["lower", "upper"] | None = None

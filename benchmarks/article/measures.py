@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.linear import linearised
+from hydroid.posterior.uncertainty import WEAK_ABOVE
 from hydroid.problem.problem import Problem
 from hydroid.studies import Result, Row
 

@@ -21,7 +21,7 @@ from measures import DETERMINED_AT_DEG
 from page import page
 from studies import Plan, Runs, load_studies
 
-from hydroid.posterior.flags import WEAK_ABOVE
+from hydroid.posterior.uncertainty import WEAK_ABOVE
 from hydroid.studies import processes
 
 ROOT = Path(__file__).parents[2]

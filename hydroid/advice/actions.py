@@ -14,9 +14,8 @@ from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.information import ExperimentSimulator, forecast
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array
-from hydroid.posterior.flags import WEAK_ABOVE
 from hydroid.posterior.posterior import Posterior
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
 
 STATED_SD = {"weigh": 0.02, "state": 0.05}

@@ -90,7 +90,7 @@ def steps(
             own, trial = problem.varied(adapted(model, [*taken, name])), last
             for _ in range(2):  # the noise, beside which priors count, is that of the adapted model
                 row = own.residuals(trial.theta[None])[0]
-                trial = refitted(own, trial.theta, prior_weight(own.channels, row, settings.objective))
+                trial = refitted(own, trial.theta, prior_weight(own, row))
             trials[name] = trial
         best = min(trials, key=lambda name: trials[name].left_out)
         if not free and trials[best].left_out > 0.95 * last.left_out:

@@ -18,7 +18,7 @@ from hydroid.arm.model import load_model
 from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.noise import channel_noise, prior_weight
+from hydroid.posterior.noise import prior_weight, problem_noise
 from hydroid.problem.problem import Problem
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.fit import FitSettings
@@ -142,7 +142,7 @@ def _begun(settings: FitSettings, logs: Sequence[Log], values: Mapping[str, floa
     chosen = logs[:: -(-len(logs) // MOST_LOGS)]
     problem = Problem(settings, chosen)
     row = problem.residuals(problem.parameters.started(values)[None])[0]
-    weight = prior_weight(problem.channels, row, settings.objective)
+    weight = prior_weight(problem, row)
     return _refined(_Refit(settings, chosen, weight, values), problem)
 
 
@@ -164,14 +164,13 @@ def _refined(begun: _Refit, problem: Problem, how: RefinementSettings = SHORT) -
     end = min((least_squares(start, rows, how) for start in starts), key=lambda end: end.cost)
     if not end.cost < begun.cost:
         return begun
-    error, objective = end.residual[: problem.measured.size], problem.settings.objective
-    noise = [channel_noise(c, error[c.rows], objective) for c in problem.channels]
+    error = end.residual[: problem.measured.size]
     return replace(
         begun,
         values={**values, **parameters.mapping(parameters.from_unit(end.point))},
         cost=end.cost,
         rms_deg=float(np.degrees(problem.rms(error[None])[0])),
-        samples=sum(one.effective_sample_size for one in noise),
+        samples=sum(one.effective_sample_size for one in problem_noise(problem, error)),
     )
 
 

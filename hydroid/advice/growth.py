@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hydroid.advice.score import Explained, Score, explained, holm
 from hydroid.advice.terms import ExtendedModel, Term, terms
 from hydroid.parameters import Array
-from hydroid.posterior.open_start import least_squares_rows
+from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress

@@ -17,6 +17,7 @@ its effective samples; less the one that a took.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
 from hydroid.parameters import Array
-from hydroid.posterior.noise import Noise, channel_noise
+from hydroid.posterior.noise import Noise, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 
@@ -103,15 +104,12 @@ class Explained:
 
 def explained(problem: Problem, known: Uncertainty) -> Explained:
     """Return what a fit has explained at an estimate. Parameters at bounds are held."""
-    linear, channels = known.linear, problem.channels
+    linear = known.linear
     scores = linear.prior_weight * problem.priors.scores(known.theta[None])[0]
     residual = np.zeros(linear.effects.shape[1])  # 0 behind: the estimate does not depend on the weak priors
     residual[: linear.residual.size + scores.size] = np.append(linear.residual, scores)
-
-    def noise_of(row: Array) -> list[Noise]:
-        return [channel_noise(c, row[c.rows], problem.settings.objective) for c in channels]
-
-    return Explained(linear.effects, residual, noise_of, [c.rows for c in channels], linear.prior_weight)
+    rows, noise_of = [c.rows for c in problem.channels], partial(problem_noise, problem)
+    return Explained(linear.effects, residual, noise_of, rows, linear.prior_weight)
 
 
 def holm(chances: Sequence[float], level: float) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hydroid.hydraulics.actuator import START_PRESSURE
 from hydroid.parameters import Array
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.linear import with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS
 from hydroid.settings.fit import FitSettings

@@ -28,8 +28,8 @@ from hydroid.identified_model import start_values
 if TYPE_CHECKING:
     from hydroid.parameters import Array
     from hydroid.plant import Plant
-    from hydroid.posterior.profile import Profile
-    from hydroid.posterior.uncertainty import Identifiability, Uncertainty
+    from hydroid.posterior.identifiability import Identifiability, Profile
+    from hydroid.posterior.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,17 +95,17 @@ def analyse(
         model = open_model(fit, config, set)
     problem = problem_of(model, logs, repair=repair)
     from hydroid.fitting.summary import account
-    from hydroid.posterior import profile as profiling
-    from hydroid.posterior import uncertainty
+    from hydroid.posterior import identifiability
+    from hydroid.posterior.uncertainty import uncertainty
     from hydroid.reporting.parameters_report import parameter_table, unknown_sections
 
     with Progress() as progress:
-        known = uncertainty.uncertainty(problem, model.theta)
+        known = uncertainty(problem, model.theta)
         profiles: dict[str, Profile] = {}
         for done, name in enumerate(names(profile)):
             progress("profiles", done, len(names(profile)))
-            profiles[name] = profiling.profile(problem, known, name)
-    identified = uncertainty.identifiability(problem, known)
+            profiles[name] = identifiability.profile(problem, known, name)
+    identified = identifiability.identifiability(problem, known)
     summary = account(problem, known, identified)
     better = tuple(name for name, one in profiles.items() if one.better_optimum)
     findings = (*([Finding("better optimum", "warning", better)] if better else []), *summary.findings)

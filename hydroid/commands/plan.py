@@ -149,7 +149,7 @@ def design(
     model = open_model(fit, config, setting_changes(set, options))
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
-    from hydroid.posterior.flags import flag_of
+    from hydroid.posterior.uncertainty import flag_of
     from hydroid.reporting.table import Table
 
     settings, commands = model.settings, None if out is None else str(Path(out) / "commands.csv")

@@ -20,7 +20,6 @@ from hydroid.commands.options import command
 from hydroid.commands.progress import FitProgress
 from hydroid.errors import SettingsError
 from hydroid.parallel.cluster import open_workers
-from hydroid.posterior.flags import Flag
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.parameters import nominal_value
@@ -176,7 +175,7 @@ def with_mechanics(
             nominal_value(settings.arm, settings.hydraulics, p),
             summary and summary.estimate[name].flag,
         )
-        doubtful = mass and flag not in (None, Flag.IDENTIFIABLE, Flag.FIXED)
+        doubtful = mass and flag not in (None, "identifiable", "fixed")
         if doubtful and nominal and abs(value - nominal) > 0.1 * nominal:
             _log.warning(
                 "%s is held at %.3g kg: stage 1 moved it from %.3g kg, but its logs do not determine it "

@@ -6,12 +6,13 @@ must predict better than they do, and can start its own fit from them.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from hydroid.log import Log
 from hydroid.log.log import Floats
@@ -30,37 +31,29 @@ class Baseline:
         joint: number, from 1.
         limits: its range [rad], where it stops, shape (2,).
         delay: [s].
-        lag: time constant of the speed towards positive and negative commands [s].
-        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: the opening below.
-        dead_band: of positive and negative commands [%].
-        exponent: of the command beyond the dead band.
-        speed: at full command of each direction [rad/s], of either sign.
+        table: commands [%], ascending, and their speeds [rad/s], shape (N, 2); None: by the numbers.
+        numbers: dead band [%], exponent of the command beyond it, speed at full command [rad/s], of either
+            sign, and time constant of the speed [s], of positive and negative commands: shape (4, 2).
     """
 
     joint: int
     limits: Floats
     delay: float = 0.0
-    lag: tuple[float, float] = (0.0, 0.0)
     table: Floats | None = None
-    dead_band: tuple[float, float] = (0.0, 0.0)
-    exponent: tuple[float, float] = (1.0, 1.0)
-    speed: tuple[float, float] = (0.0, 0.0)
+    numbers: Floats = field(default_factory=partial(np.zeros, (4, 2)))
 
     def predict(self, log: Log) -> Floats:
         """Return the angle from the log's start pose under its commands alone [rad], shape (T,)."""
-        command, side = log.command[:, self.joint - 1], (log.command[:, self.joint - 1] < 0).astype(int)
+        command = log.command[:, self.joint - 1]
+        side = (command < 0).astype(int)
         if self.table is not None:
             target = np.interp(command, *self.table.T)
         else:
-            dead, exponent, speed = np.array([self.dead_band, self.exponent, self.speed])[:, side]
+            dead, exponent, speed = self.numbers[:3, side]
             beyond = (np.abs(command) - dead) / (100.0 - dead)
             target = speed * np.power(beyond, exponent, out=np.zeros_like(beyond), where=beyond > 0)
-        late, lag = self.delay / log.period, (self.lag[0] / log.period, self.lag[1] / log.period)
-        return _follow(target * log.period, side, late, lag, log.start[self.joint - 1], self.limits)
-
-    def rms(self, logs: Sequence[Log]) -> float:
-        """Return the rms error over the samples of all logs [rad]."""
-        return float(np.sqrt(np.mean(self.errors(logs) ** 2)))
+        late, lag, start = self.delay / log.period, self.numbers[3] / log.period, log.start[self.joint - 1]
+        return _follow(target * log.period, side, late, lag, start, self.limits)
 
     def errors(self, logs: Sequence[Log]) -> Floats:
         """Return measured minus predicted angles of all logs [rad]."""
@@ -72,7 +65,7 @@ def _follow(
     target: Floats,
     side: NDArray[np.int64],
     delay: float,
-    lag: tuple[float, float],
+    lag: Floats,
     start: float,
     limits: Floats,
 ) -> Floats:
@@ -105,52 +98,45 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: Floats) -> dict[str, 
     if not any(log.driven[joint - 1] for log in measured):
         return {NAMES[0]: still}
     delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
-    table = min((_mean_speeds(measured, still, d) for d in delays), key=lambda model: model.rms(measured))
+    tables = (_mean_speeds(measured, still, delay) for delay in delays)
+    table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
     return dict(zip(NAMES, (still, table, _nine_numbers(measured, table)), strict=True))
 
 
 def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
     """Return the mean speed in each of 24 bins of a command that acts after a delay, but for zero command."""
-    commands, speeds = list[Floats](), list[Floats]()
+    pairs = list[Floats]()
     for log in logs:
         command, angle = log.command[:, still.joint - 1], log.angle[:, still.joint - 1]
-        late = round(delay / log.period)
+        late, margin = round(delay / log.period), 0.01 * np.ptp(angle)
         step = np.diff(angle[late:]) / log.period
-        margin = 0.01 * np.ptp(angle)  # at an end of its range no command moves it
-        free = (angle[late:-1] > still.limits[0] + margin) & (angle[late:-1] < still.limits[1] - margin)
-        used = free & (command[: len(step)] != 0)
-        commands.append(command[: len(step)][used])
-        speeds.append(step[used])
-    command, speed = np.concatenate(commands), np.concatenate(speeds)
-    bins = np.floor(command / (200 / 24)).astype(int)
-    filled = [bins == number for number in np.unique(bins)]
+        command = command[: len(step)]
+        # at an end of its range no command moves it
+        free = (angle > still.limits[0] + margin) & (angle < still.limits[1] - margin)
+        pairs.append(np.stack([command, step])[:, free[late:-1] & (command != 0)])
+    command, speed = np.hstack(pairs)
+    bins = np.floor(command / (200 / 24))
+    filled = (bins == number for number in np.unique(bins))
     rows = sorted([(0.0, 0.0), *((command[one].mean(), speed[one].mean()) for one in filled)])
     return replace(still, delay=delay, table=np.array(rows))
 
 
 def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
     """Return the best of the fits that start at the table of speeds with different exponents."""
-    lower = np.array([0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0])
-    upper = np.array([90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY])
-    scale = np.array([10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1])
+    lower = [0, 0, 0.3, 0.3, -np.inf, -np.inf, 0, 0, 0]
+    upper = [90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY]
+    scale = [10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1]
 
-    def made(numbers: Floats) -> Baseline:
-        dead, exponent, speed, lag = ((a, b) for a, b in numbers[:8].reshape(4, 2).tolist())
-        return Baseline(table.joint, table.limits, float(numbers[8]), lag, None, dead, exponent, speed)
+    def made(x: Floats) -> Baseline:
+        return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
 
-    def fit(numbers: Floats, evaluations: int) -> tuple[float, Floats]:
-        best = least_squares(
-            lambda x: made(x).errors(logs),
-            numbers,
-            bounds=(lower, upper),
-            x_scale=scale,
-            max_nfev=evaluations,
+    def fit(start: Floats, evaluations: int) -> OptimizeResult:
+        return least_squares(
+            lambda x: made(x).errors(logs), start, bounds=(lower, upper), x_scale=scale, max_nfev=evaluations
         )
-        return float(best.cost), best.x
 
-    starts = list(_starts(table))
-    _, best = min((fit(start, 10) for start in starts), key=lambda result: result[0])
-    return made(fit(best, 40)[1])
+    best = min((fit(start, 10) for start in _starts(table)), key=lambda ended: ended.cost)
+    return made(fit(best.x, 40).x)
 
 
 def _starts(table: Baseline) -> Iterator[Floats]:

@@ -1,6 +1,7 @@
 """Checkpoints of a fit: arrays by the name of what is under way, stored every few seconds.
 
-A run folder keeps them in a file (`run.checkpoint`); elsewhere a plain dict will do.
+A run folder keeps them in a file (`run.archive`); elsewhere a plain dict will do. Of a search they are the
+objectives of all candidates simulated so far: none is simulated twice, also not by a resumed run.
 """
 
 import time
@@ -8,7 +9,12 @@ from collections.abc import Callable, Generator, MutableMapping
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+from hydroid.errors import RunError
+from hydroid.parameters import Array
+from hydroid.problem.problem import Evaluation, Problem
 
 SAVE_EVERY = 5.0
 """seconds between checkpoints: a lost one costs no more, and writing it is noise beside the work"""
@@ -37,3 +43,67 @@ def saving(checkpoints: Checkpoints, name: str) -> Generator[Callable[[Callable[
     finally:
         if pending is not None:
             checkpoints[name] = pending()
+
+
+class Memo:
+    """Evaluates each candidate once: identical chromosomes are not simulated again.
+
+    A search is deterministic. So its memo is all that a checkpoint needs: a resumed search begins anew, and
+    gets what is stored until it asks for the first candidate that is not.
+
+    Attributes:
+        infeasible: candidates whose simulation diverged.
+        elsewhere: candidates that a local method simulated on its way to those evaluated here.
+    """
+
+    def __init__(self, problem: Problem, stored: Arrays | None = None) -> None:
+        self.problem, self.infeasible, self.elsewhere = problem, 0, 0
+        self._values: dict[bytes, Array] = {}
+        """objectives of each candidate, overall last, shape (S + 1,)"""
+        pairs = zip(stored["theta"], stored["values"], strict=True) if stored else ()
+        self._stored = {theta.tobytes(): values.copy() for theta, values in pairs}
+
+    @property
+    def simulated(self) -> int:
+        """Candidates simulated so far, those of a run that this one resumes included."""
+        return len(self._values) + self.elsewhere
+
+    @property
+    def replays(self) -> bool:
+        """Whether candidates of the resumed run have not been asked for yet."""
+        return bool(self._stored)
+
+    @property
+    def best(self) -> Array:
+        """The candidate with the lowest overall objective, shape (P,)."""
+        return np.frombuffer(min(self._values, key=lambda key: self._values[key][-1]))
+
+    def evaluate(self, theta: Array) -> Evaluation:
+        """Evaluate theta, shape (n, P), simulating what is new in it.
+
+        Raises:
+            RunError: a resumed search does not repeat itself.
+        """
+        new = {row.tobytes(): row for row in theta if row.tobytes() not in self._values}
+        values = {key: self._stored.pop(key) for key in new if key in self._stored}
+        unknown = [key for key in new if key not in values]
+        if unknown and self._stored:
+            raise RunError(
+                "the search cannot be continued: its library does not repeat what it did before",
+                hint="use the versions that the run began with, or begin another with --out",
+            )
+        if unknown:
+            rows = self.problem.evaluate(np.array([new[key] for key in unknown])).values
+            # a candidate with one infinite objective is infeasible: none of its objectives may win
+            rows[~np.isfinite(rows).all(axis=1)] = np.inf
+            values |= zip(unknown, rows, strict=True)
+        self.infeasible += sum(not np.isfinite(row[-1]) for row in values.values())
+        self._values.update((key, values[key]) for key in new)
+        return Evaluation(np.array([self._values[row.tobytes()] for row in theta]))
+
+    def arrays(self) -> Arrays:
+        """Return all candidates and their objectives, overall last: shapes (m, P) and (m, S + 1)."""
+        return {
+            "theta": np.array([np.frombuffer(key) for key in self._values]),
+            "values": np.array(list(self._values.values())),
+        }

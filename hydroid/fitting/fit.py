@@ -12,9 +12,10 @@ from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import Searched, search
 from hydroid.parameters import Array
+from hydroid.posterior.identifiability import Identifiability, identifiability
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
-from hydroid.posterior.uncertainty import Identifiability, Uncertainty, identifiability, uncertainty
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search.descent import Descent
@@ -26,8 +27,6 @@ NEARER = 0.95
 """part of the quasi-static model's rms error that the dynamic one must reach to be preferred"""
 TOO_FAR = 5.0
 """times the rms error of the last estimate from which the dynamic model is not refined"""
-STRAINED_ABOVE = 2.0
-"""standard deviations from its prior beyond which an estimate strains it"""
 
 
 @dataclass(frozen=True)
@@ -57,9 +56,8 @@ class Fit:
 
     estimates: by name, that of the search first; `final` names the one to use. front: the non-dominated
     candidates, shape (n, P), and their objectives. history: shape (G, len(HISTORY)). refinements: by the
-    estimate that each gave. uncertainty, identifiability, quantities: of the final estimate. strains:
-    standard deviations between it and the priors that are far from it, by name. seconds: wall-clock time of
-    "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
+    estimate that each gave. uncertainty, identifiability, quantities: of the final estimate. seconds:
+    wall-clock time of "search", "refinement" and "uncertainty" [s]; of a resumed fit, since it was resumed.
     """
 
     estimates: dict[str, Estimate]
@@ -70,7 +68,6 @@ class Fit:
     uncertainty: Uncertainty
     identifiability: Identifiability
     quantities: Quantities
-    strains: Mapping[str, float]
     seconds: Mapping[str, float]
 
     @property
@@ -156,34 +153,20 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             _log.warning(words, refinements[final].ending.value, final)
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
-    directions, determined = identifiability(last, about), quantities(last, about)
-    scores = zip(last.priors.names, last.priors.scores(about.theta[None])[0].tolist(), strict=True)
-    farthest = sorted(scores, key=lambda pair: -abs(pair[1]))
-    strains = {name: score for name, score in farthest if abs(score) > STRAINED_ABOVE}
+    of_it = about, identifiability(last, about), quantities(last, about)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
-    return Fit(
-        estimates,
-        final,
-        _front(searched),
-        searched.history,
-        refinements,
-        about,
-        directions,
-        determined,
-        strains,
-        dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True)),
-    )
+    took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
+    return Fit(estimates, final, _front(searched), searched.history, refinements, *of_it, took)
 
 
 def _slopes(problem: Problem, descent: Descent | None) -> Array | None:
     """Derivatives that least squares ended with, per relative change of the free parameters, (p, R)."""
     if descent is None or not len(descent.jacobian):
         return None
-    free, samples = problem.parameters.free, problem.measured.size
-    theta = problem.parameters.from_unit(descent.point)
-    width = problem.parameters.width(theta)[free]
-    scale = estimate_box(problem.parameters, theta).scale[free]
-    return descent.jacobian[:samples].T * (scale / width)[:, None]
+    parameters, free = problem.parameters, problem.parameters.free
+    theta = parameters.from_unit(descent.point)
+    change = estimate_box(parameters, theta).scale[free] / parameters.width(theta)[free]
+    return descent.jacobian[: problem.measured.size].T * change[:, None]
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
@@ -212,7 +195,7 @@ def _estimates(problem: Problem, candidates: dict[str, Array]) -> dict[str, Esti
     estimates: list[Estimate] = []
     for i, name in enumerate(candidates):
         angles = tuple(response.angle[i] for response in responses)
-        estimates.append(Estimate(name, theta[i], segments[i], float(overall[i]), float(rms[i]), angles))
+        estimates.append(Estimate(name, theta[i], segments[i], overall[i], rms[i], angles))
         if not estimates[-1].usable:
             _log.warning("the estimate %s diverged when it was simulated; it is not used", name)
     return {e.name: e for e in sorted(estimates, key=lambda e: not e.usable)}

@@ -18,12 +18,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.memo import Memo
+from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.coding import Genes
+from hydroid.search.chromosomes import Genes
 from hydroid.search.descent import Descent
 from hydroid.search.genetic import Population
 from hydroid.settings.search import RefinementSettings

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hydroid.fitting.checkpoints import Arrays, Checkpoints, saving
+from hydroid.fitting.checkpoints import Checkpoints, saving
 from hydroid.parameters import Array
+from hydroid.posterior.linear import least_squares_rows, with_open_start
 from hydroid.posterior.noise import prior_weight
-from hydroid.posterior.open_start import least_squares_rows, with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Descent, start
 from hydroid.search.least_squares import step
@@ -23,32 +23,26 @@ MAX_NOISES = 8
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class _Refinement:
-    """A refinement under way.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Refinement(Descent):
+    """A descent over the residuals, then the priors' scores times `weight`.
 
     Attributes:
-        descent: over the residuals, then the priors' scores times `weight`.
         weight: residual that a prior's standard deviation counts [rad].
         anchor: where the noise, and the effect of open start angles, were estimated: shape (p,).
         noises: how often they were.
     """
 
-    descent: Descent
     weight: float
     anchor: Array
     noises: int = 1
-
-    def arrays(self) -> Arrays:
-        own = {"weight": self.weight, "anchor": self.anchor, "noises": self.noises}
-        return self.descent.arrays() | {name: np.asarray(value) for name, value in own.items()}
 
 
 def refine(
     problem: Problem,
     theta: Array,
     settings: RefinementSettings,
-    progress: Callable[[str, int, float], None] | None = None,
+    progress: Callable[[str, int, float], None] = lambda *_: None,
     checkpoints: Checkpoints | None = None,
     name: str = "refined",
 ) -> Descent:
@@ -71,29 +65,25 @@ def refine(
         RunError: the checkpoint cannot be written.
     """
     checkpoints = {} if checkpoints is None else checkpoints
-    stored = checkpoints.get(name)
-    if stored is None:
-        now = _estimated(problem, problem.parameters.to_unit(theta))
+    if name in checkpoints:
+        now = _Refinement.from_arrays(checkpoints[name])
+        if now.ended:
+            return now
     else:
-        own = float(stored["weight"]), stored["anchor"], int(stored["noises"])
-        now = _Refinement(Descent.from_arrays(stored), *own)
-        if now.descent.ended:
-            return now.descent
+        now = _estimated(problem, problem.parameters.to_unit(theta))
     residuals = _residuals(problem, now)
     with saving(checkpoints, name) as keep:
-        while not now.descent.ended:
-            if not len(now.descent.jacobian):
+        while not now.ended:
+            if not len(now.jacobian):
                 after = _following(problem, now)
                 residuals = residuals if after is now else _residuals(problem, after)
                 now = after
                 keep(now.arrays)
-            now = replace(now, descent=step(now.descent, residuals, settings))
-            if progress is not None:
-                error = problem.rms(now.descent.residual[None, : problem.measured.size])[0]
-                progress(name, now.descent.evaluations, float(error))
+            now = step(now, residuals, settings)
+            progress(name, now.evaluations, problem.rms(now.residual[None, : problem.measured.size])[0])
         keep(now.arrays)
-    _log.info("refinement of %d parameters: %s", now.descent.point.size, now.descent)
-    return now.descent
+    _log.info("refinement of %d parameters: %s", now.point.size, now)
+    return now
 
 
 def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refinement:
@@ -101,21 +91,21 @@ def _estimated(problem: Problem, unit: Array, row: Array | None = None) -> _Refi
     theta, weight = problem.parameters.from_unit(unit[None]), 0.0
     here = with_open_start(problem, theta[0]).residuals(theta)[0] if row is None else row
     if len(problem.priors) or problem.leaves_start_open:
-        weight = prior_weight(problem.channels, here, problem.settings.objective)
-    return _Refinement(start(unit, np.append(here, weight * problem.priors.scores(theta))), weight, unit)
+        weight = prior_weight(problem, here)
+    begun = start(unit, np.append(here, weight * problem.priors.scores(theta)))
+    return _Refinement(**vars(begun), weight=weight, anchor=unit)
 
 
 def _following(problem: Problem, now: _Refinement) -> _Refinement:
     """Return the refinement with the noise estimated at its point, if it has changed."""
+    row = now.residual[: problem.measured.size]
     if not now.weight or now.noises == MAX_NOISES:
         return now
-    row, point = now.descent.residual[: problem.measured.size], now.descent.point
-    weight = prior_weight(problem.channels, row, problem.settings.objective)
-    if abs(weight - now.weight) <= SETTLED * now.weight:
+    if abs(prior_weight(problem, row) - now.weight) <= SETTLED * now.weight:
         return now
-    here = _estimated(problem, point, None if problem.leaves_start_open else row)
-    descent = replace(now.descent, residual=here.descent.residual, cost=here.descent.cost)
-    return replace(here, descent=descent, noises=now.noises + 1)
+    here = _estimated(problem, now.point, None if problem.leaves_start_open else row)
+    changed = {"residual": here.residual, "cost": here.cost, "weight": here.weight, "anchor": here.anchor}
+    return replace(now, **changed, noises=now.noises + 1)
 
 
 def _residuals(problem: Problem, now: _Refinement) -> Callable[[Array], Array]:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hydroid.fitting.checkpoints import Arrays, Checkpoints, saving
-from hydroid.fitting.memo import Memo
+from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
 from hydroid.fitting.multistart import Multistart
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
-from hydroid.search.coding import Genes
+from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Nsga2, Population, SimpleGa
 
 HISTORY = ("generation", "evaluations", "simulated", "infeasible", "best", "median")

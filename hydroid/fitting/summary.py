@@ -1,24 +1,35 @@
-"""A fit's result as `estimate.yaml` and `--json` hold it."""
+"""A fit's result as `estimate.yaml` and `--json` hold it, with what a reader must know before using it."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from hydroid.estimate import FitSummary, NamedEstimate, ParameterEstimate, finite
-from hydroid.fitting.findings import fit_findings, parameter_findings
+from hydroid.findings import Finding
 from hydroid.fitting.fit import Fit
-from hydroid.parameters import Array
-from hydroid.posterior.by_log import by_log
-from hydroid.posterior.uncertainty import Identifiability, Uncertainty
+from hydroid.parameters import Array, ParameterSet
+from hydroid.posterior.by_log import FEW, ByLog, by_log
+from hydroid.posterior.identifiability import Identifiability
+from hydroid.posterior.uncertainty import Flag, Source, Uncertainty
 from hydroid.problem.problem import Problem
+
+STRAINED_ABOVE = 2.0
+"""standard deviations from its prior beyond which an estimate strains it"""
+_MOST_DIRECTIONS = 6
+_WARNINGS = ("at bound", "effect unknown")
+_NOTES = ("at zero", "no effect", "not identifiable", "prior only", "weakly identifiable")
+"""of what is found about single parameters, the most important first"""
 
 
 def summarise(problem: Problem, fit: Fit) -> FitSummary:
     """Return the final estimate with its uncertainty, and the estimates it was chosen from."""
-    last = problem.varied(problem.settings.of_estimate(fit.final))
-    objective = 1.0 if problem.settings.objective.relative else 180 / np.pi
+    settings, refinement = problem.settings, fit.refinement
+    objective = 1.0 if settings.objective.relative else 180 / np.pi
+    last = problem.varied(settings.of_estimate(fit.final))
     known = account(last, fit.uncertainty, fit.identifiability)
     estimates = {
         e.name: NamedEstimate(
-            values=problem.settings.of_estimate(e.name).parameter_set().mapping(e.theta),
+            values=settings.of_estimate(e.name).parameter_set().mapping(e.theta),
             rms_deg=finite(np.degrees(e.rms)),
             objective=finite(objective * e.overall),
         )
@@ -27,13 +38,13 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
     own = {
         "joints": problem.active_joints,
         "final": fit.final,
-        "converged": None if fit.refinement is None else fit.refinement.converged,
-        "ending": None if fit.refinement is None else fit.refinement.ending.value,
+        "converged": refinement and refinement.converged,
+        "ending": refinement and refinement.ending.value,
         "rms_deg": finite(np.degrees(fit.best.rms)),
-        "seed": problem.settings.search.seed,
+        "seed": settings.search.seed,
         "simulations": int(fit.history[-1, 2]),
         "diverged": int(fit.history[-1, 3]),
-        "findings": (*fit_findings(fit), *known.findings),
+        "findings": (*fit_findings(last, fit), *known.findings),
         "estimates": estimates,
         "quantities": fit.quantities.scalars,
         "curves": fit.quantities.curves,
@@ -43,42 +54,93 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
 
 def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:
     """Return an estimate with what its logs say about it, whatever led to it."""
-    logs, scale, count = by_log(problem, known), known.linear.box.scale, len(known.theta)
-    relative = np.full(count, np.nan) if logs is None else logs.relative
-    by_logs = np.full((count, 2), np.nan) if logs is None else logs.interval
+    logs, scale, parameters = by_log(problem, known), known.linear.box.scale, problem.parameters
     estimate = {
         parameter.name: ParameterEstimate(
             value=float(known.theta[i]),
             unit=parameter.unit,
             sd=finite(known.standard_deviation[i]),
-            sd_by_log=finite(relative[i] * scale[i]),
+            sd_by_log=finite(logs.relative[i] * scale[i]),
             interval=_ends(known.interval[i]),
-            interval_by_log=_ends(by_logs[i]),
+            interval_by_log=_ends(logs.interval[i]),
             flag=status.flag.value,
             source=status.source and status.source.value,
-            data_share=status.share if known.free[i] else None,
+            data_share=None if status.flag is Flag.FIXED else status.share,
             at_bound=status.at_bound,
             effect_deg=finite(np.degrees(known.sensitivity[i])),
         )
-        for i, (parameter, status) in enumerate(zip(problem.parameters.parameters, known.status, strict=True))
+        for i, (parameter, status) in enumerate(zip(parameters.parameters, known.status, strict=True))
     }
     squares: dict[str, list[float]] = {}
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
             squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
+    findings = [*_parameter_findings(parameters, estimate), *log_findings(logs)]
+    findings += _direction_findings(directions) if directions else []
     return FitSummary(
         stage=problem.settings.stage,
         estimate=estimate,
-        findings=parameter_findings(problem, known, logs, directions),
-        covariance=known.posterior.stored(problem.parameters),
+        findings=tuple(sorted(findings, key=lambda finding: finding.level == "note")),
+        covariance=known.posterior.stored(parameters),
         noise_deg={angle: float(np.degrees(np.sqrt(np.mean(each)))) for angle, each in squares.items()},
-        left_out_deg={
-            f"q{joint}": tuple(np.degrees(errors).tolist())
-            for joint, errors in ({} if logs is None else logs.left_out).items()
-        },
+        left_out_deg={angle: tuple(errors) for angle, errors in logs.left_out.items()},
     )
 
 
 def _ends(interval: Array) -> tuple[float | None, float | None]:
-    low, high = interval.tolist()
-    return finite(low), finite(high)
+    return finite(interval[0]), finite(interval[1])
+
+
+def fit_findings(problem: Problem, fit: Fit) -> list[Finding]:
+    """Return what is to be said about a fit's way to its estimate; the problem is that of the last one."""
+    findings = list[Finding]()
+    if fit.refinement is None:
+        findings.append(Finding("not refined", "warning"))
+    elif not fit.refinement.converged:
+        ending = {"ending": fit.refinement.ending.value}
+        findings.append(Finding("not converged", "warning", (fit.final,), ending))
+    scores = zip(problem.priors.names, problem.priors.scores(fit.best.theta[None])[0].tolist(), strict=True)
+    for prior, score in sorted(scores, key=lambda pair: -abs(pair[1])):
+        numbers = {"score": abs(score), "side": "above" if score > 0 else "below"}
+        if abs(score) > STRAINED_ABOVE:
+            findings.append(Finding("strained prior", "warning", (prior,), numbers))
+    findings += [Finding("diverged", "warning", (e.name,)) for e in fit.estimates.values() if not e.usable]
+    # half of a 95 % interval as large as the value, or without end
+    lost = dict.fromkeys(q.label for q in fit.quantities.scalars.values() if not q.within <= 1.0)
+    return [*findings, *([Finding("quantities open", "note", tuple(lost))] if lost else [])]
+
+
+def log_findings(logs: ByLog) -> list[Finding]:
+    """Return which parameters differ from log to log by more than the noise explains."""
+    few = max(logs.freedom[np.isfinite(logs.freedom)], default=0.0) < FEW
+    kind = "few logs disagree" if few else "logs disagree"
+    return [Finding(kind, "warning", logs.differing)] if logs.differing else []
+
+
+def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:
+    """What is to be said about what the logs determine; a bound of 0 cannot be widened."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for parameter in parameters.parameters:
+        one = estimate[parameter.name]
+        idle, zero = one.flag == Flag.NO_EFFECT, one.at_bound == "lower" and parameter.lower == 0
+        if one.at_bound and not idle:
+            kinds.setdefault(("at zero" if zero else "at bound", one.at_bound), []).append(parameter.name)
+        kind = one.source if one.source == Source.PRIOR and not idle else one.flag
+        kinds.setdefault((str(kind), ""), []).append(parameter.name)
+        if one.effect_deg is None and one.flag != Flag.FIXED:  # simulations diverge where it is changed
+            kinds.setdefault(("effect unknown", ""), []).append(parameter.name)
+    return [
+        Finding(
+            kind, "warning" if kind in _WARNINGS else "note", tuple(names), {"side": side} if side else {}
+        )
+        for kind in (*_WARNINGS, *_NOTES)
+        for (own, side), names in kinds.items()
+        if own == kind
+    ]
+
+
+def _direction_findings(directions: Identifiability) -> list[Finding]:
+    several = [tuple(one) for one in directions.combinations if len(one) > 1]
+    findings = [Finding("combination", "note", names) for names in several[:_MOST_DIRECTIONS]]
+    more = {"count": str(len(several) - _MOST_DIRECTIONS)}
+    return findings + [Finding("more combinations", "note", (), more)] * (len(several) > _MOST_DIRECTIONS)

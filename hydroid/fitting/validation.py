@@ -17,7 +17,7 @@ from hydroid.fitting.summary import account
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.band import Band, prediction_bands
+from hydroid.posterior.band import Band, fitted_bands, prediction_bands
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
@@ -123,39 +123,27 @@ def errors_ahead(log: Log, errors: Callable[[Log], Array]) -> Array:
 
     Args:
         log: the log.
-        errors: of a part of it [rad], shape (T, K).
+        errors: of a part of it [rad], shape (T,) or (T, K).
 
     Returns:
-        One row for each start [rad], shape (N, HORIZONS, K); NaN where the log ends before.
+        One row for each start [rad], shape (N, HORIZONS) or (N, HORIZONS, K); NaN where the log ends before.
     """
     before, rows = round(SETTLING / log.period), list[Array]()
-    steps = [before + round(seconds / log.period) for seconds in HORIZONS]
-    for first in range(0, len(log.time) - steps[0], before):
-        error = errors(log.part(first, first + steps[-1] + 1))
-        none = np.full(error.shape[1], np.nan)
+    steps = np.array([before + round(seconds / log.period) for seconds in HORIZONS])
+    for first in range(0, len(log.time) - int(steps[0]), before):
+        error = errors(log.part(first, first + int(steps[-1]) + 1))
+        row, there = np.full((len(steps), *error.shape[1:]), np.nan), steps < len(error)
         with np.errstate(invalid="ignore"):  # it may have diverged
-            rows.append(np.array([error[k] - error[before] if k < len(error) else none for k in steps]))
+            row[there] = error[steps[there]] - error[before]
+        rows.append(row)
     return np.array(rows)
 
 
 def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
     """Return what the final estimate of a fit makes of its own logs."""
-    known = fit.uncertainty.posterior
-    slopes = fit.uncertainty.linear.slopes
-    bands: list[dict[int, Band]] = [{} for _ in problem.logs]
-    for channel, noise in zip(problem.channels, fit.uncertainty.noise, strict=True):
-        if channel.quantity == "angle":
-            sd, level = known.sd(slopes[:, channel.rows]) / channel.weight, noise.level / channel.weight
-            error = channel.measured - fit.best.responses[channel.log][:, channel.column]
-            half = known.quantile * np.hypot(sd, level)
-            inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
-            expected = float(np.sqrt(np.mean(sd**2) + level**2))
-            bands[channel.log][channel.joint] = Band(level, half, inside, rms, expected, np.inf)
-    joints = tuple(problem.settings.outputs)
-    return tuple(
-        Prediction(fit.final, *one, unseen=False)
-        for one in zip(problem.logs, [joints] * len(bands), fit.best.responses, bands, strict=True)
-    )
+    joints, responses = tuple(problem.settings.outputs), fit.best.responses
+    logs = zip(problem.logs, responses, fitted_bands(problem, fit.uncertainty, responses), strict=True)
+    return tuple(Prediction(fit.final, log, joints, angles, bands, False) for log, angles, bands in logs)
 
 
 def without_one(model: IdentifiedModel, logs: Sequence[Log], left_out: int) -> IdentifiedModel:

@@ -16,7 +16,6 @@ its. The first of these that is true is the verdict:
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -41,9 +40,8 @@ Baselines = Mapping[int, Mapping[str, Baseline]]
 
 def baselines_of(settings: FitSettings, logs: Sequence[Log]) -> Baselines:
     """Fit the baselines of all compared joints to logs."""
-    arm = settings.arm
-    limits = dict(enumerate(zip(arm.lower, arm.upper, strict=True), start=1))
-    return {joint: fit_baselines(logs, joint, np.array(limits[joint])) for joint in settings.outputs}
+    limits = np.stack([settings.arm.lower, settings.arm.upper], axis=1)
+    return {joint: fit_baselines(logs, joint, limits[joint - 1]) for joint in settings.outputs}
 
 
 def judge(
@@ -74,32 +72,30 @@ def _judge(
 ) -> JointVerdict:
     joint = rivals[NAMES[0]].joint
     own, new = ([p for p in some if p.log.driven[joint - 1]] for some in (fitted, unseen))
-    judged = new or own
-    travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in judged), default=0.0)
     stated = settings.tolerance_deg
     stated = stated.get(joint) if isinstance(stated, dict) else stated
+    travel = max((np.ptp(p.log.angle[:, joint - 1]) for p in new or own), default=0.0)
     tolerance = stated or float(np.degrees(SHARE * travel))
     errors = [rms_deg(p.error(joint) for p in some) if some else None for some in (own, new)]
     by_rival = [
         {name: rms_deg(one.errors([p.log]) for p in some) for name, one in rivals.items()} if some else {}
         for some in (own, new)
     ]
-    word = _word(errors, by_rival, tolerance, stated=stated is not None)
     ahead: dict[str, list[Array]] = {}
     if new and all(len(p.ahead) for p in new):
         ahead["the fit"] = [p.ahead[..., p.joints.index(joint)] for p in new]
-        for name, rival in rivals.items():
-            ahead[name] = [errors_ahead(p.log, partial(_column, rival))[..., 0] for p in new]
+        for name, one in rivals.items():
+            ahead[name] = [errors_ahead(p.log, lambda part, one=one: one.errors([part])) for p in new]
     return JointVerdict(
         joint=joint,
         name=settings.arm.joint_names[joint - 1],
         slides=settings.arm.joints[joint - 1].slides,
-        verdict=word,
+        verdict=_word(errors, by_rival, tolerance, stated=stated is not None),
         fitted_deg=finite(errors[0]),
         unseen_deg=finite(errors[1]),
         tolerance_deg=tolerance,
         baselines_deg=by_rival[1] or by_rival[0],
-        horizons_deg={name: _rms_ahead(np.concatenate(errors)) for name, errors in ahead.items()},
+        horizons_deg={name: _rms_ahead(np.concatenate(rows)) for name, rows in ahead.items()},
     )
 
 
@@ -128,13 +124,9 @@ def rms_deg(errors: Iterable[Array]) -> float:
     return float(np.degrees(np.sqrt(np.mean(np.concatenate([*errors]) ** 2))))
 
 
-def _column(rival: Baseline, part: Log) -> Array:
-    return rival.errors([part])[:, None]
-
-
 def _rms_ahead(errors: Array) -> tuple[float | None, ...]:
     """Return the rms of errors of predicted changes [rad], shape (N, HORIZONS), over the starts [deg]."""
-    there = np.where(np.isnan(errors), 0.0, 1.0)
+    there = ~np.isnan(errors)
     with np.errstate(all="ignore"):
-        mean = np.sum(np.nan_to_num(errors**2, posinf=np.inf), axis=0) / np.sum(there, axis=0)
+        mean = np.sum(errors**2, axis=0, where=there) / there.sum(axis=0)
     return tuple(map(finite, np.degrees(np.sqrt(mean)).tolist()))

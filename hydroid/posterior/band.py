@@ -7,6 +7,7 @@ is the model's, as far as the fit can know it. It is known from as many errors a
 Student's t. What an unseen log shows beyond all this is a further error of the model.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ from scipy.stats import t as student
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.open_start import start_deviations
-from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, stored_posterior
+from hydroid.posterior.linear import start_deviations
+from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, Posterior, stored_posterior
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.free_start import start_slopes
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
@@ -52,12 +54,24 @@ class Band:
     @property
     def model_error(self) -> float:
         """Rms error that neither noise nor parameters explain [rad]."""
-        return float(np.sqrt(max(self.error**2 - self.expected**2, 0.0)))
+        return np.sqrt(max(self.error**2 - self.expected**2, 0.0))
 
     @property
     def model_limits(self) -> bool:
         """Whether the model, not the noise, limits the prediction."""
-        return self.inside < 0.9 and self.error > self.limit  # 5 % are expected outside
+        return bool(self.inside < 0.9 and self.error > self.limit)  # 5 % are expected outside
+
+
+def fitted_bands(problem: Problem, known: Uncertainty, responses: Sequence[Array]) -> list[dict[int, Band]]:
+    """Return the bands of the compared joints around responses [rad], (T, K), to the fitted logs."""
+    bands: list[dict[int, Band]] = [{} for _ in problem.logs]
+    for channel, noise in zip(problem.channels, known.noise, strict=True):
+        if channel.quantity == "angle":
+            sd = known.posterior.sd(known.linear.slopes[:, channel.rows]) / channel.weight
+            error = channel.measured - responses[channel.log][:, channel.column]
+            band = _band(known.posterior, noise.level / channel.weight, sd**2, error)
+            bands[channel.log][channel.joint] = band
+    return bands
 
 
 def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[int, Band]:
@@ -77,7 +91,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         return problem.responses(theta)[0].angle.reshape(len(theta), -1)
 
     slopes = differentiate(angles, known.box, known.axes(STEP))
-    noises = {joint: float(np.radians(levels[f"q{joint}"])) for joint in outputs}
+    noises = {joint: np.radians(levels[f"q{joint}"]) for joint in outputs}
     start = start_effects(problem, model.theta, noises)
     parts = known.parts(slopes).reshape(-1, *response.shape)
     slopes = slopes.reshape(parts.shape)
@@ -87,29 +101,44 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         if np.mean(variance) > np.mean(np.sum(slopes[:, :, column] ** 2, axis=0)):
             variance = np.full_like(variance, np.inf)  # no better than from parameters known to 100 % each
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
-        begun = np.sum(start[joint] ** 2, axis=0)
-        right, unseen = variance + noise**2, np.radians(left_out.get(f"q{joint}", ()))
-        wrong = max(float(np.mean(unseen**2) - np.mean(right)), 0.0) if unseen.size else 0.0
+        unseen = np.radians(left_out.get(f"q{joint}", ()))
+        wrong = max(np.mean(unseen**2) - np.mean(variance + noise**2), 0.0) if unseen.size else 0.0
         widened = wrong * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
-        half = np.sqrt(known.quantile**2 * (right + begun) + NORMAL**2 * widened)
-        inside, rms = float(np.mean(np.abs(error) <= half)), float(np.sqrt(np.mean(error**2)))
-        expected = float(np.mean(right + begun)) + wrong
+        variance = variance + np.sum(start[joint] ** 2, axis=0)
         few = np.vstack([parts[:, :, column], start[joint]])
-        shares = np.append(np.linalg.eigvalsh(few @ few.T / few.shape[1]), widened)
-        limit = _limit(expected - wrong + widened, shares)
-        bands[joint] = Band(noise, half, inside, rms, float(np.sqrt(expected)), limit)
+        square = np.sum((few @ few.T / few.shape[1]) ** 2) + widened**2
+        limit = _limit(np.mean(variance) + noise**2 + widened, square)
+        bands[joint] = _band(known, noise, variance, error, (wrong, widened, limit))
     return bands
 
 
-def _limit(mean: float, shares: Array) -> float:
+def _band(
+    known: Posterior,
+    noise: float,
+    variance: Array,
+    error: Array,
+    unseen: tuple[float, float, float] = (0.0, 0.0, np.inf),
+) -> Band:
+    """Return the band of an error [rad] from the level of the noise, and the variance of the rest, (T,).
+
+    `unseen`: mean square error of the model on unseen logs, the same as wide as it is known, and the limit.
+    """
+    (wrong, widened, limit), variance = unseen, variance + noise**2
+    half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
+    inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
+    return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong), limit)
+
+
+def _limit(mean: float, square: float) -> float:
     """Root of the mean square error that 5 % of the logs exceed.
 
-    `mean` is its expected value. `shares` of it are the squares of one normal number each; the rest is the
-    mean of many. The sum is about a multiple of chi-square (F. E. Satterthwaite, 1946).
+    `mean` is its expected value. Parts of it are the squares of one normal number each, of which `square` is
+    the sum of squares; the rest is the mean of many. The sum is about a multiple of chi-square
+    (F. E. Satterthwaite, 1946).
     """
     if not np.isfinite(mean):
         return np.inf
-    freedom = mean**2 / max(float(np.sum(shares**2)), 1e-3 * mean**2)
+    freedom = mean**2 / max(square, 1e-3 * mean**2)
     return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
 
 

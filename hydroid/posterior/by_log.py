@@ -27,9 +27,8 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from hydroid.parameters import Array
-from hydroid.posterior.flags import Source
 from hydroid.posterior.posterior import COVERAGE
-from hydroid.posterior.uncertainty import Uncertainty, ends
+from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
 
 FEW = 5.0
@@ -46,26 +45,29 @@ class ByLog:
         interval: of 95 %, shape (P, 2).
         freedom: degrees of freedom of the standard deviation, shape (P,).
         differing: parameters that differ from log to log by more than the noise explains: the model errs.
-        left_out: rms error of each compared angle on each log if it is left out [rad], shape (G,), by joint.
-            What one log alone determines stays as it is: the others say nothing of it.
+        left_out: rms error of each compared angle on each of the G logs if it is left out [deg]; `q2` of
+            joint 2. What one log alone determines stays as it is: the others say nothing of it.
     """
 
     relative: Array
     interval: Array
     freedom: Array
     differing: tuple[str, ...]
-    left_out: dict[int, Array]
+    left_out: dict[str, list[float]]
 
 
-def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
-    """Return what the differences between the logs say; None for one log."""
-    logs = sorted({channel.log for channel in problem.channels})
+def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
+    """Return what the differences between the logs say: nothing of one log."""
+    of = np.array([channel.log for channel in problem.channels])
+    logs, number = np.unique(of), np.repeat(of, [len(channel.measured) for channel in problem.channels])
     if len(logs) < 2:
-        return None
+        unknown = np.full(len(uncertainty.theta), np.nan)
+        return ByLog(unknown, np.stack([unknown, unknown], axis=1), unknown, (), {})
     linear, row = uncertainty.linear, uncertainty.linear.residual.copy()
-    columns = [np.concatenate([np.r_[c.rows] for c in problem.channels if c.log == g]) for g in logs]
+    columns = [np.flatnonzero(number == g) for g in logs]
     effects = [linear.effects[:, own] for own in columns]
     shares = np.array([u @ u.T for u in effects])  # A_g
+    scatters = np.array([uncertainty.scatters[of == g].sum(axis=0) for g in logs])
     share, axes = np.linalg.eigh(shares)
     alone = share > 0.99  # only this log has information on the direction
     gain = np.where(alone, 0.0, 1 / (1 - np.minimum(share, 0.99)))
@@ -74,23 +76,20 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
     steps = np.array([m @ u @ row[own] for m, u, own in zip(inverses, effects, columns, strict=True)])
     for own, step, u in zip(columns, steps, effects, strict=True):
         row[own] += step @ u
-    left_out: dict[int, list[float]] = {}
-    scatters = np.zeros_like(shares)
-    for channel, noise in zip(problem.channels, uncertainty.noise, strict=True):
-        scatters[logs.index(channel.log)] += noise.covariance_of(linear.effects[:, channel.rows])
+    left_out: dict[str, list[float]] = {}
+    for channel in problem.channels:
         if channel.quantity == "angle":
             error = np.sqrt(np.mean((row[channel.rows] / channel.weight) ** 2))
-            left_out.setdefault(channel.joint, []).append(float(error))
-    by_joint = {joint: np.array(errors) for joint, errors in left_out.items()}
+            left_out.setdefault(f"q{channel.joint}", []).append(float(np.degrees(error)))
 
     rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary
     expected = _expected(rows @ inverses, shares, scatters, linear.prior_scatter)
     mean, square = np.trace(expected, axis1=1, axis2=2), np.sum(expected**2, axis=(1, 2))
     # what the priors say is no less certain where the logs differ
-    noise, stated = (np.sum(rows @ m * rows, axis=1) for m in (pooled, linear.prior_scatter))
+    noise = np.sum(rows @ pooled * rows, axis=1) / uncertainty.posterior.deviations**2
     with np.errstate(invalid="ignore", divide="ignore"):  # 0 / 0 of a parameter without effect: not known
         freedom, ratio = mean**2 / square, np.sum((steps @ rows.T) ** 2, axis=0) / mean
-        widened = np.sqrt((stated + noise * ratio) / (stated + noise))
+        widened = np.sqrt(1 - noise + noise * ratio)
     # a parameter that owes a tenth of its deviation to what one log alone has is unknown by log
     owed = np.linalg.norm(rows @ np.where(alone[:, None], axes, 0.0), axis=2)
     widened[(owed > 0.1 * np.linalg.norm(rows, axis=1)).any(axis=0)] = np.inf
@@ -99,12 +98,11 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog | None:
     out = [s.at_bound is not None or s.source is Source.PRIOR for s in uncertainty.status]
     relative[~np.isfinite(uncertainty.relative) | out] = np.nan
     half = student.ppf(0.5 + COVERAGE / 2, freedom) * relative
-    interval = ends(problem.parameters, uncertainty.theta, linear.box.scale, half)
     # in 5 % of the fits with a right model any parameter is said to differ
     known = np.isfinite(relative)
     differing = known & (chi2.sf(freedom * ratio, freedom) < 0.05 / max(known.sum(), 1))
     names = tuple(np.array(problem.parameters.names)[differing].tolist())
-    return ByLog(relative, interval, freedom, names, by_joint)
+    return ByLog(relative, ends(problem.parameters, linear.box, half), freedom, names, left_out)
 
 
 def _expected(changes: Array, shares: Array, scatters: Array, priors: Array) -> Array:

@@ -1,18 +1,28 @@
-"""Least squares linearised at an estimate, by finite differences as wide as the uncertainty."""
+"""Least squares linearised at an estimate, by finite differences as wide as the uncertainty.
 
+Open start angles join with a prior: how well a log's sensor shows where the arm starts. A start is wrong by
+the noise of one reading, or of the mean of a few. A residual shows this noise, and the error of the model
+besides. So it is no more than the residual's level, and no more than 0.2°, or what the signal itself jumps
+between samples. What the start angles may explain then stays small where the model errs by degrees. A joint
+that is not compared has a sensor like the others', and no more noise than its angle spreads.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.log import Log
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.noise import prior_weight
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.noise import Noise, prior_weight, problem_noise
 from hydroid.posterior.posterior import WEAK_PRIOR, Posterior, regular
+from hydroid.problem.channels import Channel
+from hydroid.problem.free_start import start_slopes
 from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem
-from hydroid.search.axes import Box, differentiate, single_axes
+from hydroid.problem.problem import OpenStart, Problem
+from hydroid.search import Mask
+from hydroid.search.axes import Box, Function, differentiate, single_axes
 
 NO_EFFECT_BELOW = 1e-6
 """a parameter whose effect is below this part of the strongest one's has none"""
@@ -39,12 +49,7 @@ class Linear:
     slopes: Array
     prior_slopes: Array
     prior_weight: float
-    diverging: NDArray[np.bool_]
-
-    @property
-    def idle(self) -> NDArray[np.bool_]:
-        """Parameters that the residuals do not depend on, shape (p,)."""
-        return ~self.slopes.any(axis=1) & ~self.diverging
+    diverging: Mask
 
     @property
     def sensitivity(self) -> Array:
@@ -58,21 +63,20 @@ class Linear:
         return white_posterior(self.box, self.slopes / self.prior_weight, self.prior_slopes)
 
     @cached_property
-    def _parts(self) -> tuple[Array, Array]:
+    def _svd(self) -> tuple[Array, Array, Array]:
         weight, weak = self.prior_weight, np.eye(len(self.slopes)) / WEAK_PRIOR
         rows = np.hstack([self.slopes, weight * self.prior_slopes, weight * weak])
-        directions, values, effects = np.linalg.svd(rows, full_matrices=False)
-        return directions / values, effects
+        return np.linalg.svd(rows, full_matrices=False)
 
     @property
     def changes(self) -> Array:
         """Relative change of each parameter per unit of each effect, V D^-1, shape (p, p)."""
-        return self._parts[0]
+        return self._svd[0] / self._svd[1]
 
     @property
     def effects(self) -> Array:
         """Orthonormal rows U, shape (p, R + M + p)."""
-        return self._parts[1]
+        return self._svd[2]
 
     @cached_property
     def prior_scatter(self) -> Array:
@@ -80,18 +84,20 @@ class Linear:
         priors = self.prior_weight * self.effects[:, self.residual.size :]
         return priors @ priors.T
 
-    def of(self, kept: NDArray[np.bool_]) -> "Linear":
-        """Return it with only some of the p parameters varying, shape (p,)."""
-        varied = self.box.varied.copy()
-        varied[varied] = kept
-        box, diverging = replace(self.box, varied=varied), self.diverging[kept]
-        return replace(
-            self, box=box, slopes=self.slopes[kept], prior_slopes=self.prior_slopes[kept], diverging=diverging
-        )
+    def scatters(self, channels: Sequence[Channel], noise: Sequence[Noise]) -> Array:
+        """Covariance of the effects by the noise of each channel, U S U', shape (C, p, p)."""
+        pairs = zip(channels, noise, strict=True)
+        return np.array([one.covariance_of(self.effects[:, channel.rows]) for channel, one in pairs])
 
-    def spread(self, values: Array, others: float = np.nan) -> Array:
-        """Return values of the parameters that vary, shape (p,), for all of them, shape (P,)."""
-        whole = np.full(self.box.at.size, others)
+    def of(self, kept: Mask) -> "Linear":
+        """Return it with only some of the p parameters varying, shape (p,)."""
+        slopes, prior_slopes, diverging = self.slopes[kept], self.prior_slopes[kept], self.diverging[kept]
+        box = self.box.of(kept)
+        return replace(self, box=box, slopes=slopes, prior_slopes=prior_slopes, diverging=diverging)
+
+    def spread(self, values: Array) -> Array:
+        """Return values of the parameters that vary, shape (p,), among all, shape (P,); NaN elsewhere."""
+        whole = np.full(self.box.at.size, np.nan)
         whole[self.box.varied] = values
         return whole
 
@@ -110,7 +116,7 @@ def linearised(problem: Problem, theta: Array, first: Array | None = None) -> Li
     """
     problem = with_open_start(problem, theta)
     box, residual = estimate_box(problem.parameters, theta), problem.residuals(theta[None])[0]
-    weight = prior_weight(problem.channels, residual, problem.settings.objective)
+    weight = prior_weight(problem, residual)
     if first is None:
         single = single_axes(box, 1e-3)
         slopes = differentiate(problem.residuals, box, single.one_sided, residual)
@@ -157,3 +163,67 @@ def white_posterior(box: Box, *parts: Array) -> Posterior:
     """Return the posterior of independent measurements, each (p, m): derivatives over their noise."""
     weak = np.eye(int(box.varied.sum())) / WEAK_PRIOR
     return Posterior(box, regular(np.vstack([weak, *(part.T for part in parts)])))
+
+
+def with_open_start(problem: Problem, theta: Array) -> Problem:
+    """Return the problem whose residuals hold for any start angle that its logs leave open.
+
+    The effect of the start angles, and the noise that their priors follow from, are those at theta, (P,). It
+    is the same problem where all logs show where they start.
+    """
+    return _opened(problem, tuple(theta.tolist())) if problem.leaves_start_open else problem
+
+
+def least_squares_rows(problem: Problem, at: Array, prior_weight: float) -> Function:
+    """Return what least squares minimises: candidates, (n, P), to residuals and weighed scores, (n, R + M).
+
+    The start angles are open as at an estimate, shape (P,).
+    """
+    opened = with_open_start(problem, at)
+
+    def rows(theta: Array) -> Array:
+        return np.hstack([opened.residuals(theta), prior_weight * problem.priors.scores(theta)])
+
+    return rows
+
+
+@lru_cache(maxsize=1)  # a refinement asks for the same once more
+def _opened(problem: Problem, values: tuple[float, ...]) -> Problem:
+    theta = np.array(values)
+    slopes = start_slopes(problem, theta)
+    # first without a prior
+    unbound = [
+        each.opened(np.where(np.isin(each.joints, problem.settings.outputs), 1e9, 0.0)) for each in slopes
+    ]
+    free = problem.with_open_starts(unbound)
+    row = free.residuals(theta[None])[0]
+    if not np.isfinite(row).all():
+        return free
+    opened, noise, weight = list[OpenStart](), problem_noise(problem, row), prior_weight(problem, row)
+    for each in slopes:
+        own = [(c, n) for c, n in zip(problem.channels, noise, strict=True) if c.log == each.log]
+        levels = {c.joint: n.level / c.weight for c, n in own if c.quantity == "angle"}
+        deviations = start_deviations(problem.logs[each.log], each.joints, levels)
+        opened.append(each.opened(deviations / weight))
+    return problem.with_open_starts(opened)
+
+
+def start_deviations(log: Log, joints: Sequence[int], levels: Mapping[int, float]) -> Array:
+    """Return how well a log shows the start angles of some of its joints [rad], shape (k,).
+
+    `levels` [rad] are those of the compared angles' residuals, by joint.
+    """
+    noise = {joint: sensor_noise(log, joint, level) for joint, level in levels.items()}
+    worst = max(noise.values())
+    readings = [noise.get(j, min(worst, np.std(log.angle[:, j - 1]))) for j in joints]
+    return readings / np.sqrt(np.maximum([log.start_samples[j - 1] for j in joints], 1.0))
+
+
+def sensor_noise(log: Log, joint: int, level: float) -> float:
+    """Standard deviation of one reading of a joint's angle [rad], no more than `level`.
+
+    The third difference of white noise has 20 times its variance, and that of a motion is next to nothing.
+    """
+    jumps = np.diff(log.angle[:, joint - 1], n=3)
+    shown = np.sqrt(np.mean(jumps**2) / 20) if len(jumps) else 0.0
+    return min(level, max(np.radians(0.2), shown))

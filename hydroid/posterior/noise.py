@@ -10,9 +10,8 @@ A variance that follows from an estimated process is uncertain because the proce
 normal, with a variance from the process's own information (P. Whittle, 1953): see `neighbours`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Literal
 
 import numpy as np
@@ -22,11 +21,12 @@ from scipy.signal import lfilter, lfiltic
 
 from hydroid.parameters import Array
 from hydroid.problem.channels import Channel
+from hydroid.problem.problem import Problem
 from hydroid.settings.problem import ObjectiveSettings
 
 STEP = 1e-4
 """of the differences by a process's numbers, in hyperbolic arc tangents of its reflection coefficients"""
-MIN_LEVEL = {"angle": float(np.deg2rad(0.05)), "pressure_a": 1e4, "pressure_b": 1e4}
+MIN_LEVEL = {"angle": np.deg2rad(0.05), "pressure_a": 1e4, "pressure_b": 1e4}
 """smallest noise level that a residual can show [rad, Pa]: no potentiometer or gauge is better (ours)"""
 
 
@@ -53,19 +53,11 @@ class Noise:
         known[0], polynomial, variance = self.level**2, np.ones(1), self.level**2
         for m, k in enumerate(self.reflection[:order]):
             known[m + 1] = -k * variance - polynomial[1:] @ known[m:0:-1]
-            polynomial, variance = _next_predictor(polynomial, variance, k)
+            polynomial, variance = _longer(polynomial, k), variance * (1 - k**2)
         if order:  # beyond the order the recursion of the process continues
             start = lfiltic([1.0], polynomial, known[order:0:-1])
             known[order + 1 :], _ = lfilter([1.0], polynomial, np.zeros(self.samples - order - 1), zi=start)
         return known
-
-    @property
-    def spectrum(self) -> Array:
-        """Power at T + 1 frequencies from 0 to half the sampling rate, shape (T + 1,)."""
-        polynomial, variance = np.ones(1), self.level**2
-        for k in self.reflection:
-            polynomial, variance = _next_predictor(polynomial, variance, k)
-        return variance / np.abs(np.fft.rfft(polynomial, 2 * self.samples)) ** 2
 
     @property
     def power(self) -> Array:
@@ -73,14 +65,13 @@ class Noise:
 
         The covariance matrix S is a part of a circulant one, which the Fourier transform makes diagonal.
         """
-        lags, size = self.autocovariance, _transform_size(self.samples)
-        filler = np.zeros(size - 2 * self.samples + 1)
-        return np.tile(np.real(np.fft.rfft(np.concatenate([lags, filler, lags[:0:-1]]))), 2)
+        lags = self.autocovariance
+        return np.tile(2 * np.fft.rfft(lags, _transform_size(self.samples)).real - lags[0], 2)
 
     def covariance_of(self, rows: Array) -> Array:
         """Return rows S rows', shape (n, n), where rows is (n, T) and S the noise's covariance matrix."""
         waves = transformed(rows)
-        return np.asarray((waves * self.power) @ waves.T, dtype=float)
+        return (waves * self.power) @ waves.T
 
     @property
     def effective_sample_size(self) -> float:
@@ -93,18 +84,23 @@ class Noise:
     def correlation_time(self) -> float:
         """Samples until the autocorrelation has fallen below 1/e for the first time; 0 of white noise."""
         below = np.flatnonzero(self.autocovariance < self.level**2 / np.e)
-        return float(below[0] - 1) if len(below) else float(self.samples)
+        return below[0] - 1 if len(below) else self.samples
 
 
-def prior_weight(channels: Sequence[Channel], residual: Array, objective: ObjectiveSettings) -> float:
+def problem_noise(problem: Problem, residual: Array) -> list[Noise]:
+    """Return the noise of each channel of a problem from a row of its residuals, shape (R,)."""
+    return [channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels]
+
+
+def prior_weight(problem: Problem, residual: Array) -> float:
     """Return the weight [rad] of a prior's score of one standard deviation beside a row of residuals, (R,).
 
     Autocorrelated residuals hold less information than their number says. The weight is therefore the noise's
     level times the root of the number of samples per effective sample.
     """
-    noise = [channel_noise(c, residual[c.rows], objective) for c in channels]
+    noise = problem_noise(problem, residual)
     square = sum(n.samples * n.level**2 for n in noise)
-    return float(np.sqrt(square / sum(n.effective_sample_size for n in noise)))
+    return np.sqrt(square / sum(n.effective_sample_size for n in noise))
 
 
 def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSettings) -> Noise:
@@ -115,8 +111,8 @@ def channel_noise(channel: Channel, residual: Array, objective: ObjectiveSetting
     given, samples = objective.noise_deg, len(residual)
     given = given.get(channel.joint) if isinstance(given, dict) else given
     if given is not None and channel.quantity == "angle":
-        return Noise(samples, float(np.deg2rad(given)) * channel.weight, np.empty(0), "settings")
-    lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - float(residual @ residual)
+        return Noise(samples, np.deg2rad(given) * channel.weight, np.empty(0), "settings")
+    lacking = samples * (MIN_LEVEL[channel.quantity] * channel.weight) ** 2 - residual @ residual
     if lacking <= 0:
         return fit_noise(residual)
     impulse = np.zeros(samples)  # its products are those expected of white noise
@@ -147,20 +143,24 @@ def neighbours(noise: Noise) -> list[Noise]:
     """
     if noise.source == "settings":
         return []
-    order, innovation = len(noise.reflection), noise.level**2 * float(np.prod(1 - noise.reflection**2))
+    samples, order, place = noise.samples, len(noise.reflection), np.arctanh(noise.reflection)
+    innovation = noise.level**2 * np.prod(1 - noise.reflection**2)
 
     def at(shift: Array) -> Noise:
-        reflection = np.tanh(np.arctanh(noise.reflection) + shift)
-        level = float(np.sqrt(innovation / np.prod(1 - reflection**2)))
+        reflection = np.tanh(place + shift)
+        level = np.sqrt(innovation / np.prod(1 - reflection**2))
         return replace(noise, level=level, reflection=reflection)
 
+    def log_spectrum(shift: Array) -> Array:
+        polynomial = reduce(_longer, at(shift).reflection, np.ones(1))
+        return -2 * np.log(np.abs(np.fft.rfft(polynomial, 2 * samples)))
+
     # standard error of the logarithm of the innovations' variance: sqrt(2 / T)
-    others = [replace(noise, level=noise.level * float(np.exp(STEP * np.sqrt(0.5 / noise.samples))))]
+    others = [replace(noise, level=noise.level * np.exp(STEP * np.sqrt(0.5 / samples)))]
     if order:
-        spectrum = np.log(noise.spectrum)
-        slopes = np.array([np.log(at(STEP * each).spectrum) - spectrum for each in np.eye(order)]) / STEP
-        information = noise.samples / 2 * slopes @ slopes.T / slopes.shape[1]
-        values, vectors = np.linalg.eigh(information)
+        middle = log_spectrum(np.zeros(order))
+        slopes = np.array([log_spectrum(STEP * each) - middle for each in np.eye(order)]) / STEP
+        values, vectors = np.linalg.eigh(samples / 2 * slopes @ slopes.T / len(middle))
         others += [at(STEP * v / np.sqrt(x)) for x, v in zip(values, vectors.T, strict=True) if x > 0]
     return others
 
@@ -173,13 +173,13 @@ def fit_noise(rows: Array, max_order: int = 30) -> Noise:
     """
     forward = backward = rows = np.atleast_2d(rows)
     samples = rows.shape[1]
-    level = float(np.sqrt(np.sum(rows**2) / samples))
+    level = np.sqrt(np.sum(rows**2) / samples)
     reflection: list[float] = []
     criterion = [0.0]
     for _ in range(min(max_order, samples // 4)):
         forward, backward = forward[:, 1:], backward[:, :-1]
-        power = float(np.vdot(forward, forward) + np.vdot(backward, backward))
-        k = -2 * float(np.vdot(forward, backward)) / power if power > 0 else np.inf
+        power = np.vdot(forward, forward) + np.vdot(backward, backward)
+        k = float(-2 * np.vdot(forward, backward) / power) if power > 0 else np.inf
         if not abs(k) < 1:
             break
         forward, backward = forward + k * backward, backward + k * forward
@@ -197,8 +197,11 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
     A fit absorbs the part of the noise that resembles its derivatives, slow noise above all. Let U be the
     orthonormal rows that span them, `effects`, (p, T), the channel's part of U, and `spread`, (p, p), U S U'
     of all channels. The covariance of the residual is (1 - U'U) S (1 - U'U). The autocovariances of `noise`
-    are raised by the difference to S, in a few rounds because S is not known beforehand.
+    are raised by the difference to S, in a few rounds because S is not known beforehand. A noise that the
+    settings give is whole.
     """
+    if noise.source == "settings":
+        return noise
     samples, order, spread_out = noise.samples, len(noise.reflection), spread @ effects
     left, whole = noise.autocovariance[: order + 1], noise
     lags = np.arange(order + 1)
@@ -213,25 +216,25 @@ def unbiased(noise: Noise, effects: Array, spread: Array) -> Noise:
         # a fit that has absorbed half the noise leaves too little to correct the level with
         if reflection is None or absorbed[0] > 0.5 * samples * left[0]:
             break
-        whole = replace(noise, level=float(np.sqrt(left[0] + absorbed[0] / samples)), reflection=reflection)
+        whole = replace(noise, level=np.sqrt(left[0] + absorbed[0] / samples), reflection=reflection)
     return whole
 
 
 def _levinson(autocovariance: Array) -> Array | None:
     """Reflection coefficients from lags 0 to p; None where no AR process has these autocovariances."""
-    polynomial, variance, reflection = np.ones(1), float(autocovariance[0]), np.empty(0)
+    polynomial, variance, reflection = np.ones(1), autocovariance[0], np.empty(0)
     if not variance > 0:
         return None
     for m in range(1, len(autocovariance)):
-        k = float(-(polynomial @ autocovariance[m:0:-1]) / variance)
+        k = -(polynomial @ autocovariance[m:0:-1]) / variance
         if not abs(k) < 1:
             return None
-        polynomial, variance = _next_predictor(polynomial, variance, k)
+        polynomial, variance = _longer(polynomial, k), variance * (1 - k**2)
         reflection = np.append(reflection, k)
     return reflection
 
 
-def _next_predictor(polynomial: Array, variance: float, k: float) -> tuple[Array, float]:
-    """Prediction-error filter of the next order and the variance of its error (Levinson)."""
+def _longer(polynomial: Array, k: float) -> Array:
+    """Prediction-error filter of the next order, whose error has 1 - k² times the variance (Levinson)."""
     longer = np.append(polynomial, 0.0)
-    return longer + k * longer[::-1], variance * (1 - k**2)
+    return longer + k * longer[::-1]

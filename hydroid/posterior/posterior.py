@@ -13,16 +13,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.stats import norm as normal
 
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.flags import UNIDENTIFIABLE_ABOVE
+from hydroid.search import Mask
 from hydroid.search.axes import Axes, Box, covariance_axes, differentiate
 
+UNIDENTIFIABLE_ABOVE = 1.0
+"""relative standard deviation above which a linear interval means nothing"""
 COVERAGE = 0.95
 """probability with which an interval covers the true value"""
 NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
@@ -47,7 +48,7 @@ class Known:
     value: Array
     sd: Array
     interval: Array
-    given: NDArray[np.bool_]
+    given: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,20 +99,19 @@ class Posterior:
         """Return steps of so many standard deviations along the axes of the covariance."""
         return covariance_axes(self.box, self.root, step)
 
-    def of(self, chosen: NDArray[np.bool_]) -> "Posterior":
+    def of(self, chosen: Mask) -> "Posterior":
         """Return what is known of some of the parameters, shape (P,), whatever the others are."""
-        varied = self.box.varied & chosen
         inside = chosen[self.box.varied]
         # with the others first, the last block of the triangle is the root of what is left (Schur complement)
         triangle = regular(self.root[:, np.argsort(inside, kind="stable")])
         others = int(np.sum(~inside))
-        return Posterior(replace(self.box, varied=varied), triangle[others:, others:], self.quantile)
+        return replace(self, box=self.box.of(inside), root=triangle[others:, others:])
 
     def propagate(
         self,
         function: Callable[[Array], Array],
-        positive: NDArray[np.bool_] | bool,
-        concerned: NDArray[np.bool_] | None = None,
+        positive: Mask | bool,
+        concerned: Mask | None = None,
     ) -> Known:
         """Return the quantities that a function of the parameters, (n, P) -> (n, m), gives at the estimate.
 
@@ -124,28 +124,22 @@ class Posterior:
             positive: which quantities cannot be negative, shape (m,).
             concerned: parameters on which any of them can depend, shape (P,); None: all.
         """
-        varied = self.box.varied
-        inside = np.ones(varied.sum(), dtype=bool) if concerned is None else concerned[varied]
+        concerned = np.ones_like(self.box.varied) if concerned is None else concerned
+        own, inside = self.of(concerned), concerned[self.box.varied]
         value = function(self.box.at[None])[0]
         slopes = np.zeros((len(inside), len(value)))
         if inside.any():
-            own = self if concerned is None else self.of(concerned)
             slopes[inside] = differentiate(function, own.box, own.axes(STEP), value)
         finite = np.isfinite(slopes).all(axis=0)
         sd = np.where(finite, self.sd(np.where(finite, slopes, 0.0)), np.nan)
-        half = self.quantile * sd
-        interval = np.stack([value - half, value + half], axis=1)
         logarithmic = positive & (value > 0)
-        with np.errstate(over="ignore"):
-            factor = np.exp(half[logarithmic] / value[logarithmic])
-        interval[logarithmic] = np.stack([value[logarithmic] / factor, value[logarithmic] * factor], axis=1)
         lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
-        lost |= logarithmic & (half > UNIDENTIFIABLE_ABOVE * NORMAL * value)
+        lost |= logarithmic & (self.quantile * sd > UNIDENTIFIABLE_ABOVE * NORMAL * value)
         sd[lost] = np.inf
-        interval[lost] = -np.inf, np.inf
-        interval[lost & positive] = 0.0, np.inf
+        ends = interval(value, self.quantile * sd, logarithmic)
+        ends[lost & positive, 0] = 0.0
         # a relative change by less than a thousandth of a parameter's: the settings give it
-        return Known(value, sd, interval, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0))
+        return Known(value, sd, ends, np.all(abs(slopes) <= 1e-3 * abs(value), axis=0))
 
     def stored(self, parameters: ParameterSet) -> Covariance:
         """Return what a file keeps of it."""
@@ -156,6 +150,14 @@ class Posterior:
             root=tuple(map(tuple, self.root.tolist())),
             quantile=self.quantile,
         )
+
+
+def interval(value: Array, half: Array, multiplicative: Mask) -> Array:
+    """Return ends, (m, 2), value ± half, or value times and over exp(half / value), from shapes (m,)."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        factor = np.exp(np.where(multiplicative, half / value, 0.0))
+    change = np.where(multiplicative, 0.0, half)
+    return np.stack([value / factor - change, value * factor + change], axis=1)
 
 
 def regular(rows: Array) -> Array:
@@ -169,17 +171,18 @@ def stored_posterior(model: IdentifiedModel) -> Posterior | None:
 
     Parameters that the settings no longer free, or whose values changed, are not the fit's.
     """
-    covariance = None if model.summary is None else model.summary.covariance
-    if model.summary is None or covariance is None:
+    summary, parameters = model.summary, model.settings.parameter_set()
+    if summary is None or summary.covariance is None:
         return None
-    parameters, fitted = model.settings.parameter_set(), model.summary.estimate
+    known, fitted = summary.covariance, summary.estimate
     free = {p.name for p in parameters.parameters if p.fixed is None}
     if any(name not in fitted or model.values[name] != fitted[name].value for name in free):
         return None
     held = {name for name in free if fitted[name].at_bound}
-    if not free - held <= set(covariance.parameters) <= free:
+    if not free - held <= set(known.parameters) <= free:
         return None
-    scale, varied = np.zeros(len(model.theta)), np.isin(parameters.names, covariance.parameters)
-    scale[varied] = covariance.scale
+    varied = np.isin(parameters.names, known.parameters)
+    scale = np.zeros(len(varied))
+    scale[varied] = known.scale
     box = Box(model.theta, parameters.lower, parameters.upper, scale, varied)
-    return Posterior(box, np.array(covariance.root), covariance.quantile)
+    return Posterior(box, np.array(known.root), known.quantile)

@@ -1,18 +1,38 @@
 """All quantities of a fit: what its logs determine, in the words of an engineer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
+from hydroid.hydraulics.cylinder import rod_motion, volume
+from hydroid.hydraulics.records import LINEAR, Records, coefficients, linkages
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
-from hydroid.posterior.measures import Column, gain_model, gravity, oil, speed_tests
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.simulation import Candidates
+
+
+class Column(NamedTuple):
+    """One quantity of a joint, or one point of its curve of speed against the command.
+
+    name: plain ASCII. label: the same in words. positive: it cannot be negative, and its interval is
+    multiplicative. command: where the point of the curve is [%].
+    """
+
+    name: str
+    label: str
+    unit: str
+    positive: bool = True
+    command: float | None = None
+
+
+Measured: TypeAlias = Iterator[tuple[Column, Array]]
+"""quantities of n candidates, each of shape (n,), the same for every population;
+NaN where one is undefined"""
 
 
 @dataclass(frozen=True)
@@ -36,7 +56,7 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
 
 def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, joint: int) -> None:
     """Add the quantities of one joint, numbered from 1."""
-    candidates = problem.bindings.candidates
+    candidates, named = problem.bindings.candidates, problem.settings.arm.joint_names[joint - 1]
     estimate = candidates(uncertainty.theta[None])
     measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
     columns = [column for column, _ in measure(estimate)]
@@ -48,42 +68,146 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
     positive = np.array([column.positive for column in columns])
     known = uncertainty.posterior.propagate(values, positive, concerned)
-    ends = [(finite(low), finite(high)) for low, high in known.interval]
-    parts, named = dict[str, list[int]](), problem.settings.arm.joint_names[joint - 1]
+    curve, given, unit = list[tuple[float, float, tuple[float | None, float | None]]](), True, ""
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
-        parts.setdefault(columns[i].name, []).append(i)
-    for part, own in parts.items():
-        if known.given[own].all():
-            continue
-        commands, first, name = [columns[i].command for i in own], columns[own[0]], f"{named}_{part}"
-        what: dict[str, Any] = {"label": first.label, "joint": joint, "unit": first.unit}
-        if first.command is None:
-            value, sd = float(known.value[own[0]]), finite(known.sd[own[0]])
-            result.scalars[name] = QuantityEstimate(**what, value=value, sd=sd, interval=ends[own[0]])
-        else:
-            points = sorted(zip(commands, known.value[own].tolist(), (ends[i] for i in own), strict=True))
-            what |= dict(zip(("at", "value", "interval"), zip(*points, strict=True), strict=True))
-            result.curves[name] = CurveEstimate(**what, along="command [%]")
+        (name, label, unit_, _, command), value = columns[i], float(known.value[i])
+        interval = finite(known.interval[i, 0]), finite(known.interval[i, 1])
+        if command is not None:
+            curve.append((command, value, interval))
+            given, unit = given and known.given[i], unit_
+        elif not known.given[i]:
+            sd = finite(known.sd[i])
+            result.scalars[f"{named}_{name}"] = QuantityEstimate(
+                label=label, joint=joint, value=value, unit=unit_, sd=sd, interval=interval
+            )
+    if not given:
+        at, value, interval = zip(*sorted(curve), strict=True)
+        result.curves[f"{named}_speed"] = CurveEstimate(
+            label="speed", joint=joint, unit=unit, along="command [%]", at=at, value=value, interval=interval
+        )
 
 
 def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], list[tuple[Column, Array]]]:
     """Return what computes the quantities of one joint; test movements are planned at the estimate."""
-    if bench.settings.stage == "mech":
-        tests = []
-    else:
-        torque = float(bench.weigh(estimate)[0][0])
-        signs = ("positive", "negative")
+    tests, further = [], gain_model
+    if bench.settings.stage == "hyd":
+        torque, signs = bench.weigh(estimate)[0][0], ("positive", "negative")
         words = ("raising", "lowering") if torque * bench.sense > 0 else ("lowering", "raising")
         words = words if abs(torque) >= 1.0 else signs  # below 1 N·m no direction is called raising
-        tests = [
-            speed_tests(bench, estimate, sign, f"_{ending}", f", {word}")
-            for sign, ending, word in zip((1.0, -1.0), signs, words, strict=True)
-        ]
-    further = oil if tests else gain_model
+        names = zip((1.0, -1.0), signs, words, strict=True)
+        tests, further = [speed_tests(bench, estimate, *name) for name in names], oil
 
     def measure(candidates: Candidates) -> list[tuple[Column, Array]]:
         torque, inertia = bench.weigh(candidates)
+        label = f"gravity torque at {np.degrees(bench.angle):.0f} deg"
+        gravity = Column("gravity_torque_at_pose", label, "N·m", False), torque
         moved = [row for test in tests for row in test(candidates)]
-        return [*moved, *further(bench, candidates, inertia), gravity(bench, torque)]
+        return [*moved, *further(bench, candidates, inertia), gravity]
+
+    return measure
+
+
+def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
+    """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
+    joint = candidates.joints[:, bench.joint - 1]
+    gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.degrees(gain / damping)
+        yield Column("gain", "gain between command and speed, K/D", "deg/s per %"), ratio
+        yield Column("time_constant", "time constant, inertia/D", "s"), inertia / damping
+        yield Column("dead_band", "dead band, friction/K", "%"), friction / gain
+        for u in (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0):
+            torque = np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0)
+            yield Column("speed", "speed", "deg/s", False, u), np.degrees(torque / damping)
+
+
+def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
+    """Stage 2: the arm on its oil with the valve shut, and the ratio of areas.
+
+    The oil is a spring of stiffness r² β (A_A²/V_A + A_B²/V_B) at the joint. Leakage and the seals' friction
+    are left out of the damping.
+    """
+    c, arm = actuator(bench, candidates)
+    volumes = c.dead_volume, c.dead_volume
+    if c.kind[0] == LINEAR:
+        travel = rod_motion(np.full(len(c), bench.angle), c)[0]
+        volumes = volume(travel, c.a.area, c.dead_volume), volume(c.stroke - travel, c.b.area, c.dead_volume)
+    stiffness = arm**2 * c.bulk_modulus * (c.a.area**2 / volumes[0] + c.b.area**2 / volumes[1])
+    frequency = np.sqrt(stiffness / inertia) / (2.0 * np.pi)
+    damping = c.damping / (2.0 * np.sqrt(stiffness * inertia))
+    if not bench.settings.quasi_static:  # it knows of neither oil nor inertia
+        yield Column("natural_frequency", "natural frequency of the arm on the oil", "Hz"), frequency
+        yield Column("damping_ratio", "damping ratio of the arm on the oil", ""), damping
+    yield Column("area_ratio", "ratio of areas, A/B", ""), c.a.area / c.b.area
+
+
+def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
+    """Return n candidates' COEFFICIENTS of the joint, (n,), and their moment arm at its angle [m], (n,).
+
+    Of a rotary actuator, whose areas are displacements, the moment arm is 1.
+    """
+    j = bench.joint - 1
+    joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
+    c: Records = coefficients(joints, linkages(bench.settings.arm, [j], [j], joints))[:, 0]  # pyright: ignore[reportAssignmentType]
+    return c, rod_motion(np.full(len(c), bench.angle), c)[1]
+
+
+COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
+"""of the curve of speed [%]"""
+MOVES = 0.02
+"""part of the speed at full command, added to that without a command, at which the joint begins to move"""
+ONSET, RISEN = 0.1, 1.0 - float(np.exp(-1.0))
+"""parts of the final speed: it takes the dead time to reach the first, and from there the time constant to
+reach the second"""
+
+
+def speed_tests(
+    bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
+) -> Callable[[Candidates], Measured]:
+    """Return what measures a joint in one direction, planned so that the estimate ends at its angle.
+
+    Args:
+        bench: the joint.
+        estimate: one candidate.
+        sign: of the commands.
+        ending, word: at the end of names and labels.
+    """
+    steps = {u: bench.movement(sign * u).through_pose(estimate) for u in COMMANDS}
+    reached = {u: step.speed(estimate)[0] for u, step in steps.items()}
+    # the smallest command from 50 % that clearly moves the joint, or the largest
+    rise = next((u for u in COMMANDS if u >= 50.0 and reached[u] > ONSET * reached[100.0]), 100.0)
+    # the dead band is enclosed to 0.25 %
+    rest = bench.movement(0.0)
+    level = MOVES * reached[100.0] + sign * rest.speed(estimate)[0]
+    above = next((u for u in COMMANDS if reached[u] > level), 0.0)
+    below = max((u for u in COMMANDS if u < above), default=0.0)
+    while above - below > 0.25:
+        middle = (below + above) / 2
+        moves = bench.movement(sign * middle).speed(estimate)[0] > level
+        below, above = (below, middle) if moves else (middle, above)
+
+    def measure(candidates: Candidates) -> Measured:
+        unit = bench.speed_unit[1]
+        runs = {u: step.speeds(candidates) for u, step in steps.items()}
+        speed = {u: steps[u].end(run) for u, run in runs.items()}
+        for u, value in speed.items():
+            yield Column("speed", "speed", unit, False, sign * u), sign * bench.sense * value
+        gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
+        onset, risen = (steps[rise].reaches(runs[rise], part * speed[rise]) for part in (ONSET, RISEN))
+        rows = [
+            *((f"speed_{u}", f"speed at {u} % command", unit, speed[u]) for u in (50, 100)),
+            ("gain", "gain between command and speed", f"{unit} per %", gain),
+            ("dead_time", f"dead time at {rise:g} % command", "s", onset),
+            ("time_constant", f"time constant at {rise:g} % command", "s", risen - onset),
+        ]
+        if below > 0.0:
+            slow, fast = (bench.movement(sign * u).speed(candidates) for u in (below, above))
+            part = (MOVES * speed[100.0] + sign * rest.speed(candidates) - slow) / (fast - slow)
+            rows.append(("dead_band", "dead band", "%", below + part * (above - below)))
+        c, arm = actuator(bench, candidates)
+        flow = 6e4 * (c.a if sign > 0 else c.b).area * np.abs(arm) * np.radians(speed[100.0])
+        rows.append(("full_flow", "flow at 100 % command", "L/min", flow))
+        for name, label, own_unit, value in rows:
+            yield Column(f"{name}_{ending}", f"{label}, {word}", own_unit), value
 
     return measure

@@ -22,22 +22,91 @@ held there, and has no interval; but one that the logs do not determine says not
 free.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.optimize import root_scalar
+from scipy.optimize import brentq
 from scipy.stats import norm as normal
 
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.flags import UNIDENTIFIABLE_ABOVE, WEAK_ABOVE, Flag, ParameterStatus, Side, flag_of
 from hydroid.posterior.linear import Linear, linearised, white_posterior
-from hydroid.posterior.noise import STEP, Noise, channel_noise, neighbours, transformed, unbiased
-from hydroid.posterior.posterior import COVERAGE, NORMAL, WEAK_PRIOR, Posterior, regular
+from hydroid.posterior.noise import STEP, Noise, neighbours, problem_noise, transformed, unbiased
+from hydroid.posterior.posterior import (
+    COVERAGE,
+    NORMAL,
+    UNIDENTIFIABLE_ABOVE,
+    WEAK_PRIOR,
+    Posterior,
+    interval,
+    regular,
+)
 from hydroid.problem.problem import Problem
-from hydroid.search.axes import held_by_bound
+from hydroid.search.axes import Box, held_by_bound
+
+WEAK_ABOVE = 0.3
+"""relative standard deviation above which a parameter or direction is weakly identifiable"""
+
+Side = Literal["lower", "upper"]
+
+
+class Flag(StrEnum):
+    """How well the logs determine a parameter, whatever a prior adds."""
+
+    IDENTIFIABLE = "identifiable"
+    WEAK = "weakly identifiable"
+    UNIDENTIFIABLE = "not identifiable"
+    NO_EFFECT = "no effect"
+    FIXED = "fixed"
+
+
+class Source(StrEnum):
+    """Where what is known of a parameter comes from."""
+
+    DATA = "data"
+    BOTH = "data and prior"
+    PRIOR = "prior only"
+
+
+@dataclass(frozen=True)
+class ParameterStatus:
+    """How well one parameter is known.
+
+    Attributes:
+        flag: what the logs alone determine.
+        at_bound: the bound that it lies at.
+        share: part of the information that the logs gave: 1 - posterior / prior variance.
+        known: whether logs and priors together determine it.
+    """
+
+    flag: Flag
+    at_bound: Side | None = None
+    share: float = 1.0
+    known: bool = True
+
+    @property
+    def source(self) -> Source | None:
+        """Where the information comes from; None where there is none, or the parameter is fixed."""
+        if self.flag is Flag.FIXED or not self.known:
+            return None
+        # nine tenths of the information are the only source that is named
+        return Source.DATA if self.share > 0.9 else Source.BOTH if self.share >= 0.1 else Source.PRIOR
+
+
+def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
+    """Return the flag of a relative standard deviation, of which the logs gave a share of the information.
+
+    The logs alone leave a variance of the posterior's divided by their share. NaN counts as infinite.
+    """
+    alone = relative_sd / math.sqrt(share) if share > 0 else math.inf
+    if not alone <= UNIDENTIFIABLE_ABOVE:
+        return Flag.UNIDENTIFIABLE
+    return Flag.WEAK if alone > WEAK_ABOVE else Flag.IDENTIFIABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +117,7 @@ class Uncertainty:
         linear: least squares linearised there, in the parameters that vary: free ones, but for those held at
             a bound.
         noise: of each channel.
-        free: which parameters are free, shape (P,).
+        scatters: covariance of the effects by each channel's noise, shape (C, p, p).
         sensitivity: rms change of the residual [rad] per 1 % of each parameter, shape (P,); NaN where fixed
             or where simulations diverge.
         posterior: what is known of the parameters that vary.
@@ -59,8 +128,8 @@ class Uncertainty:
     """
 
     linear: Linear
-    noise: tuple[Noise, ...]
-    free: NDArray[np.bool_]
+    noise: Sequence[Noise]
+    scatters: Array
     sensitivity: Array
     posterior: Posterior
     relative: Array
@@ -86,24 +155,25 @@ def uncertainty(problem: Problem, theta: Array, first: Array | None = None) -> U
     return uncertainty_from(problem, linearised(problem, theta, first))
 
 
-def uncertainty_from(problem: Problem, whole: Linear, noise: tuple[Noise, ...] | None = None) -> Uncertainty:
+def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = ()) -> Uncertainty:
     """Return the uncertainty from derivatives by all free parameters, without simulations.
 
-    None: for the noise that the residual shows.
+    Without `noise` of each channel it is that which the residual shows.
     """
-    free, white = whole.box.varied, whole.white.deviations
-    sides, held = _bounds(whole)
-    linear = whole.of(~held)
-    noise = _noise(problem, linear) if noise is None else noise
-    scatter, spread = _scatter(problem, linear, noise)
+    free, room, white = whole.box.varied, whole.box.room, whole.white.deviations
+    edge = held_by_bound(room, white)
+    held = edge & (white <= UNIDENTIFIABLE_ABOVE)
+    linear = whole.of(~held | held.all())
+    noise = noise or _noise(problem, linear)
+    scatters = linear.scatters(problem.channels, noise)
     size = np.linalg.norm(linear.changes, axis=0)  # D V' is (V D^-1)^-1
-    half = np.linalg.cholesky(scatter)
+    half = np.linalg.cholesky(scatters.sum(axis=0) + linear.prior_scatter)
     root = regular(solve_triangular(half, (linear.changes / size**2).T, lower=True))
-    # where the logarithm of a variance is known to 5 or worse, nothing is, and no interval is of use
-    widths = np.array([quantile(each) for each in np.minimum(spread, 5.0)])
+    deviations = Posterior(linear.box, root).deviations
+    widths = _widths(problem, linear, noise, deviations**2)
     # a quantity may depend on the parameter whose noise is least known
     posterior = Posterior(linear.box, root, quantile=float(widths.max()))
-    relative, widths = linear.spread(posterior.deviations), linear.spread(widths)
+    relative, widths = linear.spread(deviations), linear.spread(widths)
     # held ones are flagged as if the noise were white
     known = np.where(np.isnan(relative), whole.spread(white), relative)
     prior = whole.spread(white_posterior(whole.box, whole.prior_slopes).deviations)
@@ -114,30 +184,25 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: tuple[Noise, ...] |
     widened = known * np.where(np.isnan(widths), NORMAL, widths) / NORMAL
     unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
     relative[unknown] = np.inf
-    interval = ends(problem.parameters, linear.box.at, linear.box.scale, widths * relative)
-    status: list[ParameterStatus] = []
-    for i, sensitivity in enumerate(whole.sensitivity):
-        if not free[i]:
-            status.append(ParameterStatus(Flag.FIXED))
-            continue
-        flag = Flag.NO_EFFECT if sensitivity == 0 else flag_of(float(widened[i]), shares[i])
-        diverges = bool(np.isnan(sensitivity))
-        status.append(ParameterStatus(flag, sides.get(i), diverges, float(shares[i]), not unknown[i]))
-    return Uncertainty(linear, noise, free, whole.sensitivity, posterior, relative, interval, tuple(status))
+    status = [ParameterStatus(Flag.FIXED)] * len(free)
+    for i, there, to_bounds in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
+        flag = Flag.NO_EFFECT if whole.sensitivity[i] == 0 else flag_of(float(widened[i]), shares[i])
+        side = ("lower" if to_bounds[0] <= to_bounds[1] else "upper") if there else None
+        status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
+    between = ends(problem.parameters, linear.box, widths * relative)
+    about = posterior, relative, between, tuple(status)
+    return Uncertainty(linear, noise, scatters, whole.sensitivity, *about)
 
 
-def ends(parameters: ParameterSet, theta: Array, scale: Array, half: Array) -> Array:
+def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:
     """Return intervals, shape (P, 2), from half their widths in relative changes, shape (P,).
 
     Those on a log scale are multiplicative. No end is below 0 where the parameter cannot be.
     """
-    log = parameters.log
-    with np.errstate(over="ignore"):  # inf without an interval
-        factor = np.exp(np.where(log, half, 0.0))
-    change = np.where(log, 0.0, half * scale)
-    low = theta / factor - change
-    low = np.where(np.isfinite(low) & (parameters.lower >= 0), np.maximum(low, 0.0), low)
-    return np.stack([low, theta * factor + change], axis=1)
+    between = interval(box.at, half * box.scale, parameters.log)
+    low = between[:, 0]
+    low[(low < 0) & np.isfinite(low) & (parameters.lower >= 0)] = 0.0
+    return between
 
 
 def quantile(spread: float) -> float:
@@ -149,79 +214,25 @@ def quantile(spread: float) -> float:
 
     def outside(half: float) -> float:
         chance = weights @ (2 * normal.sf(half * np.exp(spread * nodes / 2))) / weights.sum()
-        return float(chance) - (1 - COVERAGE)
+        return chance - (1 - COVERAGE)
 
-    return float(root_scalar(outside, bracket=(1.0, 3.0 * np.exp(3 * spread))).root)
-
-
-def _bounds(whole: Linear) -> tuple[dict[int, Side], NDArray[np.bool_]]:
-    """The bound that each parameter, 0 to P - 1, lies at, and which of the p are held there."""
-    room, deviations = whole.box.room, whole.white.deviations
-    edge = held_by_bound(room, deviations)
-    nearest: tuple[Side, Side] = ("lower", "upper")
-    places = zip(np.flatnonzero(whole.box.varied).tolist(), room.argmin(axis=0), edge, strict=True)
-    sides = {i: nearest[side] for i, side, there in places if there}
-    held = edge & (deviations <= UNIDENTIFIABLE_ABOVE)
-    return sides, held & ~held.all()
+    return brentq(outside, 1.0, 3.0 * np.exp(3 * spread))  # pyright: ignore
 
 
-def _scatter(problem: Problem, linear: Linear, noise: tuple[Noise, ...]) -> tuple[Array, Array]:
-    """Covariance of the effects, U S U', (p, p), and the spread of each parameter's variance, (p,).
-
-    The spread is the standard deviation of the logarithm of the estimated variance.
-    """
-    scatter, moved = linear.prior_scatter, list[Array]()
+def _widths(problem: Problem, linear: Linear, noise: Sequence[Noise], variance: Array) -> Array:
+    """Half the interval of each parameter in standard deviations, shape (p,), from their variances, (p,)."""
+    square = np.zeros_like(variance)
     for channel, process in zip(problem.channels, noise, strict=True):
-        waves, power = transformed(linear.effects[:, channel.rows]), process.power
-        scatter = scatter + (waves * power) @ waves.T
-        if others := neighbours(process):
-            change = np.array([other.power - power for other in others]) / STEP
-            moved.append((linear.changes @ waves) ** 2 @ change.T)
-    variance = np.einsum("pi,ij,pj->p", linear.changes, scatter, linear.changes)
-    return scatter, np.linalg.norm(np.hstack([np.zeros((len(variance), 1)), *moved]), axis=1) / variance
+        waves, power = linear.changes @ transformed(linear.effects[:, channel.rows]), process.power
+        for other in neighbours(process):
+            square += (waves**2 @ (other.power - power) / STEP) ** 2
+    # where the logarithm of a variance is known to 5 or worse, nothing is, and no interval is of use
+    return np.array([quantile(spread) for spread in np.minimum(np.sqrt(square) / variance, 5.0)])
 
 
-def _noise(problem: Problem, linear: Linear) -> tuple[Noise, ...]:
+def _noise(problem: Problem, linear: Linear) -> list[Noise]:
     """Return each channel's noise before the fit absorbed a part of it."""
-    objective = problem.settings.objective
-    pairs = [
-        (channel_noise(c, linear.residual[c.rows], objective), linear.effects[:, c.rows])
-        for c in problem.channels
-    ]
-    spread = linear.prior_scatter + np.sum([each.covariance_of(part) for each, part in pairs], axis=0)
-    return tuple(each if each.source == "settings" else unbiased(each, part, spread) for each, part in pairs)
-
-
-@dataclass(frozen=True, eq=False)
-class Identifiability:
-    """The directions that are determined, and those that are not.
-
-    Attributes:
-        names: of the p parameters that vary.
-        alone: those of them that are not determined to WEAK_ABOVE, whatever the others are.
-        combinations: of the other parameters that are not determined either, the least determined first: the
-            relative changes, the largest +1, of those that take a tenth of it or more.
-    """
-
-    names: tuple[str, ...]
-    alone: tuple[str, ...]
-    combinations: tuple[dict[str, float], ...]
-
-    @property
-    def rank(self) -> int:
-        """Number of independent combinations that are determined."""
-        return len(self.names) - len(self.alone) - len(self.combinations)
-
-
-def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiability:
-    """Return the directions that are not determined at an estimate."""
-    root = uncertainty.posterior.root
-    names = np.array(problem.parameters.names)[uncertainty.linear.box.varied]
-    alone = np.linalg.norm(root, axis=0) < 1 / WEAK_ABOVE
-    _, values, axes = np.linalg.svd(root[:, ~alone], full_matrices=False)
-    combinations: list[dict[str, float]] = []
-    for axis in axes[values < 1 / WEAK_ABOVE][::-1]:
-        changes = axis / axis[np.argmax(np.abs(axis))]
-        order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= 0.1]
-        combinations.append({str(names[~alone][i]): float(changes[i]) for i in order})
-    return Identifiability(tuple(names.tolist()), tuple(names[alone].tolist()), tuple(combinations))
+    noise = problem_noise(problem, linear.residual)
+    spread = linear.prior_scatter + linear.scatters(problem.channels, noise).sum(axis=0)
+    pairs = zip(problem.channels, noise, strict=True)
+    return [unbiased(one, linear.effects[:, channel.rows], spread) for channel, one in pairs]

@@ -7,7 +7,7 @@ import numpy as np
 
 from hydroid.estimate import Covariance, FitSummary, ParameterEstimate
 from hydroid.parameters import Parameter
-from hydroid.posterior.flags import Flag, Source
+from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.quantity_table import CHOICES
 from hydroid.reporting.page import Section
 from hydroid.reporting.table import Given, Table

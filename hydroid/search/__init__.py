@@ -1,1 +1,8 @@
-"""Searches: from objectives to better points of the unit box. Nothing here knows what is searched for."""
+"""Optimisers that know no robot."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]

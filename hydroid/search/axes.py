@@ -7,12 +7,12 @@ events make.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hydroid.search import Array, Mask
+
 Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
 
@@ -43,7 +43,13 @@ class Box:
     lower: Array
     upper: Array
     scale: Array
-    varied: NDArray[np.bool_]
+    varied: Mask
+
+    def of(self, kept: Mask) -> "Box":
+        """Return it with only some of the p coordinates varied, shape (p,)."""
+        varied = self.varied.copy()
+        varied[varied] = kept
+        return replace(self, varied=varied)
 
     @property
     def room(self) -> Array:
@@ -111,7 +117,7 @@ def differentiate(
         slopes[failed] = expected[failed]
     if np.array_equal(axes.directions, np.eye(len(slopes))):
         return slopes
-    return np.asarray(np.linalg.solve(axes.directions, slopes), dtype=float)
+    return np.linalg.solve(axes.directions, slopes).astype(float)
 
 
 def single_axes(at: Box, step: float) -> Axes:
@@ -146,12 +152,12 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     return _fitted(directions, step / np.linalg.norm(root @ directions.T, axis=0), room)
 
 
-def held_by_bound(room: Array, deviation: Array) -> NDArray[np.bool_]:
+def held_by_bound(room: Array, deviation: Array) -> Mask:
     """Whether coordinates are held by a bound, (p,), from the room to both, (2, p), and their deviations."""
     return room.min(axis=0) < EDGE * np.minimum(deviation, LARGEST)
 
 
-def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _slopes(function: Function, at: Box, axes: Axes, value: Array) -> tuple[Array, Mask]:
     """Slopes along each axis, (p, R), and where both sides differ more than they have in common, (p,)."""
     steps = axes.steps.T[:, :, None]
     changes = (steps * axes.directions).reshape(-1, axes.directions.shape[1])
@@ -171,10 +177,11 @@ def _fitted(directions: Array, wanted: Array, room: Array) -> Axes:
     """Return steps of wanted lengths, (p,), shortened to LARGEST and to the room, (2, p)."""
     share = np.abs(directions)
     wanted = np.minimum(wanted, LARGEST / share.max(axis=1))
-    towards = directions > 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        ahead = np.where(share > 0, np.where(towards, room[1], room[0]) / share, np.inf).min(axis=1)
-        behind = np.where(share > 0, np.where(towards, room[0], room[1]) / share, np.inf).min(axis=1)
+        ahead, behind = (
+            np.where(share > 0, np.where(directions > 0, *sides) / share, np.inf).min(axis=1)
+            for sides in (room[::-1], room)
+        )
     both = np.minimum(wanted, np.minimum(ahead, behind))
     one = np.minimum(wanted, np.maximum(ahead, behind) / 2)
     balanced = (both >= UNBALANCED * wanted) | (both >= one)

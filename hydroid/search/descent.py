@@ -1,14 +1,24 @@
-"""Where least squares stands: the state between two steps, and why it ended."""
+"""Where least squares stands: the state between two steps, why it ended, and the residual's linear model."""
 
 from dataclasses import dataclass, fields
 from enum import Enum
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
-Float = NDArray[np.float64]
+from hydroid.search import Array, Ints
+from hydroid.search.axes import Function
 
+WIDTH = 2.0**-26
+"""of the differences: the root of the rounding unit"""
+WIDER = 2.0**10
+"""how much wider the step is that tells a weak effect from rounding noise"""
+SUSPECT = 1e-3
+"""a column this much shorter than the longest one may be noise, and is taken twice"""
+TOLERANCE = 1e-12
+"""of the box-constrained minimum: slope, in units of a column and the residual, that is only rounding"""
 DAMPING = 1e-3
 """λ at the start"""
 
@@ -48,13 +58,13 @@ class Descent:
         ending: why it ended, or UNDER_WAY.
     """
 
-    point: Float
-    residual: Float
+    point: Array
+    residual: Array
     cost: float
     cost_before: float
-    jacobian: Float
+    jacobian: Array
     fresh: bool = False
-    cycle: Float | tuple[float, int] = (np.inf, 0)
+    cycle: Array | tuple[float, int] = (np.inf, 0)
     damping: float = DAMPING
     growth: float = 2.0
     slow: int = 0
@@ -84,29 +94,104 @@ class Descent:
             values["residual"] = []  # the Jacobian is where the uncertainty begins
         return {name: np.asarray(value) for name, value in values.items()}
 
-    @staticmethod
-    def from_arrays(arrays: dict[str, NDArray[Any]]) -> "Descent":
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Self:
         """Return the descent that `arrays` stored."""
-        stored = {f.name: arrays[f.name] for f in fields(Descent)}
-        values: dict[str, Any] = {n: a if a.ndim else a.item() for n, a in stored.items()}
+        values: dict[str, Any] = {name: a if a.ndim else a.item() for name, a in arrays.items()}
         values["ending"] = Ending[values["ending"]]
-        return Descent(**values)
+        return cls(**values)
 
 
-def start(point: Float, residual: Float) -> Descent:
+def start(point: Array, residual: Array) -> Descent:
     """Return the descent from a point, shape (p,), whose residual was simulated, shape (R,)."""
-    cost = float(costs(residual[None])[0])
+    cost = costs(residual[None])[0]
     ending = Ending.UNDER_WAY if np.isfinite(cost) else Ending.START_FAILED
     return Descent(point, residual, cost, cost, no_jacobian(point), ending=ending)
 
 
-def costs(rows: Float) -> Float:
+def costs(rows: Array) -> Array:
     """Half the sum of squares of each row; inf where it is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         costs = 0.5 * np.sum(rows**2, axis=1)
     return np.where(np.isfinite(costs), costs, np.inf)
 
 
-def no_jacobian(point: Float) -> Float:
+def no_jacobian(point: Array) -> Array:
     """Return the Jacobian of a descent whose next step takes one."""
     return np.empty((0, point.size))
+
+
+class LinearModel:
+    """The linear model r + J s of the residual around a descent's point, for the parameters with effect.
+
+    A column of J of a parameter without effect is 0.
+    """
+
+    def __init__(self, at: Descent) -> None:
+        self.at = at
+        length = np.linalg.norm(at.jacobian, axis=0)
+        self._moving = np.flatnonzero(length > 0)
+        self._scale = length[self._moving]
+        self._triangle, self._right = self.reduced(at.residual)
+
+    def reduced(self, row: Array) -> tuple[Array, Array]:
+        """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
+        p = len(self._moving)
+        both = np.asarray(np.linalg.qr(np.column_stack([self.at.jacobian[:, self._moving], row]), mode="r"))
+        return both[:p, :p], both[:p, p]
+
+    def step(self, damping: float, row: Array | None = None) -> Array:
+        """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
+        triangle, right = (self._triangle, self._right) if row is None else self.reduced(row)
+        size = np.linalg.norm(right)
+        if not size:
+            return np.zeros_like(right)
+        # in lengths of the columns and of the residual, in which the solver's tolerances mean something
+        there, unit = self.at.point[self._moving], self._scale / size
+        matrix = np.vstack([triangle / self._scale, np.sqrt(damping) * np.eye(len(unit))])
+        target = np.append(-right / size, np.zeros(len(unit)))
+        limits = -there * unit, (1 - there) * unit
+        most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
+        return lsq_linear(matrix, target, limits, method="bvls", tol=TOLERANCE, max_iter=most).x / unit
+
+    def gain(self, s: Array) -> float:
+        """Part of the cost that the linear model promises to save by a step."""
+        after = self._right + self._triangle @ s
+        return 0.5 * float(self._right @ self._right - after @ after)
+
+    def reach(self, s: Array) -> Array:
+        """Return the point of the box that a step leads to, shape (p,)."""
+        point = self.at.point.copy()
+        point[self._moving] = np.clip(point[self._moving] + s, 0.0, 1.0)
+        return point
+
+    def length(self, s: Array) -> float:
+        """Length of a step, scaled."""
+        return float(np.linalg.norm(self._scale * s))
+
+
+def derivatives(residuals: Function, point: Array, row: Array) -> Array:
+    """Derivatives by each parameter at a point of the box, (p,), with its residuals, (R,): shape (p, R).
+
+    They are 0 without effect. All differences are one batch. Those that fail are taken to the other side in
+    a second batch; where that fails too, they are not finite.
+    """
+
+    def quotients(which: Ints, width: float) -> Array:
+        steps = np.where(point + abs(width) <= 1.0, width, -width)[which]
+        points = np.tile(point, (len(which), 1))
+        points[np.arange(len(which)), which] += steps
+        with np.errstate(invalid="ignore", over="ignore"):
+            return (residuals(np.clip(points, 0.0, 1.0)) - row) / steps[:, None]
+
+    columns = quotients(np.arange(point.size), WIDTH)
+    failed = np.flatnonzero(~np.isfinite(columns).all(axis=1))
+    if len(failed):
+        columns[failed] = quotients(failed, -WIDTH)
+    length = np.linalg.norm(columns, axis=1)
+    suspect = np.flatnonzero((length > 0) & (length < SUSPECT * length.max()))
+    if len(suspect):
+        # a derivative does not depend on the step; rounding noise divided by a wider step becomes smaller
+        wider = np.linalg.norm(quotients(suspect, WIDER * WIDTH), axis=1)
+        columns[suspect[wider < 0.1 * length[suspect]]] = 0.0
+    return columns

@@ -1,7 +1,7 @@
 """The article's two searches: the simple genetic algorithm (4.1, figure 12), and NSGA-II (4.2).
 
 A search is deterministic: it draws from the generator passed in alone. So a run is continued by running it
-again from its seed, with the objectives that are known (`fitting.memo`).
+again from its seed, with the objectives that are known (`fitting.checkpoints`).
 
     population = None
     for _ in range(1 + generations):
@@ -15,18 +15,19 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from hydroid.search.coding import Coding, Genes, GrayCoding, IntegerCoding
-from hydroid.search.operators import crossover, mutate, roulette
+from hydroid.search import Array, Ints
+from hydroid.search.chromosomes import (
+    Coding,
+    Genes,
+    GrayCoding,
+    IntegerCoding,
+    crossover,
+    mutate,
+    roulette,
+)
 from hydroid.search.pareto import crowding, feasible, ranks
 from hydroid.settings.search import GeneticSettings
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-
-ELITE = 1
-"""best candidates of the simple GA that survive unchanged (ours; the article gives none)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +41,12 @@ class Population:
     """
 
     chromosomes: Genes
-    objectives: Float
+    objectives: Array
 
     def __len__(self) -> int:
         return len(self.chromosomes)
 
-    def take(self, index: Int) -> "Population":
+    def take(self, index: Ints) -> "Population":
         """Return the candidates at `index`, in that order."""
         return Population(self.chromosomes[index], self.objectives[index])
 
@@ -64,61 +65,60 @@ class GeneticAlgorithm:
         parameters: dimensions p of the unit box.
         start: point of the box that joins the first population, shape (p,).
         single: whether it minimises one objective, shape (n, 1), rather than several at once.
+        elite: best candidates that survive unchanged, and are not simulated again (of the simple GA; the
+            article gives none).
     """
 
     settings: GeneticSettings
     parameters: int
-    start: Float | None = None
+    start: Array | None = None
     single: ClassVar[bool]
+    elite: ClassVar[int]
 
     @property
     def coding(self) -> Coding:
         """How candidates are written as chromosomes."""
         return (GrayCoding if self.settings.coding == "binary" else IntegerCoding)(self.parameters)
 
-    def decode(self, chromosomes: Genes) -> Float:
+    def decode(self, chromosomes: Genes) -> Array:
         """Return points of the unit box, shape (n, p)."""
         return self.coding.decode(chromosomes)
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
         """Return chromosomes to be evaluated: the first population, or the offspring of one."""
-        if population is not None:
-            return self.offspring(population, rng)
-        chromosomes = self.coding.random(self.settings.population, rng)
-        if self.start is not None:
-            chromosomes[:1] = self.coding.encode(self.start[None])
-        return chromosomes
+        if population is None:
+            chromosomes = self.coding.random(self.settings.population, rng)
+            if self.start is not None:
+                chromosomes[:1] = self.coding.encode(self.start[None])
+            return chromosomes
+        count = self.settings.population - self.elite
+        parents = self.select(population.objectives, count + count % 2, rng)
+        children = crossover(population.chromosomes[parents], self.settings, rng)[:count]
+        return mutate(children, self.settings.mutation_rate, self.coding, rng)
 
-    def offspring(self, population: Population, rng: Generator) -> Genes:
-        """Return the chromosomes of the next generation that are to be evaluated."""
+    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
+        """Return parents, shape (count,), by the objectives of a population."""
         raise NotImplementedError
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the next population, from the present one (none at the start) and its offspring."""
         raise NotImplementedError
 
-    def breed(self, parents: Genes, count: int, rng: Generator) -> Genes:
-        """Cross and mutate parents, shape (even n >= count, length); return `count` children."""
-        children = crossover(parents, self.settings, rng)[:count]
-        return mutate(children, self.settings.mutation_rate, self.coding, rng)
-
 
 class SimpleGa(GeneticAlgorithm):
     """Roulette, crossover, mutation; the best few survive, the children replace the rest."""
 
-    single = True
+    single, elite = True, 1
 
-    def offspring(self, population: Population, rng: Generator) -> Genes:
-        """Return (population - ELITE, length): the elite is not simulated again."""
-        count = self.settings.population - ELITE
-        parents = roulette(_objective(population), count + count % 2, rng)
-        return self.breed(population.chromosomes[parents], count, rng)
+    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
+        """Return parents by the roulette wheel."""
+        return roulette(_objective(objectives), count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """Return the best ELITE candidates of the present population, then all offspring."""
+        """Return the elite of the present population, then all offspring."""
         if population is None:
             return offspring
-        best = np.argsort(_objective(population), kind="stable")[:ELITE]
+        best = np.argsort(_objective(population.objectives), kind="stable")[: self.elite]
         return population.take(best).join(offspring)
 
 
@@ -128,13 +128,11 @@ class Nsga2(GeneticAlgorithm):
     Non-dominated sorting, crowding, crowded tournament, and survival of the best of parents and children.
     """
 
-    single = False
+    single, elite = False, 0
 
-    def offspring(self, population: Population, rng: Generator) -> Genes:
-        """Return (population, length), from parents of the crowded tournament."""
-        count = self.settings.population
-        parents = tournament(population.objectives, count + count % 2, rng)
-        return self.breed(population.chromosomes[parents], count, rng)
+    def select(self, objectives: Array, count: int, rng: Generator) -> Ints:
+        """Return parents by the crowded tournament."""
+        return tournament(objectives, count, rng)
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
         """Return the best of parents and children together, in crowded order."""
@@ -142,7 +140,7 @@ class Nsga2(GeneticAlgorithm):
         return everyone.take(crowded_order(everyone.objectives)[: self.settings.population])
 
 
-def crowded_order(objectives: Float) -> Int:
+def crowded_order(objectives: Array) -> Ints:
     """Return candidates, (n,), from best to worst by their objectives, (n, m); equals keep their order.
 
     That is the crowded comparison: lower rank first, then more room around them.
@@ -151,7 +149,7 @@ def crowded_order(objectives: Float) -> Int:
     return np.lexsort((-crowding(objectives, rank), rank))
 
 
-def tournament(objectives: Float, count: int, rng: Generator) -> Int:
+def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
     """Return winners, (count,), of binary tournaments by the crowded comparison of objectives, (n, m).
 
     The contestants of each round are a random permutation of the population, so that every candidate
@@ -167,6 +165,6 @@ def tournament(objectives: Float, count: int, rng: Generator) -> Int:
     return np.where(a_wins, a, b)
 
 
-def _objective(population: Population) -> Float:
+def _objective(objectives: Array) -> Array:
     """The one objective, shape (n,), inf where infeasible."""
-    return np.where(feasible(population.objectives), population.objectives[:, 0], np.inf)
+    return np.where(feasible(objectives), objectives[:, 0], np.inf)

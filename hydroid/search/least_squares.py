@@ -21,16 +21,25 @@ What differs from a textbook:
 """
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.search import Array
 from hydroid.search.axes import Function
-from hydroid.search.descent import DAMPING, Descent, Ending, costs, no_jacobian, start
-from hydroid.search.linear_model import LinearModel, derivatives
+from hydroid.search.descent import (
+    DAMPING,
+    Descent,
+    Ending,
+    LinearModel,
+    costs,
+    derivatives,
+    no_jacobian,
+    start,
+)
 from hydroid.settings.search import RefinementSettings
 
-Float = NDArray[np.float64]
+State = TypeVar("State", bound=Descent)
 
 UNDAMPED = 1e-14
 """λ of the step that tells what a Jacobian promises at most"""
@@ -48,7 +57,7 @@ SLOW_STEPS = 2
 """steps in a row that may gain less than the tolerance"""
 
 
-def least_squares(start_at: Float, residuals: Function, settings: RefinementSettings) -> Descent:
+def least_squares(start_at: Array, residuals: Function, settings: RefinementSettings) -> Descent:
     """Minimise the sum of squared residuals from a point of the unit box, shape (p,).
 
     Returns:
@@ -60,13 +69,13 @@ def least_squares(start_at: Float, residuals: Function, settings: RefinementSett
     return descent
 
 
-def step(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
+def step(now: State, residuals: Function, settings: RefinementSettings) -> State:
     """Return the descent after taking a Jacobian, or after trying a step. One that has ended stays."""
     if now.ended:
         return now
     simulated = 0
 
-    def counted(points: Float) -> Float:
+    def counted(points: Array) -> Array:
         nonlocal simulated
         simulated += len(points)
         return residuals(points)
@@ -75,20 +84,20 @@ def step(now: Descent, residuals: Function, settings: RefinementSettings) -> Des
     return replace(after, evaluations=now.evaluations + simulated)
 
 
-def _differentiate(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
+def _differentiate(now: State, residuals: Function, settings: RefinementSettings) -> State:
     """Take the Jacobian; end where it promises no gain."""
     columns = derivatives(residuals, now.point, now.residual)
     if not np.isfinite(columns).all():
         return replace(now, ending=Ending.JACOBIAN_FAILED)
     after = replace(now, jacobian=columns.T, fresh=True, cycle=(now.cost, now.evaluations))
-    model = LinearModel(after.point, after.residual, after.jacobian)
+    model = LinearModel(after)
     promises = model.gain(model.step(UNDAMPED)) > settings.gain_tolerance * now.cost
     return after if promises else replace(after, ending=Ending.GAIN)
 
 
-def _advance(now: Descent, residuals: Function, settings: RefinementSettings) -> Descent:
+def _advance(now: State, residuals: Function, settings: RefinementSettings) -> State:
     """Try a step, or two; take the better one if it helps."""
-    model = LinearModel(now.point, now.residual, now.jacobian)
+    model = LinearModel(now)
     steps = [model.step(now.damping)]
     promised = model.gain(steps[0])
     if now.fresh and np.linalg.norm(steps[0]) > SHORTEST:
@@ -103,7 +112,12 @@ def _advance(now: Descent, residuals: Function, settings: RefinementSettings) ->
         return _damped(now, model, settings)
     ratio = (now.cost - cost[best]) / promised if promised > 0 else 0.0
     after = _moved(now, points[best], rows[best], ratio, settings)
-    if after.ended or not _update_pays(now, after, ratio):
+    if after.ended:
+        return after
+    # the logarithm of the cost must fall by as much in this one simulation as it has on average
+    cost, evaluations = now.cycle
+    mean = np.log(cost / after.cost) / (now.evaluations + 1 - evaluations)
+    if not (ratio > TRUSTED if now.fresh else np.log(now.cost / after.cost) >= mean):
         return after
     # Broyden's update: the Jacobian nearest to the present one, by its own scale, that explains the step
     move = after.point - now.point
@@ -112,9 +126,9 @@ def _advance(now: Descent, residuals: Function, settings: RefinementSettings) ->
     return replace(after, jacobian=now.jacobian + np.outer(unexplained / (scaled @ move), scaled))
 
 
-def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: RefinementSettings) -> Descent:
+def _moved(now: State, point: Array, row: Array, ratio: float, settings: RefinementSettings) -> State:
     """Move to a better point, whose gain is `ratio` times the promised one; the Jacobian is to be taken."""
-    cost = float(costs(row[None])[0])
+    cost = costs(row[None])[0]
     slow = now.slow + 1 if now.cost - cost < settings.gain_tolerance * now.cost else 0
     ending = Ending.UNDER_WAY
     if cost <= EXACT * now.cost_before:
@@ -138,16 +152,7 @@ def _moved(now: Descent, point: Float, row: Float, ratio: float, settings: Refin
     )
 
 
-def _update_pays(now: Descent, after: Descent, ratio: float) -> bool:
-    """Whether to update the Jacobian after a step, which took one simulation, not to take a new one."""
-    if now.fresh:
-        return ratio > TRUSTED
-    cost, evaluations = now.cycle
-    spent = now.evaluations + 1 - evaluations
-    return bool(np.log(now.cost / after.cost) >= np.log(cost / after.cost) / spent)
-
-
-def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> Descent:
+def _damped(now: State, model: LinearModel, settings: RefinementSettings) -> State:
     """After a step that did not help: a new Jacobian, or a shorter step."""
     if not now.fresh:
         return replace(now, jacobian=no_jacobian(now.point))
@@ -156,19 +161,19 @@ def _damped(now: Descent, model: LinearModel, settings: RefinementSettings) -> D
     return after if promises else _no_step(now)
 
 
-def _no_step(now: Descent) -> Descent:
+def _no_step(now: State) -> State:
     """Where no step is left: end, or take a Jacobian that was updated anew."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
     return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING, growth=2.0)
 
 
-def _corrected(model: LinearModel, s: Float, damping: float, residuals: Function) -> list[Float]:
+def _corrected(model: LinearModel, s: Array, damping: float, residuals: Function) -> list[Array]:
     """The same step corrected for the curvature along it; none where that cannot be measured."""
     origin, probe = model.reach(np.zeros_like(s)), model.reach(PROBE * s)
-    slope = (residuals(probe[None])[0] - model.residual) / PROBE
-    curvature = 2 / PROBE * (slope - model.jacobian @ ((probe - origin) / PROBE))
+    slope = (residuals(probe[None])[0] - model.at.residual) / PROBE
+    curvature = 2 / PROBE * (slope - model.at.jacobian @ ((probe - origin) / PROBE))
     if not np.isfinite(curvature).all():
         return []
-    corrected = model.step(damping, model.residual + 0.5 * curvature)
+    corrected = model.step(damping, model.at.residual + 0.5 * curvature)
     return [corrected] if model.length(corrected - s) < CURVED * model.length(s) else []

@@ -5,33 +5,27 @@ candidate dominates it.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from hydroid.search import Array, Ints, Mask
 
 
-def feasible(objectives: Float) -> Bool:
+def feasible(objectives: Array) -> Mask:
     """Candidates all of whose objectives (n, m) are finite, shape (n,)."""
     return np.all(np.isfinite(objectives), axis=1)
 
 
-def dominates(values: Float) -> Bool:
+def dominates(values: Array) -> Mask:
     """Whether candidate i (row) dominates j (column): nowhere worse, somewhere better; shape (n, n)."""
-    n, m = values.shape
-    no_worse = np.ones((n, n), dtype=bool)
-    better = np.zeros((n, n), dtype=bool)
-    for k in range(m):
-        column = values[:, k]
+    no_worse = np.ones((len(values), len(values)), dtype=bool)
+    better = ~no_worse
+    for column in values.T:
         no_worse &= column[:, None] <= column
         better |= column[:, None] < column
     return no_worse & better
 
 
-def ranks(objectives: Float) -> Int:
+def ranks(objectives: Array) -> Ints:
     """Fast non-dominated sorting (Deb 2002): the front that each candidate belongs to.
 
     Args:
@@ -44,7 +38,7 @@ def ranks(objectives: Float) -> Int:
     values = np.where(feasible(objectives)[:, None], objectives, np.inf)
     above = dominates(values)
     waiting = above.sum(axis=0)
-    rank = np.full(len(values), -1, dtype=np.int64)
+    rank = np.full(len(values), -1)
     front = waiting == 0
     current = 0
     while front.any():
@@ -55,12 +49,12 @@ def ranks(objectives: Float) -> Int:
     return rank
 
 
-def non_dominated(objectives: Float) -> Bool:
+def non_dominated(objectives: Array) -> Mask:
     """The Pareto set among the candidates, shape (n,); empty if none is feasible."""
     return (ranks(objectives) == 0) & feasible(objectives)
 
 
-def crowding(objectives: Float, rank: Int) -> Float:
+def crowding(objectives: Array, rank: Ints) -> Array:
     """Crowding distance (Deb 2002): the room each candidate has to itself on its front.
 
     Args:
@@ -73,26 +67,13 @@ def crowding(objectives: Float, rank: Int) -> Float:
     """
     room = np.zeros(len(objectives))
     usable = feasible(objectives)
-    for front in range(int(rank.max(initial=-1)) + 1):
-        candidates = np.flatnonzero((rank == front) & usable)
-        if len(candidates):
-            room[candidates] = _room(objectives[candidates])
+    for front in np.unique(rank[usable]):
+        candidates = (rank == front) & usable
+        room[candidates] = _room(objectives[candidates])
     return room
 
 
-def ideal(objectives: Float) -> Float:
-    """Utopia point (article, definition 1): the least of each objective over the feasible candidates.
-
-    Returns:
-        Shape (m,).
-
-    Raises:
-        ValueError: no candidate is feasible.
-    """
-    return objectives[feasible(objectives)].min(axis=0)
-
-
-def _room(front: Float) -> Float:
+def _room(front: Array) -> Array:
     order = np.argsort(front, axis=0, kind="stable")
     sorted_ = np.take_along_axis(front, order, axis=0)
     span = sorted_[-1] - sorted_[0]
@@ -105,7 +86,7 @@ def _room(front: Float) -> Float:
     return room.sum(axis=1)
 
 
-def segment_best(objectives: Float) -> Int:
+def segment_best(objectives: Array) -> Ints:
     """The best candidate of each segment, the thin traces of figure 19.
 
     Args:
@@ -120,7 +101,7 @@ def segment_best(objectives: Float) -> Int:
     return _ranked(objectives).argmin(axis=0)
 
 
-def average(points: Float, objectives: Float) -> Float:
+def average(points: Array, objectives: Array) -> Array:
     """The article's estimate: the mean, parameter by parameter, of the best points of all segments.
 
     Args:
@@ -136,7 +117,7 @@ def average(points: Float, objectives: Float) -> Float:
     return points[segment_best(objectives)].mean(axis=0)
 
 
-def utopia(points: Float, objectives: Float) -> Float:
+def utopia(points: Array, objectives: Array) -> Array:
     """The candidate nearest to the utopia point F⁰.
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far would
@@ -154,13 +135,13 @@ def utopia(points: Float, objectives: Float) -> Float:
         SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
-    nearest = ideal(objectives)
-    span = objectives[feasible(objectives)].max(axis=0) - nearest
+    usable = objectives[feasible(objectives)]
+    nearest, span = usable.min(axis=0), np.ptp(usable, axis=0)
     distance = (((values - nearest) / np.where(span > 0, span, 1.0)) ** 2).sum(axis=1)
     return points[distance.argmin()]
 
 
-def best(points: Float, overall: Float) -> Float:
+def best(points: Array, overall: Array) -> Array:
     """The candidate with the lowest norm over the whole record.
 
     Args:
@@ -176,7 +157,7 @@ def best(points: Float, overall: Float) -> Float:
     return points[segment_best(overall[:, None])[0]]
 
 
-def _ranked(objectives: Float) -> Float:
+def _ranked(objectives: Array) -> Array:
     """Objectives with inf throughout for infeasible candidates."""
     usable = feasible(objectives)
     if not usable.any():

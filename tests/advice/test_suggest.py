@@ -12,7 +12,7 @@ from hydroid.advice.growth import candidates, promising, refitted, score_terms
 from hydroid.advice.suggestions import advice
 from hydroid.advice.terms import ExtendedModel, terms
 from hydroid.log import Log
-from hydroid.posterior.open_start import with_open_start
+from hydroid.posterior.linear import with_open_start
 from hydroid.posterior.posterior import regular
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.prediction import simulate_log

@@ -7,9 +7,9 @@ from conftest import TRUTH, step_log
 from hydroid import load_settings
 from hydroid.errors import HydroidError
 from hydroid.findings import Finding
-from hydroid.fitting.findings import fit_findings
+from hydroid.fitting.checkpoints import Memo
 from hydroid.fitting.fit import fit
-from hydroid.fitting.memo import Memo
+from hydroid.fitting.summary import fit_findings
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
@@ -70,7 +70,7 @@ def test_a_compromise_that_diverges_gives_way_to_one_that_does_not(caplog):
     assert result.final == result.searched.name == "utopia"
     assert result.best.usable
     assert "estimate average diverged" in caplog.text
-    assert Finding("diverged", "warning", ("average",)) in fit_findings(result)
+    assert Finding("diverged", "warning", ("average",)) in fit_findings(problem, result)
 
 
 def test_where_everything_diverges_the_run_says_so():

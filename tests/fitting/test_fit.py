@@ -7,8 +7,8 @@ from small_fits import Study, Watcher
 
 from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
+from hydroid.fitting.checkpoints import Memo
 from hydroid.fitting.fit import fit
-from hydroid.fitting.memo import Memo
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
 from hydroid.problem.bindings import Bindings

@@ -12,10 +12,11 @@ from hydroid.fitting.validation import Prediction, fitted
 from hydroid.fitting.verdict import baselines_of
 from hydroid.log import Log
 from hydroid.posterior.band import Band
+from hydroid.posterior.identifiability import identifiability
 from hydroid.posterior.linear import Linear, estimate_box
-from hydroid.posterior.noise import channel_noise
+from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
-from hydroid.posterior.uncertainty import Uncertainty, identifiability, uncertainty_from
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
 from hydroid.problem.channels import make_channels
 from hydroid.problem.objectives import overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
@@ -133,7 +134,6 @@ def make_fit(
         uncertain,
         identifiability(problem, uncertain),
         make_quantities(problem),
-        {},
         {"search": 2.0, "refinement": 1.0, "uncertainty": 0.5},
     )
 
@@ -197,5 +197,4 @@ def make_uncertainty(
         prior_weight=float(np.deg2rad(0.1)),
         diverging=np.isnan(slopes[free]).any(axis=1),
     )
-    noise = tuple(channel_noise(c, residual[c.rows], problem.settings.objective) for c in problem.channels)
-    return uncertainty_from(problem, at, noise)
+    return uncertainty_from(problem, at, problem_noise(problem, residual))

@@ -18,7 +18,7 @@ from spread_problem import arguments, assert_same, random_candidates
 from worker_targets import DEADLY, Deadly, Rows
 
 from hydroid.errors import RunError
-from hydroid.fitting.memo import Memo
+from hydroid.fitting.checkpoints import Memo
 from hydroid.parallel.cluster import open_workers, write_credentials
 from hydroid.parallel.workers import DaskWorkers
 from hydroid.problem.problem import Problem

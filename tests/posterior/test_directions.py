@@ -6,8 +6,8 @@ from conftest import TRUTH as MECH
 from conftest import noisy, step_log
 
 from hydroid import load_settings
-from hydroid.posterior.flags import WEAK_ABOVE, Flag, Source
-from hydroid.posterior.uncertainty import Identifiability, Uncertainty, identifiability, uncertainty
+from hydroid.posterior.identifiability import Identifiability, identifiability
+from hydroid.posterior.uncertainty import WEAK_ABOVE, Flag, Source, Uncertainty, uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from hydroid.posterior.flags import Flag, ParameterStatus, Source, flag_of
 from hydroid.posterior.posterior import WEAK_PRIOR, Posterior, regular
+from hydroid.posterior.uncertainty import Flag, ParameterStatus, Source, flag_of
 from hydroid.search.axes import Box
 
 THETA = np.array([2.0, 5.0, 0.1])

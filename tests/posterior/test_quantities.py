@@ -9,9 +9,8 @@ from hydroid import load_settings
 from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_voltage
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
-from hydroid.posterior.bench import Bench, make_bench
-from hydroid.posterior.measures import actuator
-from hydroid.posterior.quantities import joint_measure
+from hydroid.posterior.bench import Bench, Movement, make_bench
+from hydroid.posterior.quantities import actuator, joint_measure
 from hydroid.problem.bindings import Bindings
 from hydroid.simulation import Candidates
 
@@ -113,7 +112,7 @@ def test_a_transport_delay_adds_to_the_dead_time_and_to_nothing_else(shoulder):
 
 def test_the_natural_frequency_is_that_of_the_oscillation_after_a_step(shoulder):
     _, bench, estimate, found = shoulder
-    angle = bench.drive(estimate, 5.0, bench.angle, 60)[0]
+    angle = Movement(bench, 5.0, bench.angle, 60).angles(estimate)[0]
     speed = np.diff(angle) - np.linspace(0, 1, 60) * (angle[-1] - angle[-2])
     peaks = np.flatnonzero((speed[1:-1] > speed[:-2]) & (speed[1:-1] > speed[2:]))[:3]
     assert 1 / (np.diff(peaks).mean() * 0.01) == pytest.approx(found["joint2_natural_frequency"][0], rel=0.15)

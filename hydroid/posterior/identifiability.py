@@ -1,4 +1,4 @@
-"""Intervals without the linear approximation: profile likelihood."""
+"""Which directions an estimate leaves open, and intervals without the linear approximation."""
 
 from dataclasses import dataclass, replace
 
@@ -7,9 +7,9 @@ from scipy.stats import chi2
 
 from hydroid.errors import SettingsError
 from hydroid.parameters import Array, ParameterSet
-from hydroid.posterior.open_start import least_squares_rows
+from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.posterior import COVERAGE
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import Function
 from hydroid.search.least_squares import least_squares
@@ -55,18 +55,18 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
     if name not in free:
         raise SettingsError(f"no free parameter {name!r} to profile", hint=f"free: {', '.join(free)}")
     i, residuals = parameters.names.index(name), least_squares_rows(problem, theta, linear.prior_weight)
-    cost = float(np.sum(residuals(theta[None])[0] ** 2))
+    cost = np.sum(residuals(theta[None])[0] ** 2)
     # what a deviance of 1 is: the parameter's variance over (J J')^-1; held at a bound, the others' largest
     units = linear.spread(uncertainty.posterior.deviations**2 / np.sum(linear.changes**2, axis=1))
     unit = units[i] if linear.box.varied[i] else np.nanmax(units)
 
-    deviation = float(uncertainty.standard_deviation[i])
-    reach = np.inf if np.isnan(deviation) else 3.0 * deviation  # NaN: it lies at a bound
+    reach = 3.0 * uncertainty.standard_deviation[i]
+    reach = np.inf if np.isnan(reach) else reach  # it lies at a bound
     ends, lowest = list[float](), 0.0
-    for bound, end in ((float(parameters.lower[i]), -np.inf), (float(parameters.upper[i]), np.inf)):
+    for bound, end in ((parameters.lower[i], -np.inf), (parameters.upper[i], np.inf)):
         # from the estimate outwards, until beyond THRESHOLD or at the bound, or after twelve points
-        near, start, value, crossing = 0.0, theta, float(theta[i]), end
-        length = (float(np.clip(bound, value - reach, value + reach)) - value) / STEPS
+        near, start, value, crossing = 0.0, theta, theta[i], end
+        length = (np.clip(bound, value - reach, value + reach) - value) / STEPS
         for number in range(2 * STEPS if length else 0):
             before, length = value, length * (1.5 if number >= STEPS else 1.0)
             value = bound if (bound - value - length) / length < 1e-6 else value + length
@@ -88,10 +88,44 @@ def _fit_others(
 ) -> tuple[Array, float]:
     """Fit all but parameter i, held at a value; return the result, shape (P,), and its sum of squares."""
     held = [replace(p, fixed=value) if j == i else p for j, p in enumerate(parameters.parameters)]
-    others, theta = ParameterSet(tuple(held)), start.copy()
-    theta[i] = value
-    if others.free.any():
-        unit, how = others.to_unit(start[None])[0], RefinementSettings(iterations=50, gain_tolerance=1e-6)
-        ended = least_squares(unit, lambda points: residuals(others.from_unit(points)), how)
-        return others.from_unit(ended.point[None])[0], 2 * ended.cost
-    return theta, float(np.sum(residuals(theta[None])[0] ** 2))
+    others, theta = ParameterSet(tuple(held)), np.where(np.arange(len(held)) == i, value, start)
+    if not others.free.any():
+        return theta, np.sum(residuals(theta[None])[0] ** 2)
+    how = RefinementSettings(iterations=50, gain_tolerance=1e-6)
+    ended = least_squares(others.to_unit(start), lambda unit: residuals(others.from_unit(unit)), how)
+    return others.from_unit(ended.point), 2 * ended.cost
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """The directions that are determined, and those that are not.
+
+    Attributes:
+        names: of the p parameters that vary.
+        alone: those of them that are not determined to WEAK_ABOVE, whatever the others are.
+        combinations: of the other parameters that are not determined either, the least determined first: the
+            relative changes, the largest +1, of those that take a tenth of it or more.
+    """
+
+    names: tuple[str, ...]
+    alone: tuple[str, ...]
+    combinations: tuple[dict[str, float], ...]
+
+    @property
+    def rank(self) -> int:
+        """Number of independent combinations that are determined."""
+        return len(self.names) - len(self.alone) - len(self.combinations)
+
+
+def identifiability(problem: Problem, uncertainty: Uncertainty) -> Identifiability:
+    """Return the directions that are not determined at an estimate."""
+    root = uncertainty.posterior.root
+    names = np.array(problem.parameters.names)[uncertainty.linear.box.varied]
+    alone = np.linalg.norm(root, axis=0) < 1 / WEAK_ABOVE
+    _, values, axes = np.linalg.svd(root[:, ~alone], full_matrices=False)
+    combinations: list[dict[str, float]] = []
+    for axis in axes[values < 1 / WEAK_ABOVE][::-1]:
+        changes = axis / axis[np.argmax(np.abs(axis))]
+        order = [i for i in np.argsort(-np.abs(changes), kind="stable") if abs(changes[i]) >= 0.1]
+        combinations.append({str(names[~alone][i]): float(changes[i]) for i in order})
+    return Identifiability(tuple(names.tolist()), tuple(names[alone].tolist()), tuple(combinations))

@@ -1,5 +1,6 @@
 """A fit's result as `estimate.yaml` and `--json` hold it, with what a reader must know before using it."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 
 import numpy as np
@@ -71,10 +72,10 @@ def account(problem: Problem, known: Uncertainty, directions: Identifiability | 
         )
         for i, (parameter, status) in enumerate(zip(parameters.parameters, known.status, strict=True))
     }
-    squares: dict[str, list[float]] = {}
+    squares = defaultdict[str, list[float]](list)
     for channel, noise in zip(problem.channels, known.noise, strict=True):
         if channel.quantity == "angle":
-            squares.setdefault(f"q{channel.joint}", []).append((noise.level / channel.weight) ** 2)
+            squares[f"q{channel.joint}"].append((noise.level / channel.weight) ** 2)
     findings = [*_parameter_findings(parameters, estimate), *log_findings(logs)]
     findings += _direction_findings(directions) if directions else []
     return FitSummary(
@@ -119,16 +120,16 @@ def log_findings(logs: ByLog) -> list[Finding]:
 
 def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, ParameterEstimate]) -> list[Finding]:
     """What is to be said about what the logs determine; a bound of 0 cannot be widened."""
-    kinds: dict[tuple[str, str], list[str]] = {}
+    kinds = defaultdict[tuple[str, str], list[str]](list)
     for parameter in parameters.parameters:
         one = estimate[parameter.name]
         idle, zero = one.flag == Flag.NO_EFFECT, one.at_bound == "lower" and parameter.lower == 0
         if one.at_bound and not idle:
-            kinds.setdefault(("at zero" if zero else "at bound", one.at_bound), []).append(parameter.name)
+            kinds["at zero" if zero else "at bound", one.at_bound].append(parameter.name)
         kind = one.source if one.source == Source.PRIOR and not idle else one.flag
-        kinds.setdefault((str(kind), ""), []).append(parameter.name)
+        kinds[str(kind), ""].append(parameter.name)
         if one.effect_deg is None and one.flag != Flag.FIXED:  # simulations diverge where it is changed
-            kinds.setdefault(("effect unknown", ""), []).append(parameter.name)
+            kinds["effect unknown", ""].append(parameter.name)
     return [
         Finding(
             kind, "warning" if kind in _WARNINGS else "note", tuple(names), {"side": side} if side else {}
@@ -140,7 +141,7 @@ def _parameter_findings(parameters: ParameterSet, estimate: Mapping[str, Paramet
 
 
 def _direction_findings(directions: Identifiability) -> list[Finding]:
-    several = [tuple(one) for one in directions.combinations if len(one) > 1]
-    findings = [Finding("combination", "note", names) for names in several[:_MOST_DIRECTIONS]]
-    more = {"count": str(len(several) - _MOST_DIRECTIONS)}
-    return findings + [Finding("more combinations", "note", (), more)] * (len(several) > _MOST_DIRECTIONS)
+    several = [Finding("combination", "note", tuple(one)) for one in directions.combinations if len(one) > 1]
+    more = len(several) - _MOST_DIRECTIONS
+    rest = [Finding("more combinations", "note", (), {"count": str(more)})] if more > 0 else []
+    return several[:_MOST_DIRECTIONS] + rest

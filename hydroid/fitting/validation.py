@@ -90,9 +90,9 @@ class Prediction:
 
 def error_indices(measured: Array, error: Array) -> ErrorIndices:
     """Return the indices of an error of the measured angle [rad], both of shape (T,)."""
-    rms, spread = float(np.sqrt(np.mean(error**2))), float(np.std(measured))
-    fit = 100 * (1 - rms / spread) if spread > 1e-9 else float("nan")  # else it moves by rounding only
-    return ErrorIndices(float(np.mean(np.abs(error))), rms, float(np.max(np.abs(error))), fit)
+    rms, spread, size = np.sqrt(np.mean(error**2)), np.std(measured), np.abs(error)
+    fit = 100 * (1 - rms / spread) if spread > 1e-9 else np.nan  # else it moves by rounding only
+    return ErrorIndices(size.mean(), rms, size.max(), fit)
 
 
 def predicted(model: IdentifiedModel, log: Log, unseen: bool | None) -> Prediction:

@@ -20,6 +20,7 @@ t with these. The usual sandwich, clustered by log, is useless for a few logs th
 that alone determines a parameter is zero at the optimum.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,11 +77,11 @@ def by_log(problem: Problem, uncertainty: Uncertainty) -> ByLog:
     steps = np.array([m @ u @ row[own] for m, u, own in zip(inverses, effects, columns, strict=True)])
     for own, step, u in zip(columns, steps, effects, strict=True):
         row[own] += step @ u
-    left_out: dict[str, list[float]] = {}
+    left_out = defaultdict[str, list[float]](list)
     for channel in problem.channels:
         if channel.quantity == "angle":
             error = np.sqrt(np.mean((row[channel.rows] / channel.weight) ** 2))
-            left_out.setdefault(f"q{channel.joint}", []).append(float(np.degrees(error)))
+            left_out[f"q{channel.joint}"].append(float(np.degrees(error)))
 
     rows, pooled = linear.changes, scatters.sum(axis=0)  # of the p parameters that vary
     expected = _expected(rows @ inverses, shares, scatters, linear.prior_scatter)

@@ -124,14 +124,14 @@ def no_jacobian(point: Array) -> Array:
 class LinearModel:
     """The linear model r + J s of the residual around a descent's point, for the parameters with effect.
 
-    A column of J of a parameter without effect is 0.
+    A column of J of a parameter without effect is 0; `scale` has the lengths of the others.
     """
 
     def __init__(self, at: Descent) -> None:
         self.at = at
         length = np.linalg.norm(at.jacobian, axis=0)
         self._moving = np.flatnonzero(length > 0)
-        self._scale = length[self._moving]
+        self.scale = length[self._moving]
         self._triangle, self._right = self.reduced(at.residual)
 
     def reduced(self, row: Array) -> tuple[Array, Array]:
@@ -147,8 +147,8 @@ class LinearModel:
         if not size:
             return np.zeros_like(right)
         # in lengths of the columns and of the residual, in which the solver's tolerances mean something
-        there, unit = self.at.point[self._moving], self._scale / size
-        matrix = np.vstack([triangle / self._scale, np.sqrt(damping) * np.eye(len(unit))])
+        there, unit = self.at.point[self._moving], self.scale / size
+        matrix = np.vstack([triangle / self.scale, np.sqrt(damping) * np.eye(len(unit))])
         target = np.append(-right / size, np.zeros(len(unit)))
         limits = -there * unit, (1 - there) * unit
         most = 20 * len(unit) + 20  # changes of the active set: far more than it takes
@@ -164,10 +164,6 @@ class LinearModel:
         point = self.at.point.copy()
         point[self._moving] = np.clip(point[self._moving] + s, 0.0, 1.0)
         return point
-
-    def length(self, s: Array) -> float:
-        """Length of a step, scaled."""
-        return float(np.linalg.norm(self._scale * s))
 
 
 def derivatives(residuals: Function, point: Array, row: Array) -> Array:

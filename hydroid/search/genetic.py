@@ -52,8 +52,8 @@ class Population:
 
     def join(self, other: "Population") -> "Population":
         """Return these candidates, then the others."""
-        both = zip((self.chromosomes, self.objectives), (other.chromosomes, other.objectives), strict=True)
-        return Population(*map(np.concatenate, both))
+        chromosomes = np.concatenate([self.chromosomes, other.chromosomes])
+        return Population(chromosomes, np.concatenate([self.objectives, other.objectives]))
 
 
 @dataclass(frozen=True)
@@ -157,9 +157,8 @@ def tournament(objectives: Array, count: int, rng: Generator) -> Ints:
     """
     rank = ranks(objectives)
     room = crowding(objectives, rank)
-    n = len(objectives)
-    rounds = -(-2 * count // n)
-    contestants = np.concatenate([rng.permutation(n) for _ in range(rounds)])[: 2 * count]
+    rounds = -(-2 * count // len(rank))
+    contestants = np.concatenate([rng.permutation(len(rank)) for _ in range(rounds)])[: 2 * count]
     a, b = contestants[0::2], contestants[1::2]
     a_wins = (rank[a] < rank[b]) | ((rank[a] == rank[b]) & (room[a] >= room[b]))
     return np.where(a_wins, a, b)

@@ -176,4 +176,5 @@ def _corrected(model: LinearModel, s: Array, damping: float, residuals: Function
     if not np.isfinite(curvature).all():
         return []
     corrected = model.step(damping, model.at.residual + 0.5 * curvature)
-    return [corrected] if model.length(corrected - s) < CURVED * model.length(s) else []
+    change, length = (np.linalg.norm(model.scale * each) for each in (corrected - s, s))
+    return [corrected] if change < CURVED * length else []

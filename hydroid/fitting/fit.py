@@ -153,10 +153,11 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
             _log.warning(words, refinements[final].ending.value, final)
     times.append(time.perf_counter())
     about = uncertainty(last, estimates[final].theta, _slopes(last, refinements.get(final)))
-    of_it = about, identifiability(last, about), quantities(last, about)
+    directions, determined, front = identifiability(last, about), quantities(last, about), _front(searched)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     took: dict[str, float] = dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True))
-    return Fit(estimates, final, _front(searched), searched.history, refinements, *of_it, took)
+    history = searched.history
+    return Fit(estimates, final, front, history, refinements, about, directions, determined, took)
 
 
 def _slopes(problem: Problem, descent: Descent | None) -> Array | None:

@@ -8,7 +8,7 @@ Student's t. What an unseen log shows beyond all this is a further error of the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -44,7 +44,7 @@ class Band:
     inside: float
     error: float
     expected: float
-    limit: float
+    limit: float = np.inf
 
     @property
     def exists(self) -> bool:
@@ -108,25 +108,21 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         few = np.vstack([parts[:, :, column], start[joint]])
         square = np.sum((few @ few.T / few.shape[1]) ** 2) + widened**2
         limit = _limit(np.mean(variance) + noise**2 + widened, square)
-        bands[joint] = _band(known, noise, variance, error, (wrong, widened, limit))
+        bands[joint] = replace(_band(known, noise, variance, error, wrong, widened), limit=limit)
     return bands
 
 
 def _band(
-    known: Posterior,
-    noise: float,
-    variance: Array,
-    error: Array,
-    unseen: tuple[float, float, float] = (0.0, 0.0, np.inf),
+    known: Posterior, noise: float, variance: Array, error: Array, wrong: float = 0.0, widened: float = 0.0
 ) -> Band:
     """Return the band of an error [rad] from the level of the noise, and the variance of the rest, (T,).
 
-    `unseen`: mean square error of the model on unseen logs, the same as wide as it is known, and the limit.
+    wrong: mean square error of the model on unseen logs. widened: the same, as wide as it is known.
     """
-    (wrong, widened, limit), variance = unseen, variance + noise**2
+    variance = variance + noise**2
     half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
     inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
-    return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong), limit)
+    return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong))
 
 
 def _limit(mean: float, square: float) -> float:

@@ -185,13 +185,13 @@ def uncertainty_from(problem: Problem, whole: Linear, noise: Sequence[Noise] = (
     unknown = (widened > UNIDENTIFIABLE_ABOVE) & ~(prior < 0.5 * WEAK_PRIOR)
     relative[unknown] = np.inf
     status = [ParameterStatus(Flag.FIXED)] * len(free)
-    for i, there, to_bounds in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
+    for i, at_edge, (down, up) in zip(np.flatnonzero(free).tolist(), edge, room.T, strict=True):
         flag = Flag.NO_EFFECT if whole.sensitivity[i] == 0 else flag_of(float(widened[i]), shares[i])
-        side = ("lower" if to_bounds[0] <= to_bounds[1] else "upper") if there else None
+        side = ("lower" if down <= up else "upper") if at_edge else None
         status[i] = ParameterStatus(flag, side, float(shares[i]), not unknown[i])
     between = ends(problem.parameters, linear.box, widths * relative)
-    about = posterior, relative, between, tuple(status)
-    return Uncertainty(linear, noise, scatters, whole.sensitivity, *about)
+    sensitivity, each = whole.sensitivity, tuple(status)
+    return Uncertainty(linear, noise, scatters, sensitivity, posterior, relative, between, each)
 
 
 def ends(parameters: ParameterSet, box: Box, half: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.advice.pseudo_random import pseudo_random_log
-from hydroid.estimate import read_values
+from hydroid.estimate import read_estimate
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
@@ -21,7 +21,7 @@ from hydroid.settings.search import RefinementSettings
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-ARTICLE_TRUTH = read_values(EXAMPLES / "article" / "truth.yaml")[0]
+ARTICLE_TRUTH = read_estimate(EXAMPLES / "article" / "truth.yaml")[1]
 
 
 def options(text: str | None, **defaults: Any) -> Any:

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from hydroid.commands.logs import read_logs as read_logs
     from hydroid.commands.plan import design as design
     from hydroid.commands.plan import suggest as suggest
-    from hydroid.commands.simulate import simulate as simulate
     from hydroid.commands.stages import fit_hyd as fit_hyd
     from hydroid.commands.stages import fit_mech as fit_mech
     from hydroid.commands.study import study as study
     from hydroid.commands.validate import report as report
     from hydroid.commands.validate import validate as validate
+    from hydroid.commands.view import simulate as simulate
     from hydroid.commands.view import view as view
     from hydroid.errors import HydroidError as HydroidError
     from hydroid.identified_model import IdentifiedModel as IdentifiedModel

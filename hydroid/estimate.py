@@ -193,9 +193,6 @@ class FitSummary(Settings):
         return self.model_dump(mode="json", by_alias=True)
 
 
-_GIVE = "give the run folder, its estimate.yaml, or a YAML file of values by name"
-
-
 def write_estimate(folder: Path, summary: FitSummary) -> None:
     """Write `estimate.yaml`.
 
@@ -207,47 +204,30 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
     write_atomic(folder / NAME, text)
 
 
-def estimate_file(source: Path) -> Path:
-    """Return the file that holds the values of a run folder, of a saved plant, or of a YAML file by itself.
-
-    Raises:
-        RunError: the folder holds none.
-    """
-    if not source.is_dir():
-        return source
-    if is_file(source / NAME):
-        return source / NAME
-    begun = is_file(source / "run.json")
-    hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
-    raise RunError("holds no estimate" + (" yet" if begun else ""), where=str(source), hint=hint)
-
-
-def read_values(source: Path) -> tuple[dict[str, Any], FitSummary | None]:
+def read_estimate(source: Path) -> tuple[Path, dict[str, Any], FitSummary | None]:
     """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
 
     Returns:
-        The values, unchecked where they are not an estimate's, and the estimate where there is one.
+        The file, its values, unchecked where they are not an estimate's, and the estimate where there is one.
 
     Raises:
         RunError: the folder holds none.
-        SettingsError: the file cannot be read, or is no mapping.
+        SettingsError: the file cannot be read, or holds no values by name.
     """
-    file = estimate_file(source)
-    try:
-        content, _ = read_yaml(file)
-    except SettingsError:
-        if file.suffix in (".yaml", ".yml", ".json") or not is_file(file):
-            raise
-        raise SettingsError("is no estimate", where=str(file), hint=_GIVE) from None
+    file = source / NAME if source.is_dir() else source
+    if source.is_dir() and not is_file(file):
+        begun = is_file(source / "run.json")
+        hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
+        raise RunError("holds no estimate" + (" yet" if begun else ""), where=str(source), hint=hint)
+    content, _ = read_yaml(file)
     if "estimate" in content:
         summary = load(file, FitSummary)
-        return dict(summary.values), summary
+        return file, summary.values, summary
     values = content.get("parameters", content)
-    if isinstance(values, dict) and any(isinstance(value, dict) for value in values.values()):
-        raise SettingsError("these are settings, not an estimate", where=str(file), hint=_GIVE)
-    if not isinstance(values, dict):
-        raise SettingsError("parameters must be a mapping", where=str(file), hint="write `K: 0.2` lines")
-    return values, None
+    if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):
+        hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
+        raise SettingsError("is no estimate", where=str(file), hint=hint)
+    return file, values, None
 
 
 def finite(value: float | None) -> float | None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from hydroid.estimate import NAME, FitSummary, ParameterEstimate, estimate_file, read_values
+from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
 from hydroid.files import find_config, is_file, write_atomic
 from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
@@ -92,10 +92,9 @@ def load_identified(
         RunError: the folder holds no estimate.
         SettingsError: a file that cannot be read, a parameter that is unknown, or missing and not `nominal`.
     """
-    file = None if source is None else estimate_file(Path(source))
-    values, summary = ({}, None) if file is None else read_values(file)
-    beside = None if file is None else file.parent / CONFIG
-    chosen = config or (beside if beside is not None and is_file(beside) else default)
+    file, values, summary = (None, {}, None) if source is None else read_estimate(Path(source))
+    beside = file and file.parent / CONFIG
+    chosen = config or (beside if beside and is_file(beside) else default)
     settings = load(find_config(chosen), FitSettings, dict(overrides or {}))
     if config is None and summary is not None:
         settings = settings.of_estimate(summary.final)
@@ -103,7 +102,7 @@ def load_identified(
     if nominal and missing:
         known = {n: p for n, p in settings.parameters.items() if n not in missing}
         settings = settings.changed({"parameters": known})
-    origin = str(chosen if file is None else file)
+    origin = str(file or chosen)
     theta = settings.parameter_set().vector(values, origin)
     return IdentifiedModel(settings, theta, origin, summary, tuple(missing))
 

@@ -35,7 +35,8 @@ from hydroid.progress import NOTE, Progress
 from hydroid.run.identity import deciding, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.study import cell_settings, load_study
+from hydroid.settings.load import load
+from hydroid.settings.study import StudySettings, cell_settings
 
 Result = dict[str, Any]
 """what `perform` returns, or {"failed": why}"""
@@ -126,7 +127,7 @@ def run_study(
         LogError: a log cannot be used.
         RunError: the folder cannot be written, or a process died.
     """
-    study = load_study(path)
+    study = load(path, StudySettings)
     cells = cell_settings(study, path)
     logs = read([path.parent / name for name in study.logs], next(iter(cells.values())))
     tasks = make_tasks(cells, study.seeds, logs)

@@ -52,7 +52,7 @@ def test_values_are_taken_and_what_is_not_named_is_nominal(tmp_path: Path, arm: 
         ("AA: 900\n", "unknown parameter 'AA'"),
         ("K: 1\n", "'D' is missing"),
         ("K: -1\n", "a number from 0"),
-        ("parameters: 3\n", "must be a mapping"),
+        ("parameters: 3\n", "is no estimate"),
         ("estimate: {K: 3}\nstage: mech\n", "estimate.K: must be a mapping"),
     ],
 )

@@ -1,16 +1,22 @@
 """The study's mechanism: each run is one file, what is there is not repeated, what failed is shown."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from small_studies import content, run, written
 
 from hydroid import read_logs, studies
 from hydroid.errors import HydroidError, RunError
-from hydroid.settings.study import cell_settings, load_study
+from hydroid.settings.load import load
+from hydroid.settings.study import StudySettings, cell_settings
 from hydroid.studies import make_tasks
 
 
@@ -54,7 +60,7 @@ def test_what_is_there_is_read_and_what_is_missing_is_performed(tmp_path: Path, 
 def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     """A checkout that is moved keeps its runs: paths decide nothing."""
     file = written(tmp_path)
-    cells = cell_settings(load_study(file), file)
+    cells = cell_settings(load(file, StudySettings), file)
     (task, *_) = make_tasks(cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"]))
     arm = task.settings.arm
     moved = replace(arm, file=arm.file.model_copy(update={"pair": tmp_path / "other.xml"}))
@@ -87,12 +93,15 @@ def test_a_run_that_fails_is_shown_and_the_others_count(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml, line \d+: .*objective.nrm.*'norm'"),
-        ({"set": {"search.ga.population": 1}}, r"small.yaml, line \d+: .*must be greater than or equal to 4"),
-        ({"axes": {"objective.norm": []}}, r"axes give 0 cells"),
+        ({"axes": {"norm": {"a": {"objective.nrm": 1}}}}, r"small.yaml: .*objective.nrm.*'norm'"),
+        (
+            {"set": {"search.ga.population": 1}},
+            r"small.yaml: search.ga.population: .*than or equal to 4",
+        ),
+        ({"axes": {"objective.norm": []}}, r"small.yaml, line \d+: axes.objective.norm"),
         ({"sedes": 3}, r"unknown setting 'sedes'; did you mean 'seeds'"),
         ({"base": "nowhere"}, r"nowhere: no such config; give a YAML file or one of: .*article-mech"),
-        ({"logs": []}, r"names no log"),
+        ({"logs": []}, r"small.yaml, line \d+: logs"),
         ({"logs": ["gone.csv"]}, r"gone.csv"),
     ],
 )
@@ -115,8 +124,37 @@ def test_a_damaged_result_is_refused_in_one_line(tmp_path: Path, text: str):
 def test_axes_multiply_and_lists_name_their_cells(tmp_path: Path):
     axes = {"search.ga.crossover_rate": [0.4, 0.8], "norm": content()["axes"]["norm"]}
     file = written(tmp_path, axes=axes)
-    cells = cell_settings(load_study(file), file)
+    cells = cell_settings(load(file, StudySettings), file)
     assert list(cells) == [
         f"search.ga.crossover_rate {r}, {n}" for r in (0.4, 0.8) for n in ("largest", "mean")
     ]
     assert [s.search.ga.crossover_rate for s in cells.values()] == [0.4, 0.4, 0.8, 0.8]
+
+
+@pytest.mark.slow
+def test_a_killed_study_goes_on_ends_with_the_same_bits_and_leaves_no_process(tmp_path: Path):
+    file, (whole, killed) = written(tmp_path, seeds=6), (tmp_path / "whole", tmp_path / "killed")
+
+    def start(out: Path) -> "subprocess.Popen[str]":
+        command = [sys.executable, "-m", "hydroid", "study", file, "--out", out, "--processes", "2"]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    first, second = start(whole), start(killed)
+    while not list(killed.glob("runs/*.json")) and second.poll() is None:
+        time.sleep(0.01)
+    workers = psutil.Process(second.pid).children()
+    second.send_signal(signal.SIGKILL)
+    second.wait()
+    assert first.wait(timeout=300) == 0, first.communicate()
+    before = {file: file.stat().st_mtime_ns for file in killed.glob("runs/*.json")}
+    assert 0 < len(before) < 12
+    again = start(killed)
+    _, said = again.communicate(timeout=300)
+    assert again.returncode == 0, said
+    assert f"{len(before)} of 12 runs found, goes on" in said
+    assert all(file.stat().st_mtime_ns == then for file, then in before.items())  # nothing is done twice
+    assert stored(killed) == stored(whole)
+    cells = "tables/cells.csv"  # runs.csv has the seconds too
+    assert (killed / cells).read_bytes() == (whole / cells).read_bytes()
+    assert workers
+    assert not any(worker.is_running() for worker in workers)

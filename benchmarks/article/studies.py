@@ -90,6 +90,7 @@ class CheckLog(Settings):
 class ArticleStudy(StudySettings):
     """A study with what the article prints and says of it."""
 
+    logs: tuple[str, ...] = ()
     about: str
     items: tuple[str, ...]
     checks: dict[str, CheckLog] = Field(default_factory=dict[str, CheckLog])

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from hydroid.commands.fit import FitResult
 from hydroid.commands.fit import fit as run_fit
-from hydroid.commands.inputs import ModelSource, Source, open_model
+from hydroid.commands.inputs import ModelSource, Source, command, names, open_model
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import command, names
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 

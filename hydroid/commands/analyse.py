@@ -14,11 +14,12 @@ from hydroid.commands.inputs import (
     ModelSource,
     SettingChanges,
     Source,
+    command,
     load_settings,
+    names,
     open_model,
 )
 from hydroid.commands.logs import problem_of
-from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.errors import RunError
 from hydroid.estimate import finite

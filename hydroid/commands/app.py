@@ -13,7 +13,6 @@ from typer.core import TyperGroup
 
 import hydroid
 from hydroid.commands.console import log_lines, show, show_error
-from hydroid.commands.options import COMMAND_LINES
 from hydroid.commands.progress import VISIBLE, listen, stopped
 from hydroid.errors import HydroidError
 
@@ -80,6 +79,8 @@ class LazyGroup(TyperGroup):
 def click_command(command: str) -> "TyperCommand":
     """Return a command, which prints the result of the function of its name."""
     function: Callable[..., Any] = getattr(hydroid, command.replace("-", "_"))
+    from hydroid.commands.inputs import COMMAND_LINES
+
     text, example, parameters = COMMAND_LINES[function]
 
     def run(json: bool, quiet: bool, verbose: bool, **given: Any) -> None:

@@ -15,11 +15,11 @@ from hydroid.commands.inputs import (
     SettingChanges,
     Source,
     as_list,
+    command,
     load_settings,
     refuse_overwriting,
 )
 from hydroid.commands.logs import check_file, named, plain_findings
-from hydroid.commands.options import command
 from hydroid.settings.log import LogSettings
 
 if TYPE_CHECKING:

@@ -23,7 +23,6 @@ OPTIONS = {
     "search.seed": "--seed",
     "simulation.threads": "--threads",
     "refinement": "--no-refinement",
-    "joint_refinement": "--both-stages",
     "design.duration_s": "--duration",
     "design.joints": "--joints",
 }

@@ -83,25 +83,18 @@ class FitResult(Printed):
         rows = {name: one.model_dump() for name, one in self.summary.estimate.items()}
         return pandas.DataFrame.from_dict(rows, orient="index")
 
-    def report(self, out: Source | None = None) -> Path:
-        """Write the report and its tables to a folder, by default the run folder; return the page.
+    def report(self, out: Source) -> Path:
+        """Write the run of a fit in memory to a folder, as `out` of the fit does; return its page.
 
         Raises:
-            RunError: the folder cannot be written, or there is none.
+            RunError: the folder holds another run or cannot be written.
         """
-        from hydroid.reporting.fit_report import fit_page
-        from hydroid.reporting.page_file import write_page
-        from hydroid.run.identity import identity
-        from hydroid.run.record import Record, fit_result
+        from hydroid.run.folder import RunFolder
 
-        folder = out or self.folder
-        if folder is None:
-            raise RunError("this fit has no folder", hint="name one: report('runs/a')")
-        made_by = identity(self.problem.settings, self.problem.logs)
-        result = fit_result(self.fit, self.predictions, self.baselines)
-        record = Record(str(folder), made_by, self.model.settings, self.summary, result, {})
-        write_page(page := fit_page(record), Path(folder))
-        return Path(folder) / f"{page.name}.html"
+        folder = RunFolder(Path(out))
+        with folder.owned():
+            folder.begin(self.problem.settings, self.problem.logs)
+            return _store(folder, self)
 
 
 def fit(
@@ -139,6 +132,7 @@ def fit(
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem
     from hydroid.run.folder import RunFolder
+    from hydroid.run.process import log_start
 
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
@@ -147,7 +141,10 @@ def fit(
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)
     with folder.owned():
-        return _fit_in(folder, problem, progress)
+        log_start()
+        result = _result(problem, run_fit(problem, progress, folder.begin(settings, read)), folder.path)
+        _store(folder, result)
+    return result
 
 
 def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
@@ -177,19 +174,14 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     return FitResult(lines, content, *own, details=details)
 
 
-def _fit_in(folder: "RunFolder", problem: "Problem", progress: "Watcher | None") -> FitResult:
-    """Begin the folder's run, or continue it, to its report."""
-    from hydroid.fitting.fit import fit as run_fit
+def _store(folder: "RunFolder", result: FitResult) -> Path:
+    """Write a finished fit to its folder; return the page."""
     from hydroid.reporting.fit_report import draw
-    from hydroid.run.process import log_start
     from hydroid.run.record import fit_result, save_result
 
-    log_start()
-    fit = run_fit(problem, progress, folder.begin(problem.settings, problem.logs))
-    result = _result(problem, fit, folder.path)
-    folder.write_estimate(problem.logs[0], fit.best.theta, result.summary)
     began = time.monotonic()
-    save_result(folder.path, fit_result(fit, result.predictions, result.baselines))
-    draw(folder.path)
-    folder.status("done", seconds=dict(fit.seconds) | {"report": time.monotonic() - began})
-    return result
+    folder.write_estimate(result.problem.logs[0], result.fit.best.theta, result.summary)
+    save_result(folder.path, fit_result(result.fit, result.predictions, result.baselines))
+    page = draw(folder.path)
+    folder.status("done", seconds=dict(result.fit.seconds) | {"report": time.monotonic() - began})
+    return page

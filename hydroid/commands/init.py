@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result
-from hydroid.commands.inputs import Source, as_list
-from hydroid.commands.options import command, names
+from hydroid.commands.inputs import Source, as_list, command, names
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
 

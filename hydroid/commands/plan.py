@@ -10,11 +10,12 @@ from hydroid.commands.inputs import (
     ModelSource,
     SettingChanges,
     Source,
+    command,
+    names,
     open_model,
     setting_changes,
 )
 from hydroid.commands.logs import problem_of, read_logs
-from hydroid.commands.options import command, names
 from hydroid.commands.progress import Progress
 from hydroid.files import is_file
 from hydroid.findings import Finding
@@ -152,7 +153,7 @@ def design(
     from hydroid.posterior.uncertainty import flag_of
     from hydroid.reporting.table import Table
 
-    settings, commands = model.settings, None if out is None else str(Path(out) / "commands.csv")
+    settings = model.settings
     with Progress() as progress:
         existing = read_logs(logs, settings, repair=repair)
         result = best_experiment(settings, model.theta, existing, seed, progress)
@@ -171,9 +172,10 @@ def design(
     )
     safety = Finding("run the experiment", "note").hint
     table = Table.of("Predicted relative standard deviations", PRECISION, rows, note + safety)
-    files = written({"design": table}, out)
+    files, commands = written({"design": table}, out), None
     if out is not None:
-        write_log(Path(out) / "commands.csv", result.log, settings.log)
+        commands = str(Path(out) / "commands.csv")
+        write_log(Path(commands), result.log, settings.log)
         write_log(Path(out) / "predicted.csv", result.best.log, settings.log)
-        files.insert(0, str(commands))
+        files.insert(0, commands)
     return Result([table, *files], {"commands": commands, "precision": rows}, result)

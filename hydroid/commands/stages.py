@@ -11,12 +11,12 @@ from hydroid.commands.inputs import (
     ModelSource,
     SettingChanges,
     Source,
+    command,
     load_settings,
     open_values,
     setting_changes,
 )
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import command
 from hydroid.commands.progress import FitProgress
 from hydroid.errors import SettingsError
 from hydroid.parallel.cluster import open_workers
@@ -75,7 +75,6 @@ def fit_hyd(
     start: "ModelSource | None" = None,
     resume: bool = False,
     refinement: bool | None = None,
-    both_stages: bool | None = None,
     threads: int | None = None,
     dask: str | None = None,
     config: "ConfigSource" = "fit-hyd",
@@ -95,13 +94,11 @@ def fit_hyd(
     Args:
         out (DIR): Run folder [default of the command line: runs/fit-hyd].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values.
-        both_stages: At the end, refine the parameters of both stages together.
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
     """
     changes = _changes(set, algorithm, seed, threads, refinement)
-    changes = setting_changes(changes, {"joint_refinement": both_stages})
     settings = load_stage("hyd", config, with_mechanics(mech, config, changes), start)
     return _fit(settings, logs, out, resume=resume, dask=dask, repair=repair)
 

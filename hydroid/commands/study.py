@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hydroid.commands.console import Result, written
-from hydroid.commands.inputs import Source
+from hydroid.commands.inputs import Source, command
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import command
 from hydroid.commands.progress import Progress
 from hydroid.errors import Stopped
-from hydroid.settings.study import load_study
+from hydroid.settings.load import load
+from hydroid.settings.study import StudySettings
 
 if TYPE_CHECKING:
     from hydroid.studies import Row
@@ -45,7 +45,7 @@ def study(
         RunError: the folder cannot be written or is in use, or a process died.
     """
     path, folder = Path(file), Path(out)
-    load_study(path)  # a wrong file is refused before anything heavy is imported
+    load(path, StudySettings)  # a wrong file is refused before anything heavy is imported
     from hydroid.estimate import finite
     from hydroid.reporting.table import Table
     from hydroid.run.process import locked

@@ -6,9 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from hydroid.commands.console import Result, written
 from hydroid.commands.fit import FitResult
-from hydroid.commands.inputs import LogSources, ModelSource, SettingChanges, Source, as_list, open_model
+from hydroid.commands.inputs import (
+    LogSources,
+    ModelSource,
+    SettingChanges,
+    Source,
+    as_list,
+    command,
+    open_model,
+)
 from hydroid.commands.logs import read_logs
-from hydroid.commands.options import command
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 
@@ -118,7 +125,6 @@ def report(
     runs: "Source | Sequence[Source]",
     *,
     merge: bool = False,
-    without: Sequence[str] = (),
     figures: bool = False,
     out: "Source | None" = None,
 ) -> "Result[tuple[Record, ...]]":
@@ -136,7 +142,6 @@ def report(
         runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
         merge: The folders are runs of one fit with different seeds: show median and spread of their
             estimates. Runs that are not finished or damaged are left out, with a warning.
-        without (NAME): Leave out a validation of the run; repeat for several.
         figures: Also write every chart as PNG and SVG, to figures/.
         out (DIR): Folder for the tables of --merge.
 
@@ -147,7 +152,7 @@ def report(
     if not merge:
         from hydroid.reporting.fit_report import draw
 
-        files = [str(draw(run, without or (), figures=figures)) for run in as_list(runs)]
+        files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
     from hydroid.reporting.validation_report import merged_tables
     from hydroid.run.collection import read_runs

@@ -1,7 +1,6 @@
 """The page of a fit, from what its run stores: the verdict, the prediction, what is known, what to do."""
 
 import shlex
-from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,18 +24,17 @@ from hydroid.reporting.verdict_table import lead, next_step, verdict_section
 from hydroid.run.record import Record, load_record
 
 
-def draw(run: str | Path, without: Collection[str] = (), *, figures: bool = False) -> Path:
+def draw(run: str | Path, *, figures: bool = False) -> Path:
     """Draw the report of a finished run in its folder, from what it stores; return the page.
 
     Args:
         run: its folder.
-        without: names of validations that are left out.
         figures: write every chart as PNG and SVG too, to figures/ beside the page.
 
     Raises:
         RunError: the folder holds no finished run of this version, or the page cannot be written.
     """
-    folder, page = Path(run), fit_page(load_record(run, without))
+    folder, page = Path(run), fit_page(load_record(run))
     page_file.write_page(page, folder)
     if figures:
         page_file.write_figures(page, folder / "figures")

@@ -8,7 +8,7 @@ A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder
 
 import math
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -101,11 +101,6 @@ class Record:
         """Its logs as a command takes them."""
         return " ".join(shlex.quote(p.log.source) for p in self.result.fitted)
 
-    @property
-    def predictions(self) -> tuple[Prediction, ...]:
-        """Of all logs, the unseen ones first."""
-        return (*self.validations.values(), *self.result.fitted)
-
 
 def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -> FitResult:
     """Return what a run stores beside its summary."""
@@ -165,23 +160,19 @@ def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, 
     return result.fitted, result.baselines, {*RunFolder(folder).identity().get("logs", {}).values()}
 
 
-def load_record(folder: str | Path, without: Collection[str] = ()) -> Record:
-    """Read a finished run; the validations named in `without` are left out.
+def load_record(folder: str | Path) -> Record:
+    """Read a finished run.
 
     Raises:
-        RunError: the folder holds no finished run, it is damaged, or there is no such validation.
+        RunError: the folder holds no finished run, or it is damaged.
     """
     path = Path(folder)
     identity = RunFolder(path).identity()
     summary = load(path / NAME, FitSummary)
     settings = RunFolder(path).settings().of_estimate(summary.final)
     files = sorted(path.glob(f"{VALIDATIONS}/*/{RESULT}"))
-    names = [file.parent.name for file in files]
-    if missing := [name for name in without if name not in names]:
-        hint = f"it has {', '.join(names)}" if names else "it has none"
-        raise RunError(f"has no validation {missing[0]}", where=str(folder), hint=hint)
-    kept = {file.parent.name: _read(file, Prediction) for file in files if file.parent.name not in without}
-    return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), kept)
+    unseen = {file.parent.name: _read(file, Prediction) for file in files}
+    return Record(str(folder), identity, settings, summary, _read(path / RESULT, FitResult), unseen)
 
 
 def _read(file: Path, kind: type[T]) -> T:

@@ -125,5 +125,3 @@ def test_the_command_names_the_best_run_and_warns_on_the_side(runs):
     assert found["best"] == min(found["runs"], key=lambda run: found["runs"][run]["rms_deg"])
     assert [row["name"] for row in found["parameters"]][:3] == ["K", "D", "S"]
     assert done.stderr == "hydroid: left out: seed-3: is not finished (running); resume it\n"
-    done = CliRunner().invoke(app, ["report", "--merge", "seed-*", "--out", "out"])
-    assert f"smallest error: {found['best']} (seed " in done.stdout

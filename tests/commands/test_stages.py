@@ -1,6 +1,7 @@
-"""The commands as a user meets them: from logs to fits, errors on other logs, predictions."""
+"""The commands as a user meets them: from logs to fits, errors on other logs, predictions, both stages."""
 
 import json
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import yaml
 from command_line import Run
 
 import hydroid
-from hydroid.errors import RunError
+from hydroid.commands.stages import with_mechanics
+from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
 
 ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
@@ -85,8 +87,6 @@ def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(shor
     start = fitted.model.settings.arm.pose("study")
     np.testing.assert_array_equal(fitted.plant().reset("study"), start)
     np.testing.assert_array_equal(hydroid.load_plant(fitted).reset("study"), start)
-    with pytest.raises(RunError, match="has no folder"):
-        fitted.report()
     assert sorted(tmp_path.iterdir()) == before
     assert fitted.report(tmp_path / "page").stat().st_size > 0
 
@@ -110,9 +110,19 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
 
 def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path: Path):
     (tmp_path / "mech.yaml").write_text(yaml.safe_dump(VALUES))
-    arguments = ["fit-hyd", short, "--mech", "mech.yaml", *GA, "--out", "run", "--both-stages", *QUICK]
-    measured = "free_start=false"  # the errors below are those from the measured start
-    found = json.loads(hydroid_cli(*arguments, "--set", measured, "--json").out)
+    arguments = [
+        "fit-hyd",
+        short,
+        "--mech",
+        "mech.yaml",
+        *GA,
+        "--out",
+        "run",
+        *QUICK,
+    ]
+    # the errors below are those from the measured start
+    changes = ["--set=free_start=false"]
+    found = json.loads(hydroid_cli(*arguments, *changes, "--json").out)
     assert list(found["estimates"]) == ["best", "refined", "joint"]
     held = found["estimates"]["refined"]["values"]
     assert all(held[name] == value for name, value in VALUES.items() if name != "D")
@@ -131,3 +141,27 @@ def test_check_prints_json_and_says_by_its_status_that_a_log_is_unusable(short: 
     assert (good["usable"], good["driven_joints"]) == (True, ["shoulder"])
     assert not bad["usable"]
     assert {finding["level"] for finding in bad["findings"]} >= {"error"}
+
+
+def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(tmp_path: Path, caplog):
+    """The arm's file has 5.1 and 22.5 kg: M2 was moved, M3 stayed, and the logs know M4."""
+    flags = {"M2": "weakly identifiable", "M3": "not identifiable", "M4": "identifiable"}
+    values = VALUES | {"M2": 8.0, "M3": 22.6, "M4": 3.0}
+    known = {
+        n: ParameterEstimate(
+            value=v, unit="?", flag=flags.get(n, "fixed" if n[0] == "M" else "not identifiable")
+        )
+        for n, v in values.items()
+    }
+    write_estimate(tmp_path, FitSummary(stage="mech", estimate=known))
+    with caplog.at_level(logging.WARNING, "hydroid"):
+        changes = with_mechanics(tmp_path, "fit-hyd", {"log.delay_s": 0.2})
+    (line,) = caplog.messages
+    assert line.startswith("M2 is held at 8 kg: stage 1 moved it from 5.1 kg, but its logs do not")
+    settings = hydroid.load_settings("fit-hyd", changes)
+    assert settings.log.delay_s == 0.2
+    # the masses hold; the damping and the spring of stage 2 have a start and a value of their own
+    masses = {name: value for name, value in values.items() if name.startswith("M")}
+    assert {name: settings.parameters[name].fixed for name in masses} == masses
+    assert settings.parameters["D"].fixed is None
+    assert settings.parameters["S"].fixed == 0.0

@@ -17,7 +17,6 @@ from hydroid import fit, load_settings, read_logs
 from hydroid.errors import RunError
 from hydroid.log import write_log
 from hydroid.prediction import simulate_log
-from hydroid.problem.problem import Problem
 from hydroid.reporting import page_file
 from hydroid.run.folder import RunFolder
 from hydroid.run.process import locked
@@ -31,14 +30,16 @@ SMALL = {
 }
 
 
+SETTINGS = load_settings("article-mech", SMALL)
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Settings, arm, log and problem of a small fit."""
-    settings = load_settings("article-mech", SMALL)
-    log = step_log(settings.arm.pose("study"), [60.0, -80.0])
+def path(tmp_path_factory) -> Path:
+    """The log of a small fit."""
+    log = step_log(SETTINGS.arm.pose("study"), [60.0, -80.0])
     path = tmp_path_factory.mktemp("log") / "log.csv"
-    write_log(path, simulate_log(settings, log, TRUTH, "truth"), settings.log)
-    return settings, settings.arm, path, Problem(settings, [log])
+    write_log(path, simulate_log(SETTINGS, log, TRUTH, "truth"), SETTINGS.log)
+    return path
 
 
 @pytest.fixture(autouse=True)
@@ -48,11 +49,10 @@ def _no_report(monkeypatch):
 
 
 @pytest.fixture
-def folder(made, tmp_path) -> RunFolder:
+def folder(path, tmp_path) -> RunFolder:
     """A run that has begun, with two checkpoints of one and of two generations."""
-    settings, _arm, path, _ = made
     folder = RunFolder(tmp_path / "run")
-    folder.begin(settings, read_logs([path], settings))
+    folder.begin(SETTINGS, read_logs([path], SETTINGS))
     assert "holds no checkpoint yet" in folder.interrupt()
     for number in (1, 2):
         folder.checkpoints()["search"] = stored(number)
@@ -85,7 +85,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_flipped_bits_never_change_a_checkpoint(folder, made):
+def test_flipped_bits_never_change_a_checkpoint(folder):
     """Wherever a bit flips: the newest to its last bit, where the zip does not care, or the one before it."""
     file, previous = folder.path / "checkpoint.npz", folder.path / "checkpoint.previous.npz"
     whole, before = file.read_bytes(), previous.read_bytes()
@@ -104,7 +104,7 @@ def test_flipped_bits_never_change_a_checkpoint(folder, made):
 
 
 @pytest.mark.parametrize("share", [0, 0.01, 0.5, 0.999])
-def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, made, share, caplog):
+def test_a_truncated_checkpoint_gives_way_to_the_one_before_it(folder, path, share, caplog):
     file = folder.path / "checkpoint.npz"
     whole = file.read_bytes()
     file.write_bytes(whole[: int(share * len(whole))])
@@ -126,11 +126,9 @@ def test_where_none_is_whole_the_run_says_so(folder):
     assert (folder.path / "checkpoint.npz").read_bytes() == b"PK"  # left for whoever can mend it
 
 
-def test_the_checkpoint_of_another_run_is_refused(folder, made, tmp_path):
-    settings, _arm, path, _ = made
+def test_the_checkpoint_of_another_run_is_refused(folder, path, tmp_path):
     other = RunFolder(tmp_path / "other")
-    search = settings.search.model_copy(update={"seed": 2})
-    other.begin(settings.model_copy(update={"search": search}), read_logs([path], settings))
+    other.begin(SETTINGS.changed({"search.seed": 2}), read_logs([path], SETTINGS))
     shutil.copy(folder.path / "checkpoint.npz", other.path)
     with pytest.raises(RunError, match="another run's"):
         other.checkpoints()
@@ -150,56 +148,52 @@ def test_a_full_disk_leaves_both_checkpoints(folder, monkeypatch):
     assert same(folder, 2)
 
 
-def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(made, tmp_path):
-    settings, _arm, path, _ = made
-    fit(settings, read_logs([path], settings), tmp_path / "whole", progress=Watcher())
+def test_a_full_disk_ends_a_fit_with_a_line_and_it_goes_on_afterwards(path, tmp_path):
+    fit(SETTINGS, path, tmp_path / "whole", progress=Watcher())
     with pytest.raises(KeyboardInterrupt):
-        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher(stop_at=2))
+        fit(SETTINGS, path, tmp_path / "run", progress=Watcher(stop_at=2))
     with files_up_to(4000), pytest.raises(RunError, match="cannot be written"):
-        fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
+        fit(SETTINGS, path, tmp_path / "run", resume=True, progress=Watcher())
     assert "search" in RunFolder(tmp_path / "run").checkpoints()
-    fit(settings, read_logs([path], settings), tmp_path / "run", resume=True, progress=Watcher())
+    fit(SETTINGS, path, tmp_path / "run", resume=True, progress=Watcher())
     for name in ("checkpoint.npz", "estimate.yaml", "model/fitted.xml"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_folder_of_something_else_stays_as_it_is(made, tmp_path):
-    settings, _arm, path, _ = made
+def test_a_folder_of_something_else_stays_as_it_is(path, tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     for resume in (False, True):
         with pytest.raises(RunError, match="holds no run"):
-            fit(settings, read_logs([path], settings), tmp_path, resume=resume, progress=Watcher())
+            fit(SETTINGS, path, tmp_path, resume=resume, progress=Watcher())
     assert content(tmp_path) == {"thesis.tex": b"mine"}
 
 
-def test_a_run_killed_while_it_began_begins_again(made, tmp_path):
-    settings, _arm, path, _ = made
+def test_a_run_killed_while_it_began_begins_again(path, tmp_path):
     folder = RunFolder(tmp_path)
     with locked(tmp_path):
-        folder.begin(settings, read_logs([path], settings))
+        folder.begin(SETTINGS, read_logs([path], SETTINGS))
     (tmp_path / "run.json").unlink()
     (tmp_path / ".config.yaml.abc.part").write_text("half")
-    fit(settings, read_logs([path], settings), tmp_path, resume=True, progress=Watcher())
+    fit(SETTINGS, path, tmp_path, resume=True, progress=Watcher())
     assert folder.identity()["status"] == "done"
     assert not list(tmp_path.rglob(".*.part"))
 
 
 @pytest.mark.parametrize("name", ["config.yaml", "arm.yaml", "model/arm.xml"])
-def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, made, name):
-    settings, _arm, path, _ = made
-    folder.begin(settings, read_logs([path], settings))
+def test_a_run_whose_own_files_were_edited_is_refused_by_name(folder, path, name):
+    folder.begin(SETTINGS, read_logs([path], SETTINGS))
     file = folder.path / name
     file.write_text(file.read_text() + "\n")
     with pytest.raises(RunError, match=f"{name}: has changed since the run began"):
-        folder.begin(settings, read_logs([path], settings))
+        folder.begin(SETTINGS, read_logs([path], SETTINGS))
 
 
-def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
-    settings, arm, path, _ = made
+def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
+    arm = SETTINGS.arm
 
     def other(**changes):
         changed = replace(arm, file=arm.file.model_copy(update=changes))
-        return settings.model_copy(update={"arm": changed}), read_logs([path], settings)
+        return SETTINGS.changed({"arm": changed}), read_logs([path], SETTINGS)
 
     with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
         folder.begin(*other(actuators={}))
@@ -210,20 +204,18 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, made, tmp_path):
         folder.begin(*other(model=model))
 
 
-def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, made, tmp_path):
-    settings, _, path, _ = made
+def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(folder, path, tmp_path):
     moved = tmp_path / "moved.csv"
     moved.write_bytes(path.read_bytes())
-    folder.begin(settings, read_logs(moved, settings))
+    folder.begin(SETTINGS, read_logs(moved, SETTINGS))
     with pytest.raises(RunError, match=r"other logs, .*log.csv, not .*moved.csv, .*log.csv"):
-        folder.begin(settings, read_logs([moved, path], settings))
+        folder.begin(SETTINGS, read_logs([moved, path], SETTINGS))
     moved.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
     with pytest.raises(RunError, match=r"other logs, or others' contents: .*log.csv, not .*moved.csv"):
-        folder.begin(settings, read_logs(moved, settings))
+        folder.begin(SETTINGS, read_logs(moved, SETTINGS))
 
 
-def test_two_in_one_folder_the_second_is_refused(made, tmp_path):
-    settings, _arm, path, _ = made
+def test_two_in_one_folder_the_second_is_refused(path, tmp_path):
     with locked(tmp_path / "run"), pytest.raises(RunError, match=f"in use by process {os.getpid()} on "):
-        fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
-    fit(settings, read_logs([path], settings), tmp_path / "run", progress=Watcher())
+        fit(SETTINGS, path, tmp_path / "run", progress=Watcher())
+    fit(SETTINGS, path, tmp_path / "run", progress=Watcher())

@@ -142,7 +142,8 @@ def fit(
         return _result(problem, run_fit(problem, progress), None)
     with folder.owned():
         log_start()
-        result = _result(problem, run_fit(problem, progress, folder.begin(settings, read)), folder.path)
+        checkpoints = folder.begin(problem.settings, problem.logs)
+        result = _result(problem, run_fit(problem, progress, checkpoints), folder.path)
         _store(folder, result)
     return result
 

@@ -110,18 +110,9 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
 
 def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path: Path):
     (tmp_path / "mech.yaml").write_text(yaml.safe_dump(VALUES))
-    arguments = [
-        "fit-hyd",
-        short,
-        "--mech",
-        "mech.yaml",
-        *GA,
-        "--out",
-        "run",
-        *QUICK,
-    ]
+    arguments = ["fit-hyd", short, "--mech", "mech.yaml", *GA, "--out", "run", *QUICK]
     # the errors below are those from the measured start
-    changes = ["--set=free_start=false"]
+    changes = ["--set=joint_refinement=true", "--set=free_start=false"]
     found = json.loads(hydroid_cli(*arguments, *changes, "--json").out)
     assert list(found["estimates"]) == ["best", "refined", "joint"]
     held = found["estimates"]["refined"]["values"]

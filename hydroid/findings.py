@@ -45,7 +45,6 @@ class Finding:
 _OUTSIDE = (
     "{quantity} of joint{s} {names} is {value:.6g} {unit}, allowed are {low:.6g} to {high:.6g} {unit}{rows}"
 )
-_UNIT = "the file says that {names} {is} in {unit}, but log."
 _RANGE = "if commands are in {range}, set log.command.scale: {scale}"
 _BRINGS = "{what} would be known to {after} % instead of {before} %."
 
@@ -151,16 +150,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "unreadable": ("{what}", "{hint}"),
     "layout": ("{what}", ""),
     # its columns
-    "no such joint": ("no joint {0}; the arm has joints 1 to {joints}", "correct outputs or log.joints"),
-    "no output angle": ("output joint {0} has no angle column", "map it in log.joints, or take another"),
     "absent joints": ("holds nothing of joint{s} {names}", ""),
-    "missing column": (
-        "the file lacks {missing}",
-        "it has {columns}: name its columns in {settings} (`hydroid convert` guesses them); a joint that it "
-        "lacks is null there",
-    ),
-    "column twice": ("has {count:.0f} columns of this name", "rename all but one"),
-    "shared column": ("one column cannot be {names}", "correct log.joints in the config"),
     # its rows and cells
     "torn row": (
         "the row should have {cells} cells, as the header has{rows}",
@@ -176,7 +166,7 @@ WORDS: dict[str, tuple[str, str]] = {
     ),
     "outside": (
         _OUTSIDE,
-        "correct the cells, or unit, scale and offset of {column} in log.{quantity}, or the joint's range",
+        "correct the cells, or unit, scale and offset of {name} in log.{quantity}, or the joint's range",
     ),
     "outside in another range": (_OUTSIDE, _RANGE),
     "outside in another unit": (_OUTSIDE, "if angles are in {other}, set log.angle.unit: {other}"),
@@ -204,32 +194,12 @@ WORDS: dict[str, tuple[str, str]] = {
         "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
         "--repair fills gaps up to {longest:g} s (log.repair_s); cut the log into two files at longer ones",
     ),
-    "jitter": (
-        "sample period varies from {least:.4g} to {most:.4g} s around {period:.4g} s{rows}",
-        "commands are held and angles interpolated",
-    ),
-    "resampled": (
-        "resampled from steps of {step:.6g} s to {period:g} s",
-        "angles interpolated, commands held, or averaged where the log is faster",
-    ),
-    # its units
-    "unit of time": (f"{_UNIT}time.unit says otherwise", "set log.time.unit: {unit}"),
-    "unit of angle": (f"{_UNIT}angle.unit says otherwise", "set log.angle.unit: {unit}"),
-    "unit of command": (
-        f"{_UNIT}command.scale is 1",
-        "command [%] = scale · cell + offset: for ±10 V set log.command.scale: 10",
-    ),
     "range": ("the command of joint{s} {names} looks like {range}", "if so, set log.command.scale: {scale}"),
     # its motion
-    "undriven": ("no joint is driven", "check log.command"),
     "angle is constant": ("angle of joint{s} {names} never changes", "check the sensor and log.angle"),
     "command is constant": (
         "command of joint{s} {names}, whose angle is compared, is constant",
         "such a log alone says little: fit it together with others",
-    ),
-    "late": (
-        "angle of joint{s} {names} moves {lag:.2f} s before the command, as no machine does",
-        "the log's clocks differ: mend the log, or set log.delay_s: {delay:.2f}",
     ),
     "turned": (
         "angle of joint {0} moves against the command (for {against:.0%} of {path} of travel)",

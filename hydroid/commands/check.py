@@ -74,7 +74,7 @@ def check(
         log, findings = check_file(path, settings, repair=repair)
         moved, driven, samples, duration = dict[str, float](), list[str](), None, None
         if log is not None:
-            findings = [*findings, *named(motion_findings(log), names)]
+            findings = [*findings, *named([*motion_findings(log)], names)]
             travels = {joint: motion.travel for joint, motion in driven_joints(log).items()}
             moved = {names[joint - 1]: travel for joint, travel in travels.items()}
             driven = [name for name, one in zip(names, log.driven, strict=True) if one]
@@ -125,7 +125,7 @@ def convert(
         SettingsError: `out` would overwrite the log, or a setting that is not allowed.
         RunError: `out` cannot be written.
     """
-    from hydroid.log import guess_columns, open_table, read_log, write_log
+    from hydroid.log import check_log, guess_columns, open_table, write_log
 
     path, guess, lines = Path(log), None, list[str]()
     refuse_overwriting(path, out)
@@ -133,12 +133,14 @@ def convert(
         settings = load_settings(config or "fit-mech", set)
         layout, ranges = settings.log, settings.arm.ranges
     else:
-        most = [f"joint{number}" for number in range(1, 13)]  # more joints than an arm has
+        most = [f"joint {number}" for number in range(1, 13)]  # more joints than an arm has
         guess = guess_columns(open_table(path, LogSettings()), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
         lines = [*guess.reasons] + ([f"not used: {', '.join(guess.unused)}"] if guess.unused else [])
-    read, findings = read_log(path, layout, ranges, repair=repair)
+    read, findings = check_log(path, layout, ranges, repair=repair)
+    if read is None:
+        raise findings[0].error()
     write_log(Path(out), read, _plain_layout(read), exact=True)
     lines += [f"{finding.level}: {finding}" for finding in findings]
     lines.append(f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s")

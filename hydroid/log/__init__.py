@@ -1,11 +1,10 @@
 """File -> `Log`: read, checked, repaired on request, resampled to one period; and back."""
 
-from hydroid.log.finding import LogFinding, grouped
+from hydroid.log.checks import motion_findings
 from hydroid.log.guess import ColumnGuess, guess_columns
-from hydroid.log.log import Log
+from hydroid.log.log import Log, LogFinding, grouped
 from hydroid.log.motion import JointMotion, driven_joints, motion_of
-from hydroid.log.read import check_log, open_table, read_log
-from hydroid.log.survey import motion_findings
+from hydroid.log.read import check_log, open_table
 from hydroid.log.table import Table
 from hydroid.log.write import write_log, write_logs
 
@@ -22,7 +21,6 @@ __all__ = [
     "motion_findings",
     "motion_of",
     "open_table",
-    "read_log",
     "write_log",
     "write_logs",
 ]

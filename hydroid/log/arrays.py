@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import LogError
-from hydroid.log.table import Table, optional_package, readable
+from hydroid.log.table import Table, format_library
 
 
 def open_mat(path: Path, *, hdf5: bool) -> Table:
@@ -21,21 +21,21 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
     Raises:
         LogError: it is damaged, has no arrays, or needs a package that is not installed.
     """
-    with readable(path, "a MATLAB file"):
+    package = "h5py" if hdf5 else "scipy.io"
+    with format_library(package, "mat", path, "a MATLAB file") as library:
         if hdf5:
-            with optional_package("h5py", "mat", str(path)).File(path, "r") as file:
-                columns = dict(_columns("", _without_hdf5(file)))
+            with library.File(path, "r") as file:
+                variables = _without_hdf5(file)
         else:
-            from scipy.io import loadmat
-
-            columns = dict(_columns("", loadmat(str(path), simplify_cells=True)))
+            variables = library.loadmat(str(path), simplify_cells=True)
+        columns = dict(_columns("", variables))
     if not columns:
         hint = (
             "save commands, angles and time as arrays or structs; of a timeseries ts in MATLAB: "
             "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
         )
         raise LogError("holds no array of numbers", where=str(path), hint=hint)
-    return Table(source=str(path), layout="MATLAB file", names=tuple(columns), columns=columns)
+    return Table(source=str(path), names=tuple(columns), columns=columns)
 
 
 def open_parquet(path: Path) -> Table:
@@ -44,11 +44,10 @@ def open_parquet(path: Path) -> Table:
     Raises:
         LogError: it is damaged, or pyarrow is not installed.
     """
-    parquet = optional_package("pyarrow.parquet", "parquet", str(path))
-    with readable(path, "Parquet"):
+    with format_library("pyarrow.parquet", "parquet", path, "Parquet") as parquet:
         table = parquet.read_table(str(path))
         columns = {name: table[name].to_numpy() for name in table.column_names}
-    return Table(source=str(path), layout="Parquet", names=tuple(columns), columns=columns)
+    return Table(source=str(path), names=tuple(columns), columns=columns)
 
 
 def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -7,8 +7,9 @@ settings, over the time that all interpolated ones have: angles are interpolated
 column has the name that the settings give it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -17,41 +18,35 @@ import numpy as np
 from hydroid.errors import LogError
 from hydroid.log.log import Floats
 from hydroid.log.repair import hold
-from hydroid.log.table import Recording, Signal, Table, optional_package, readable
+from hydroid.log.table import Recording, Signal, Table, format_library
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BagTable(Table):
-    """The channels of a bag, by name: values by the time of their messages [ns]; rows are at `period` [s].
-
-    The times of the topics `unstamped` are those of recording.
-    """
+    """The channels of a bag, by name: values by the time of their messages [ns]; rows are at `period` [s]."""
 
     channels: Mapping[str, Mapping[int, float]]
-    unstamped: Set[str]
     period: float
 
     def read(self, signals: Sequence[Signal]) -> Recording:
         """Read columns; those that share no time are refused."""
         time, *names = self.names
-        held = {s.name: s.kind == "command" for s in signals if s.name != time} or {names[0]: False}
+        held = {s.name: s.kind == "command" for s in signals if s.name != time}
+        held = held or {max(names, key=lambda name: len(self.channels[name])): False}
         at = {name: np.array(sorted(self.channels[name])) for name in held}
         smooth = [at[name] for name in held if not held[name] and len(at[name]) > 1] or [*at.values()]
         start, end = max(int(times[0]) for times in smooth), min(int(times[-1]) for times in smooth)
         if end - start < self.period * 1e9:
             hint = "record them together, with one clock"
             raise LogError("the channels have no common time", where=self.source, hint=hint)
-        rows = int((end - start) / (1e9 * self.period) + 1e-6) + 1
-        columns = {time: np.arange(rows, dtype=np.float64) * self.period}
+        grid = self.period * np.arange(int((end - start) / (1e9 * self.period) + 1e-6) + 1, dtype=np.float64)
+        columns = {time: grid}
         for name, times in at.items():
             values = np.array([self.channels[name][key] for key in times.tolist()])
-            columns[name] = _resampled((times - start) / 1e9, values, columns[time], held=held[name])
-        topics = {name.partition(".")[0] for name in held}
-        remarks = [f"{', '.join(sorted(topics))}: resampled to {self.period:g} s"]
-        if unstamped := ", ".join(sorted(topics & self.unstamped)):
-            remarks.append(f"{unstamped}: no header stamp, so the time of recording counts")
-        table = Table(source=self.source, layout=self.layout, names=self.names, columns=columns)
-        return replace(table, remarks=tuple(remarks)).read(signals)
+            columns[name] = _resampled((times - start) / 1e9, values, grid, held=held[name])
+        topics = ", ".join(sorted({name.partition(".")[0] for name in held}))
+        remarks = (f"{topics}: resampled to {self.period:g} s",)
+        return Table(source=self.source, names=self.names, columns=columns, remarks=remarks).read(signals)
 
 
 def open_bag(path: Path, time: str, period: float) -> BagTable:
@@ -60,31 +55,23 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
     Raises:
         LogError: it is damaged, has no channel of numbers, or rosbags is not installed.
     """
-    highlevel = optional_package("rosbags.highlevel", "ros", str(path))
-    typesys = optional_package("rosbags.typesys", "ros", str(path))
-    latest = typesys.get_typestore(typesys.Stores.LATEST)  # for bags that do not hold their definitions
-    channels, unstamped = dict[str, dict[int, float]](), set[str]()
-    with readable(path, "a bag"), highlevel.AnyReader([path], default_typestore=latest) as reader:
-        for connection, recorded, data in reader.messages():
-            if len(data) > 20_000:
-                continue  # an image or a point cloud
-            message = reader.deserialize(data, connection.msgtype)
-            stamp = getattr(getattr(message, "header", None), "stamp", None)
-            at = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
-            if not at:
-                unstamped.add(connection.topic)
-            for name, number in _numbers(message, f"{connection.topic}."):
-                channels.setdefault(name, {}).setdefault(at or recorded, number)
+    channels = dict[str, dict[int, float]]()
+    with format_library("rosbags.highlevel", "ros", path, "a bag") as rosbags:
+        from rosbags.typesys import Stores, get_typestore
+
+        latest = get_typestore(Stores.LATEST)  # for bags that do not hold their definitions
+        with rosbags.AnyReader([path], default_typestore=latest) as reader:
+            for connection, recorded, data in reader.messages():
+                if len(data) > 20_000:
+                    continue  # an image or a point cloud
+                message = reader.deserialize(data, connection.msgtype)
+                stamp = getattr(getattr(message, "header", None), "stamp", None)
+                at = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
+                for name, number in _numbers(message, f"{connection.topic}."):
+                    channels.setdefault(name, {}).setdefault(at or recorded, number)
     if not channels:
         raise LogError("holds no channel of numbers", where=str(path))
-    return BagTable(
-        source=str(path),
-        layout="bag",
-        names=(time, *channels),
-        channels=channels,
-        unstamped=unstamped,
-        period=period,
-    )
+    return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
 
 
 def _resampled(at: Floats, values: Floats, grid: Floats, *, held: bool) -> Floats:
@@ -102,16 +89,14 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message by name, without those of its header; of an array the first 64."""
     labels = getattr(message, "name", None)
     for slot in fields(message):
-        if slot.name == "header" or slot.name.startswith("__"):
-            continue
         value, name = getattr(message, slot.name), prefix + slot.name
-        parts = {name: value}
+        parts = {name: value} if slot.name != "header" else {}
         if isinstance(value, np.ndarray | list):
             named = isinstance(labels, list) and len(labels) == len(value)
             keys: Any = labels if named else range(1, len(value) + 1)
             parts = {f"{name}[{key}]": part for key, part in zip(keys, value[:64], strict=False)}
         for key, part in parts.items():
-            if isinstance(part, bool | int | float | np.number | np.bool_):
+            if isinstance(part, Real | np.bool_):
                 yield key, float(part)
             elif is_dataclass(part):
                 yield from _numbers(part, f"{key}.")

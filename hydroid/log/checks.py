@@ -1,12 +1,13 @@
-"""Checks of a recording: each function looks for one kind of fault and says where it is and what to do."""
+"""Checks of a recording and of the motion in it: what is wrong, where, and what to do."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from hydroid.log.clues import KINDS, column_unit, likely_range
-from hydroid.log.finding import LogFinding
-from hydroid.log.log import Floats
+from hydroid.log.clues import likely_range
+from hydroid.log.log import Floats, Log, LogFinding, log_finding
+from hydroid.log.motion import driven_joints
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.log import LogSettings
@@ -15,86 +16,59 @@ from hydroid.units import UNITS, likely_time_unit
 DEGREE = UNITS["deg"].factor
 
 
-def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> list[LogFinding]:
-    """Return every fault of the recording, in the order in which a user should mend them.
+def check_recording(recording: Recording, settings: LogSettings, *, repaired: bool) -> Iterator[LogFinding]:
+    """Yield every fault of the recording, in the order in which a user should mend them.
 
     `repaired`: gaps up to `settings.repair_s` are no faults.
     """
-    return [
-        *_holes(recording, settings.repair_s),
-        *_time(recording, settings, repaired),
-        *_values(recording),
-        *_stated_units(recording),
-    ]
-
-
-def _holes(recording: Recording, longest: float) -> Iterator[LogFinding]:
-    """Rows of too few or too many cells, and cells without a number."""
-    if recording.torn.any():
-        cells = str(len(recording.table.names))
-        yield recording.finding("error", "torn row", np.flatnonzero(recording.torn), cells=cells)
+    table, longest = recording.table, settings.repair_s
+    torn = np.isin(recording.rows, table.torn)
+    if torn.any():
+        yield recording.finding("error", "torn row", np.flatnonzero(torn), cells=str(len(table.names)))
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
-        rows = np.flatnonzero(np.isnan(values) & ~recording.torn)
+        rows = np.flatnonzero(np.isnan(values) & ~torn)
         if len(rows):
-            text = recording.text(int(rows[0]), signal)
-            what = f"{text[:30]!r} is not a number" if text else "no value is there"
+            cell = table.columns[signal.name][recording.rows[rows[0]]]
+            what = f"{cell[:30]!r} is not a number" if isinstance(cell, str) and cell else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
+    yield from _time(recording, settings, longest if repaired else 0.0)
+    yield from _values(recording)
 
 
-def _time(recording: Recording, settings: LogSettings, repaired: bool) -> Iterator[LogFinding]:
-    """A time that falls, is too short or slow, or has gaps; a row without one is reported elsewhere."""
-    signal, rows = recording.signals[0], np.flatnonzero(~np.isnan(recording.time))
-    time = recording.time[rows]
-    steps, apart = np.diff(time), np.diff(rows)
-    if len(back := np.flatnonzero(steps <= 0)):
-        pair = {"time": time[back[0] + 1], "before": time[back[0]]}
-        yield recording.finding("error", "time order", rows[1:][back], signal, **pair)
+def _time(recording: Recording, settings: LogSettings, repaired: float) -> Iterator[LogFinding]:
+    """A time that falls, is too short or slow, or has gaps longer than `repaired` [s]."""
+    signal, known = recording.signals[0], recording.time[~np.isnan(recording.time)]
+    steps, period = np.diff(recording.time), sample_period(recording.time)  # NaN beside a row without time
+    falls = 1 + np.flatnonzero(steps <= 0)
+    gaps = 1 + np.flatnonzero((steps > GAP * period) & (steps > repaired * (1 + 1e-9) + period))
+    duration = np.ptp(known) if len(known) else 0.0
+    slowest = 10 * settings.period_s  # else held commands would not explain the motion
+    kind, rows = ("time order", falls) if len(falls) else ("gap", gaps)
+    if not len(falls) and (duration < 0.5 or period > slowest):
+        kind, rows = "too short" if duration < 0.5 else "too slow", gaps[:0]
+    elif not len(rows):
         return
-    period, duration = sample_period(time), np.ptp(time) if len(time) else 0.0
     unit = likely_time_unit(period / signal.gain)
     remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "set log.time.unit"
-    slowest = 10 * settings.period_s  # else held commands would not explain the motion
-    if len(time) < 2 or duration < 0.5:
-        count = float(len(time))
-        yield recording.finding("error", "too short", duration=duration, samples=count, remedy=remedy)
-        return
-    if period > slowest:
-        numbers = {"period": period, "slowest": slowest, "remedy": remedy}
-        yield recording.finding("error", "too slow", (), signal, **numbers)
-        return
-    longest, per_row = settings.repair_s, steps / apart
-    short = steps <= longest * (1 + 1e-9) + period
-    gaps = np.flatnonzero((steps > (apart - 1 + GAP) * period) & ~(repaired & short))
-    bridged = per_row > GAP * period
-    uneven = np.flatnonzero((np.abs(per_row - period) > 0.25 * period) & ~bridged)
-    if len(gaps):
-        numbers = {"gap": steps[gaps[0]], "period": period, "longest": longest}
-        yield recording.finding("error", "gap", rows[1:][gaps], signal, **numbers)
-    elif len(uneven):
-        numbers = {"least": per_row.min(), "most": per_row[~bridged].max(), "period": period}
-        yield recording.finding("warning", "jitter", rows[1:][uneven], signal, **numbers)
+    numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
+    if len(rows):
+        before, after = recording.time[rows[0] - 1 : rows[0] + 1]
+        numbers |= {"time": after, "before": before, "gap": after - before, "longest": settings.repair_s}
+    yield recording.finding("error", kind, rows, signal, remedy=remedy, **numbers)
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:
-    """Values outside their limits, which another range, unit or sign may explain if they are many.
-
-    A joint without limits is checked by its speed: none turns by 180 deg within one sample.
-    """
+    """Values outside their limits, which another range, unit or sign may explain if they are many."""
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         rows = np.flatnonzero((values < signal.low - 1e-6) | (values > signal.high + 1e-6))
         if len(rows):
             many = len(rows) > 0.05 * (values != 0).sum()
             kind, remedy = _explained(signal, values) if many else ("outside", {})
             numbers = {"value": values[rows[0]], "low": signal.low, "high": signal.high}
-            shown = {name: number / UNITS[signal.unit].factor for name, number in numbers.items()}
-            names = {"quantity": signal.kind, "unit": signal.unit, "column": signal.name}
+            shown = {name: value / UNITS[signal.unit].factor for name, value in numbers.items()}
+            names = {"quantity": signal.kind, "unit": signal.unit, "name": signal.name}
             yield recording.finding("error", kind, rows, signal, signal.joint, **names, **shown, **remedy)
-        if signal.unit == "deg" and not np.isfinite(signal.high):
-            there = np.flatnonzero(~np.isnan(values))
-            steps = np.rad2deg(np.diff(values[there]))
-            if len(far := np.flatnonzero(np.abs(steps) > 180)):
-                yield recording.finding("error", "jump", there[1:][far], signal, step=steps[far[0]])
 
 
 def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
@@ -114,18 +88,46 @@ def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
     return "outside", {}
 
 
-def _stated_units(recording: Recording) -> Iterator[LogFinding]:
-    """Units that the file states and the settings contradict; a time's only where they are plausible."""
-    step = sample_period(recording.time)
-    for signal in recording.signals:
-        unit, gain = column_unit(signal.name, recording.table.units.get(signal.name, "")), abs(signal.gain)
-        if unit is None or signal.name in recording.clocks or KINDS.get(unit.quantity) != signal.kind:
-            continue
-        wrong = {
-            "time": gain != unit.factor and unit.name == likely_time_unit(step / gain),
-            "angle": unit.quantity == "angle" and gain != unit.factor and gain in (1, DEGREE),
-            "command": unit.name != "%" and gain == 1,
-        }
-        if wrong[signal.kind]:
-            kind = f"unit of {signal.kind}"
-            yield recording.finding("warning", kind, (), signal, signal.name, unit=unit.name)
+def check_motion(
+    log: Log, signals: Sequence[Signal], outputs: Collection[int], backward: Collection[int]
+) -> Iterator[LogFinding]:
+    """Yield what the motion says against the settings.
+
+    A positive command turns the joints `backward` to negative angles.
+    """
+    of = {(signal.kind, signal.joint): signal for signal in signals if not signal.part}
+    motions, common = driven_joints(log), likely_range(log.command.ravel())
+
+    def warning(kind: str, signal: Signal, **numbers: Any) -> LogFinding:
+        return log_finding("warning", kind, log.source, signal.joint, column=signal.name, **numbers)
+
+    for (kind, joint), signal in of.items():
+        command, angle = np.ptp(log.command[:, joint - 1]), np.ptp(log.angle[:, joint - 1])
+        if kind == "angle" and angle == 0 and (joint in outputs or log.driven[joint - 1]):
+            yield warning("angle is constant", signal)
+        if kind == "command" and command == 0 and joint in outputs:
+            yield warning("command is constant", signal)
+    # of commands within 10 %, although joints move well; else they may be small commands in %
+    small = common and common.name in ("±1", "±10 V") and any(m.travel > 3 for m in motions.values())
+    for joint, motion in motions.items():
+        command, angle = of["command", joint], of["angle", joint]
+        likely = common if small else likely_range(log.command[:, joint - 1])
+        if likely and (small or (likely.offset and command.low < 0)):
+            yield warning("range", command, **likely.remedy(command.gain, command.offset))
+        if motion.turned and joint not in backward:
+            path, against = motion.directed
+            way = f"{path:.3g} deg" if angle.unit == "deg" else f"{np.radians(path):.3g} m"
+            yield warning("turned", command, path=way, against=against)
+        if motion.push > 300 and 0 < motion.travel < 2:
+            yield warning("no motion", angle, most=motion.travel)
+
+
+def motion_findings(log: Log) -> Iterator[LogFinding]:
+    """Yield joints that stand at a stop, and whether a log does not begin at rest."""
+    for joint, motion in driven_joints(log).items():
+        if motion.stopped >= 0.5:
+            yield log_finding("note", "at a stop", log.source, joint, seconds=motion.stopped)
+    rest = log.first_command * log.period
+    if log.driven.any() and rest < 0.2:
+        after = f" after {rest:.2g} s" if rest else ""
+        yield log_finding("note", "no rest", log.source, after=after)

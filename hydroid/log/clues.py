@@ -2,17 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.log.log import Floats
 from hydroid.units import Unit, unit_of
 
-Kind = Literal["time", "command", "angle", "other"]
-
-WORDS: dict[Kind, str] = {
+WORDS = {
     "time": "time t timestamp stamp zeit sec seconds temps",
     "other": "flow pump pressure press p pa pb tank supply current",
     "command": """u cmd command commands valve joystick joy input inputs pwm control ctrl duty lever out
@@ -24,7 +21,7 @@ WORDS: dict[Kind, str] = {
 DERIVED = """velocity vel speed qd dq qdot acc acceleration torque force load effort temp temperature error
 fault status count index sample date"""
 """words of what is neither command nor angle, whatever its unit"""
-KINDS: dict[str, Kind] = {
+KINDS = {
     "time": "time",
     "angle": "angle",
     "length": "angle",
@@ -62,13 +59,12 @@ RANGES = (
 """what amplifiers and joysticks give; the middle stands for no command"""
 
 
-@dataclass(frozen=True)
-class CommandRange:
+class CommandRange(NamedTuple):
     """A range by its name, and what brings it to percent: command [%] = scale · cell + offset."""
 
     name: str
     scale: float
-    offset: float = 0.0
+    offset: float
 
     def remedy(self, gain: float, offset: float) -> dict[str, str]:
         """Return its name, and the settings that bring it to percent where those of the log are given."""
@@ -95,14 +91,14 @@ def likely_range(values: Floats, negative: Floats | None = None) -> CommandRange
     low, high = values.min(), values.max()
     kinds, counts = np.unique(values, return_counts=True)
     rests = np.array([values[0], kinds[counts.argmax()]])
-    raised = 0 not in kinds[counts >= 0.05 * len(values)]
+    raised = low >= 0 and 0 not in kinds[counts >= 0.05 * len(values)]
     for start, end, name in RANGES:
         middle, half = (start + end) / 2, (end - start) / 2
-        slack = 0.06 * half
+        slack = 0.06 * half / (1 + (start < 0))
+        if low < start - slack or high > end + slack:
+            continue
         used = low < middle - 0.1 * half and high > middle + 0.1 * half
-        resting = raised and used and low >= 0 and (abs(rests - middle) <= slack).any()
-        inside = low >= start - slack / (1 + (start < 0)) and high <= end + slack / (1 + (start < 0))
-        if inside and (start < 0 or resting):
+        if start < 0 or (raised and used and (abs(rests - middle) <= slack).any()):
             return CommandRange(name, 100 / half, -100 * middle / half)
     return None
 
@@ -119,8 +115,8 @@ def column_unit(name: str, given: str = "") -> Unit | None:
     return next((unit for unit in units if unit and unit.quantity != "ambiguous"), None)
 
 
-def kind_of(name: str, unit: Unit | None) -> Kind:
-    """Return what the unit, or else the words of a name say that a column is."""
+def kind_of(name: str, unit: Unit | None) -> str:
+    """Return time, command, angle or other: what the unit, or else the words of a name say of a column."""
     there = words(name)
     if {*there} & {*DERIVED.split()}:
         return "other"
@@ -128,11 +124,8 @@ def kind_of(name: str, unit: Unit | None) -> Kind:
         return KINDS.get(unit.quantity, "other")
     if {*there} & {"cmd", "command", "commands", "joystick", "joy"}:
         return "command"  # also in /joint_commands.position[boom]
-    for word in reversed(there):
-        for kind, those in WORDS.items():
-            if word in those.split():
-                return kind
-    return "command" if direction(name)[0] else "other"
+    named = (kind for word in reversed(there) for kind, those in WORDS.items() if word in those.split())
+    return next(named, "command" if direction(name)[0] else "other")
 
 
 def joint_of(name: str, joints: Sequence[str]) -> int | None:

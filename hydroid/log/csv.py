@@ -8,20 +8,20 @@ that has a number in the first column of numbers, and half as many as most lines
 line below the names is left out only if it holds no number: any other fault there is a fault of the data.
 """
 
+import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hydroid.errors import LogError
-from hydroid.log.cells import holds_number, number, split
-from hydroid.log.table import Table
+from hydroid.log.table import Table, clock, number
 from hydroid.units import bare, unit_of
 
-SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "spaces"}
+SEPARATORS = "\t;,| "
+csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, with its place
 IS_CSV = "a log is a CSV file with a header, one row a sample"
 
 
@@ -31,47 +31,38 @@ def open_csv(path: Path, data: bytes) -> Table:
     Raises:
         LogError: it is not text, or has no header.
     """
-    text, encoding = _decode(path, data)
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    if long := next((k for k, line in enumerate(lines, 1) if len(line) > 100_000), 0):  # csv has such a limit
-        raise LogError("is longer than 100000 characters", where=f"{path}, line {long}", hint=IS_CSV)
+    lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     content = [k for k, line in enumerate(lines) if _is_content(line)]
     if not content:
         raise LogError("is empty", where=str(path), hint=IS_CSV)
     separator = _separator([lines[k] for k in content[:400]])
     rows = {k: split(lines[k], separator) for k in content[:400]}
     header, left_out = _header(rows)
-    names = rows[header]
+    names, width = rows[header], len(rows[header])
     if all(number(name.replace(",", ".")) is not None for name in names if name):
-        what, where = "has no header: this line holds numbers", f"{path}, line {header + 1}"
         hint = "write the columns' names above it (a line that starts with # is a comment)"
-        raise LogError(what, where=where, hint=hint)
-    remarks, units = list[str](), dict[str, str]()
+        where = f"{path}, line {header + 1}"
+        raise LogError("has no header: this line holds numbers", where=where, hint=hint)
+    units = dict[str, str]()
+    remarks = [f"line {k + 1} is text and left out" for k in left_out]
     if content[0] < header:
-        remarks.append(f"the names are in line {header + 1}; what stands above is left out")
+        remarks.insert(0, f"the names are in line {header + 1}; what stands above is left out")
     for k in left_out:
-        said = "is text and left out"
         if _are_units(rows[k]):
-            units |= {name: unit for name, unit in zip(names, map(bare, rows[k]), strict=True) if unit}
-            said = f"holds units ({', '.join(dict.fromkeys(units.values()))})"
-        remarks.append(f"line {k + 1} {said}")
-    layout = f"CSV in {encoding} separated by {SEPARATORS[separator]}"
+            units |= zip(names, map(bare, rows[k]), strict=True)
     below = [k for k in content if k > header and k not in left_out and _is_content(lines[k], separator)]
     commas = separator != "," and any("," in lines[k] for k in below)
-    if commas or layout != "CSV in UTF-8 separated by commas":
-        remarks.append(f"read as {layout}{', with decimal commas' if commas else ''}")
-    width = len(names)
+    if commas:
+        remarks.append("commas are read as decimal points")
     cells = [split(lines[k].replace(",", ".") if commas else lines[k], separator) for k in below]
-    torn = np.array([len(row) < width or any(row[width:]) for row in cells], bool)
-    cells = [[""] * width if bad else row for row, bad in zip(cells, torn, strict=True)]
-    columns: dict[str, Any] = {
-        name: np.array([row[c] for row in cells], dtype=object) for c, name in enumerate(names)
-    }
+    torn = [k for k, row in enumerate(cells) if len(row) < width or any(row[width:])]
+    for k in torn:
+        cells[k] = [""] * width
+    table = np.array([row[:width] for row in cells], dtype=object).reshape(-1, width)
     return Table(
         source=str(path),
-        layout=layout,
         names=tuple(names),
-        columns=columns,
+        columns=dict(zip(names, table.T, strict=True)),
         header=header + 1,
         units=units,
         remarks=tuple(remarks),
@@ -80,16 +71,27 @@ def open_csv(path: Path, data: bytes) -> Table:
     )
 
 
-def _decode(path: Path, data: bytes) -> tuple[str, str]:
-    """Return a file's text and encoding."""
+def _decode(path: Path, data: bytes) -> str:
+    """Return a file's text."""
     wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
         with suppress(UnicodeDecodeError):
             text = data.decode(encoding)
             if "\0" not in text:
-                return text, encoding.upper().removesuffix("-SIG")
+                return text
     hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
     raise LogError("is not a text file", where=str(path), hint=hint)
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; of a line in columns of spaces, however many part them."""
+    spaces = separator == " "
+    if '"' in line:
+        line = line.strip() if spaces else line
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=spaces))
+    else:
+        cells = line.split(None if spaces else separator)
+    return [cell.strip() for cell in cells]
 
 
 def _separator(sample: Sequence[str]) -> str:
@@ -97,9 +99,9 @@ def _separator(sample: Sequence[str]) -> str:
 
     def merit(separator: str) -> tuple[int, bool, int]:
         rows = [split(line, separator) for line in sample]
-        counts = [len(_numbers(row)) * (len(row) > 1) for row in rows]
-        usual = _usual(counts)
-        return usual * counts.count(usual), separator != " ", max(map(len, rows))
+        counts = Counter(len(_numbers(row)) * (len(row) > 1) for row in rows)
+        most = max(numbers * lines for numbers, lines in counts.items())
+        return most, separator != " ", max(map(len, rows))
 
     return max(SEPARATORS, key=merit)
 
@@ -107,28 +109,25 @@ def _separator(sample: Sequence[str]) -> str:
 def _header(rows: Mapping[int, Sequence[str]]) -> tuple[int, list[int]]:
     """Return the line of names among lines of cells, and the lines of text between it and the data."""
     numbers = {k: _numbers(row) for k, row in rows.items()}
-    usual = _usual([*map(len, numbers.values())])
+    common = Counter(map(len, numbers.values()))
+    usual = max(common, key=lambda n: (n * common[n], n))
     pattern = Counter(at for at in numbers.values() if len(at) == usual).most_common(1)[0][0]
     data = (k for k, at in numbers.items() if pattern and pattern[0] in at and 2 * len(at) >= usual)
     first = next(data, max(rows) + 1)
     texts = {k: [*filter(None, row)] for k, row in rows.items() if k < first and not numbers[k]}
     texts = {k: cells for k, cells in texts.items() if len(cells) >= max(usual / 2, 1)}
-    named = [k for k in texts if not _are_units(rows[k])] or texts
+    named = [k for k in texts if not _are_units(texts[k])] or texts
     # names differ, are many, and stand below other texts
-    header = max(
-        named, key=lambda k: (len({*texts[k]}) == len(texts[k]), len(texts[k]), k), default=next(iter(rows))
-    )
+    order = {k: (len({*texts[k]}) == len(texts[k]), len(texts[k]), k) for k in named}
+    header = max(order, key=lambda k: order[k], default=next(iter(rows)))
     return header, [k for k in texts if k > header and len(rows[k]) == len(rows[header])]
 
 
 def _numbers(row: Sequence[str]) -> tuple[int, ...]:
-    return tuple(c for c, cell in enumerate(row) if holds_number(cell))
-
-
-def _usual(counts: Sequence[int]) -> int:
-    """Return how many numbers most numbers stand in a line with; 0 where there are none."""
-    common = Counter(counts)
-    return max(common, key=lambda n: (n * common[n], n))
+    """Return which cells hold a number, maybe with a decimal comma, or a time."""
+    return tuple(
+        c for c, x in enumerate(row) if number(x.replace(",", ".")) is not None or clock(x) is not None
+    )
 
 
 def _is_content(line: str, separator: str = ",") -> bool:
@@ -137,5 +136,5 @@ def _is_content(line: str, separator: str = ",") -> bool:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    there = [cell for cell in row if cell]
-    return bool(there) and all(map(unit_of, there))
+    """Return whether all cells that are not empty hold units."""
+    return any(row) and all(map(unit_of, filter(None, row)))

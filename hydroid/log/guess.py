@@ -18,6 +18,9 @@ from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
+PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+"""[s], of which a guess takes the nearest"""
+
 
 class ColumnGuess(NamedTuple):
     """What the columns of a log seem to hold.
@@ -38,15 +41,14 @@ class _Column(NamedTuple):
     kind: str
     unit: str
     values: Floats
-    clock: bool
 
     @property
     def why(self) -> str:
         return "by its unit" if self.unit else "by its name"
 
-    @property
-    def slides(self) -> bool:
-        return bool(self.unit) and UNITS[self.unit].quantity == "length"
+
+_Pairs = dict[int, list[_Column]]
+"""the column, or the two for the directions of a command, of each joint"""
 
 
 def guess_columns(
@@ -65,71 +67,55 @@ def guess_columns(
     Raises:
         LogError: no column looks like a time.
     """
-    columns = _columns(table)
-    times = [column for column in columns if column.kind == "time"]
-    time = max(times, key=lambda column: _rises(column.values), default=None)
+    columns = [*_columns(table)]
+    time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
         hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
         raise LogError("has no column that looks like a time", where=table.source, hint=hint)
     step = float(np.nanmedian(np.diff(time.values)))
-    unit = "s" if time.clock else time.unit or likely_time_unit(step) or "s"
+    unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
-    said = "dates or times of day" if time.clock else unit
-    reasons = [f"{time.name}: time in {said}, {time.why}, every {step:.3g} s"]
-    names = [f"joint {k}" if name == f"joint{k}" else name for k, name in enumerate(joints, 1)]
-    known = (joints, links)
-    entries, used = dict[int, dict[str, Any]](), {time.name}
-    by_kind = {
-        kind: _by_joint([c for c in columns if c.kind == kind], known, slides, names, reasons)
+    reasons = [f"{time.name}: time in {unit}, {time.why}, every {step:.3g} s"]
+    commands, angles = (
+        _by_joint([c for c in columns if c.kind == kind], (joints, links), slides, reasons)
         for kind in ("command", "angle")
-    }
-    angles = [pair[0] for joint, pair in by_kind["angle"].items() if joint not in slides]
-    unitless = [float(np.nanmax(np.abs(column.values))) for column in angles if not column.unit]
-    default = "rad" if unitless and max(unitless) <= 6.3 else "deg"
-    for joint in sorted({*by_kind["angle"], *by_kind["command"]}):
+    )
+    unitless = [c.values for joint, (c,) in angles.items() if joint not in slides and not c.unit]
+    default = "rad" if max((np.nanmax(np.abs(x)) for x in unitless), default=np.inf) <= 6.3 else "deg"
+    entries = dict[int, dict[str, Any]]()
+    for joint in sorted({*angles, *commands}):
         entry: dict[str, Any] = {"command": None, "angle": None}
-        entries[joint], name = entry, names[joint - 1]
-        if pair := by_kind["command"].get(joint):
-            entry["command"], said = _command(pair)
-            reasons.append(f"{said} of {name}, {pair[0].why}")
-        for column in by_kind["angle"].get(joint, []):
-            slide = joint in slides
-            given = column.unit or (_length_unit(column.values) if slide else default)
-            entry["angle"] = {"column": column.name, "unit": given}
-            reasons.append(
-                f"{column.name}: {'position' if slide else 'angle'} in {given} of {name}, {column.why}"
-            )
-        used |= {column.name for pairs in by_kind.values() for column in pairs.get(joint, ())}
+        entries[joint], of = entry, joints[joint - 1]
+        if pair := commands.get(joint):
+            entry["command"], said = _command(table, pair)
+            reasons.append(f"{said} of {of}, {pair[0].why}")
+        for column in angles.get(joint, ()):
+            what, usual = "angle", default
+            if joint in slides:  # no telescope is 50 m long
+                what, usual = "position", "mm" if np.nanmax(np.abs(column.values)) > 50 else "m"
+            entry["angle"] = {"column": column.name, "unit": column.unit or usual}
+            reasons.append(f"{column.name}: {what} in {column.unit or usual} of {of}, {column.why}")
+    used = {time.name} | {c.name for pairs in (commands, angles) for pair in pairs.values() for c in pair}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
-    periods = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
-    log |= {"period_s": min(periods, key=lambda period: abs(np.log(period / step))), "joints": entries}
-    return ColumnGuess(log, tuple(reasons), tuple(n for n in table.names if n and n not in used))
+    log |= {"period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)), "joints": entries}
+    return ColumnGuess(log, tuple(reasons), tuple(name for name in table.names if name and name not in used))
 
 
-def _columns(table: Table) -> list[_Column]:
-    """Read all columns whose names or units say that they are times, commands or angles.
+def _columns(table: Table) -> Iterator[_Column]:
+    """Yield all columns whose names or units say that they are times, commands or angles.
 
-    If they cannot be read together, read those that have the most frequent length.
+    Of arrays only those of the most frequent length: the others are no signals.
     """
-    given = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
-    kinds = {name: kind for name, unit in given.items() if (kind := kind_of(name, unit)) != "other"}
-
-    def read(names: Sequence[str]) -> Iterator[_Column]:
-        recording = table.read([Signal(n, "command" if kinds[n] == "command" else "angle") for n in names])
-        for name, values in zip(names, recording.values.T, strict=True):
-            unit = given[name]
-            yield _Column(name, kinds[name], unit.name if unit else "", values, name in recording.clocks)
-
-    columns = list[_Column]()
-    try:
-        columns = [*read([*kinds])] if kinds else []
-    except LogError:  # text, or different lengths or clocks
-        for name in kinds:
-            with suppress(LogError):
-                columns += read([name])
-    lengths = [len(column.values) for column in columns]
-    usual = max(lengths, key=lengths.count, default=0)
-    return [c for c in columns if len(c.values) == usual and np.isfinite(c.values).any()]
+    units = {name: column_unit(name, table.units.get(name, "")) for name in table.names if name}
+    kinds = {name: kind for name, unit in units.items() if (kind := kind_of(name, unit)) != "other"}
+    lengths = [len(table.columns.get(name, ())) for name in kinds]  # 0 in a bag
+    for (name, kind), length in zip(kinds.items(), lengths, strict=True):
+        if length == max(lengths, key=lengths.count):
+            with suppress(LogError):  # a channel of a single message
+                recording = table.read([Signal(name, kind)])
+                if np.isfinite(recording.time).any():
+                    unit = units[name]
+                    yield _Column(name, kind, unit.name if unit else "", recording.time)
 
 
 def _rises(values: Floats) -> bool:
@@ -142,57 +128,49 @@ def _by_joint(
     columns: Sequence[_Column],
     known: tuple[Sequence[str], Sequence[str]],
     slides: Sequence[int],
-    names: Sequence[str],
     reasons: list[str],
-) -> dict[int, list[_Column]]:
-    """Give each joint its column, or two for the directions; say what is uncertain or left out."""
-    groups, given = dict[Any, list[_Column]](), dict[int, list[_Column]]()
+) -> _Pairs:
+    """Give columns of one kind to the joints; say what is uncertain or left out."""
+    groups, given, names = dict[Any, list[_Column]](), _Pairs(), known[0]
+    kind = columns[0].kind if columns else ""
     for column in columns:
         sign, others = direction(column.name)
-        groups.setdefault(others if sign and column.kind == "command" else column.name, []).append(column)
+        groups.setdefault(others if sign and kind == "command" else column.name, []).append(column)
     pairs = [sorted(pair, key=lambda c: -direction(c.name)[0])[:2] for pair in groups.values()]
     from_zero = any(number_in(column.name) == 0 for column in columns)
-    left, kind = list[list[_Column]](), columns[0].kind if columns else ""
 
-    def fits(joint: int, column: _Column) -> bool:
-        """Return whether a position's unit is one of the joint, and the joint has no column yet."""
-        measures = column.kind == "command" or not column.unit or column.slides == (joint in slides)
-        return measures and 0 < joint <= len(names) and joint not in given
-
-    for pair in pairs:
-        number = number_in(pair[0].name)
-        joint = next(filter(None, (joint_of(pair[0].name, of) for of in known)), None)
-        joint = joint or (None if number is None else number + from_zero)
-        if joint and fits(joint, pair[0]):
+    def give(pair: list[_Column], joint: int) -> bool:
+        """Give columns to a joint that has none yet and moves in their unit; return whether it does."""
+        unit = pair[0].unit
+        fits = kind == "command" or not unit or (UNITS[unit].quantity == "length") == (joint in slides)
+        if fits and 0 < joint <= len(names) and joint not in given:
             given[joint] = pair
-        else:
-            left.append(pair)
+        return given.get(joint) is pair
+
+    def named(name: str) -> int:
+        number = number_in(name)
+        joints = (joint_of(name, of) for of in known)
+        return next(filter(None, joints), 0 if number is None else number + from_zero)
+
+    left = [pair for pair in pairs if not give(pair, named(pair[0].name))]
     if given and from_zero:
         reasons.append("the numbers in the names count from 0: joint 1 is number 0")
     if left and not given:
-        for pair in left:
-            if joint := next((k for k in range(1, len(names) + 1) if fits(k, pair[0])), 0):
-                given[joint] = pair
+        left = [pair for pair in left if not any(give(pair, joint + 1) for joint in range(len(names)))]
         said = listed([f"{pair[0].name} of {names[joint - 1]}" for joint, pair in given.items()], 12)
         reasons.append(f"{kind}s by their order: check them: {said}")
-        left = [pair for pair in left if pair not in given.values()]
-    without = [name for k, name in enumerate(names, 1) if k not in given]
     if left:
         spare = listed([column.name for pair in left for column in pair], 12)
-        whose = f"whose {kind} is it: {' or '.join(without)}?" if without else "every joint has one already"
+        free = [name for joint, name in enumerate(names, 1) if joint not in given]
+        whose = f"whose {kind} is it: {' or '.join(free)}?" if free else "every joint has one already"
         reasons.append(f"left out, though like a joint's {kind}: {spare}; {whose}")
     return given
 
 
-def _length_unit(values: Floats) -> str:
-    """Return the unit of a slide's position: no telescope is 50 m long."""
-    return "mm" if np.nanmax(np.abs(values)) > 50 else "m"
-
-
-def _command(columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
+def _command(table: Table, columns: Sequence[_Column]) -> tuple[dict[str, Any], str]:
     """Return the settings of a command, and its name with what its numbers seem to be."""
     names = [column.name for column in columns]
-    likely = likely_range(*(np.nan_to_num(column.values) for column in columns))
+    likely = likely_range(*np.nan_to_num(table.read([Signal(name, "command") for name in names]).values.T))
     entry: dict[str, Any] = {"column": names[0] if len(names) == 1 else names}
     if likely is None or "%" in (columns[0].unit, likely.name):
         return entry, f"{' and '.join(names)}: command in %"

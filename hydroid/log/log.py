@@ -1,9 +1,15 @@
-"""The log as the rest of the program sees it."""
+"""What a file is read as: the log as the rest of the program sees it, and findings about it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hydroid.errors import LogError
+from hydroid.findings import WORDS, Finding, Level
+from hydroid.words import listed
 
 Floats = NDArray[np.float64]
 
@@ -87,28 +93,75 @@ class Log:
 
     def driving(self, joint: int) -> "Log":
         """Return the recording without the commands of all joints but this one (number, from 1)."""
-        rest = self.first_command if self.rest is None else self.rest
-        return replace(self, command=self.command * (np.arange(self.joints) == joint - 1), rest=rest)
+        return replace(self, command=self.command * (np.arange(self.joints) == joint - 1), rest=self._rest)
 
     def first(self, seconds: float) -> "Log":
         """Return the recording from its start to `seconds` after its first command."""
         end = self.first_command + 1 + max(round(seconds / self.period), 1)
-        pressure = None if self.pressure is None else self.pressure[:end]
-        cut = {"time": self.time[:end], "command": self.command[:end], "angle": self.angle[:end]}
-        return replace(self, **cut, pressure=pressure)
+        return replace(self.part(0, end), rest=self.rest)
 
     def part(self, first: int, end: int) -> "Log":
         """Return the samples from `first` to before `end`, which start where they were measured."""
         at = slice(first, end)
-        pressure = None if self.pressure is None else self.pressure[at]
-        own = {"command": self.command[at], "angle": self.angle[at], "pressure": pressure, "rest": 0}
-        return replace(self, time=self.time[at] - self.time[first], **own)
+        cut = {"command": self.command[at], "angle": self.angle[at], "time": self.time[at] - self.time[first]}
+        return replace(self, **cut, pressure=None if self.pressure is None else self.pressure[at], rest=0)
+
+    @property
+    def _rest(self) -> int:
+        return self.first_command if self.rest is None else self.rest
 
     def _at_rest(self, signal: Floats) -> Floats:
-        rest = self.first_command if self.rest is None else self.rest
         longest = round(2.0 / self.period)  # a leaking valve lets an arm sink
-        return signal[: min(rest, longest) + 1]
+        return signal[: min(self._rest, longest) + 1]
 
     def _mean_at_rest(self, signal: Floats) -> Floats:
         resting = self._at_rest(signal)
         return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal values to the last bit
+
+
+@dataclass(frozen=True)
+class LogFinding(Finding):
+    """A finding of one log; its `column` is a name in the header.
+
+    An error: the log cannot be used; a warning: look at it; a note: what the reader did.
+    """
+
+    source: str = ""
+    column: str = ""
+
+    def error(self) -> LogError:
+        """Return the finding as the error that ends a command."""
+        return LogError(self.what, where=self.where, hint=self.hint)
+
+    def __str__(self) -> str:
+        return str(self.error())
+
+
+def log_finding(
+    level: Level,
+    kind: str,
+    source: str,
+    *subjects: object,
+    row: str = "",
+    column: str = "",
+    **numbers: float | str,
+) -> LogFinding:
+    """Make a finding about a file, at a `row` such as "line 12"; joints among the subjects count from 1."""
+    where = ", ".join(filter(None, (source, row, column and f"column {column}")))
+    return LogFinding(kind, level, tuple(map(str, subjects)), numbers, where, source, column)
+
+
+def grouped(findings: Sequence[LogFinding]) -> list[tuple[Level, str]]:
+    """Return findings as lines with their levels: what several joints or logs share stands once."""
+    groups: dict[tuple[object, ...], list[LogFinding]] = {}
+    for finding in findings:
+        several = "{names}" in WORDS[finding.kind][0]  # its sentence has room for several subjects
+        about = finding.hint if several else (finding.column, finding.numbers.get("what"))
+        groups.setdefault((finding.level, finding.kind, about), []).append(finding)
+    lines = list[tuple[Level, str]]()
+    for group in groups.values():
+        subjects = tuple(dict.fromkeys(subject for finding in group for subject in finding.subjects))
+        others = [Path(source).name for source in dict.fromkeys(finding.source for finding in group)][1:]
+        also = f" (also in {listed(others, 3)})" if others else ""
+        lines.append((group[0].level, f"{replace(group[0], subjects=subjects)}{also}"))
+    return lines

@@ -2,25 +2,27 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import get_args
 
 import numpy as np
 
 from hydroid.errors import LogError
 from hydroid.log.arrays import open_mat, open_parquet
 from hydroid.log.bag import open_bag
-from hydroid.log.checks import check_recording
-from hydroid.log.columns import map_signals, match_signals
+from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
-from hydroid.log.finding import LogFinding, log_finding
-from hydroid.log.log import Floats, Log
-from hydroid.log.repair import fill, resample, sample_period, unwrap
-from hydroid.log.survey import contradictions
-from hydroid.log.table import Recording, Table
-from hydroid.settings.log import LogSettings
+from hydroid.log.log import Floats, Log, LogFinding, log_finding
+from hydroid.log.repair import fill, resample, unwrap
+from hydroid.log.table import Signal, Table
+from hydroid.settings.log import Kind, LogSettings
+from hydroid.units import UNITS
+from hydroid.words import listed
 
 DEFAULT = LogSettings()
+SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
+"""units in which messages state what is measured"""
 
 
 def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
@@ -49,21 +51,6 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
     return open_csv(path, data)
 
 
-def read_log(path: Path, settings: LogSettings, ranges: Floats, **how: Any) -> tuple[Log, list[LogFinding]]:
-    """Read a log that is to be used; the arguments are those of `check_log`.
-
-    Returns:
-        The log at `settings.period_s`, and warnings and notes.
-
-    Raises:
-        LogError: the first fault that keeps the log from being used.
-    """
-    log, findings = check_log(path, settings, ranges, **how)
-    if log is None:
-        raise findings[0].error()
-    return log, findings
-
-
 def check_log(
     path: Path,
     settings: LogSettings,
@@ -89,62 +76,90 @@ def check_log(
     """
     source, log, findings, compared = str(path), None, list[LogFinding](), outputs or ()
     try:
-        signals = map_signals(settings, ranges)
+        needed, signals = {*compared, *settings.joints}, map_signals(settings, ranges)
+        if (last := max(needed, default=0)) > len(ranges):
+            what = f"no joint {last}; the arm has joints 1 to {len(ranges)}"
+            raise LogError(what, where=source, hint="correct outputs or log.joints")
+        if unmapped := [joint for joint in compared if settings.columns("angle", joint) is None]:
+            what = f"output joint {unmapped[0]} has no angle column"
+            raise LogError(what, where=source, hint="map it in log.joints, or take another")
         table = open_table(path, settings)
-        measured = {signal.joint for signal in signals if signal.kind == "angle"}
-        for joint in sorted({*compared, *settings.joints}):
-            if joint > len(ranges):
-                joints = str(len(ranges))
-                findings.append(log_finding("error", "no such joint", source, [joint], joints=joints))
-            elif joint in compared and joint not in measured:
-                findings.append(log_finding("error", "no output angle", source, [joint]))
         if outputs is None:
             signals = [s for s in signals if s.kind in ("time", "command") or s.name in table.names]
-        signals = match_signals(table, signals, {*compared, *settings.joints}, findings)
-        if signals and signals[0].kind == "time":
-            recording = unwrap(_in_si(table.read(signals)), findings)
-            findings += [log_finding("note", "layout", source, what=remark) for remark in recording.remarks]
-            if repair:
-                recording = fill(recording, settings.repair_s, findings)
-            findings += check_recording(recording, settings, repaired=repair)
-            if all(finding.level != "error" for finding in findings):
-                log = _to_log(recording, settings, len(ranges), findings)
-                said = {finding.kind for finding in findings}
-                findings += contradictions(log, settings, compared, said, backward)
+        signals = _match(table, signals, needed, findings)
+        recording = table.read(signals)
+        findings += [log_finding("note", "layout", source, what=one) for one in recording.table.remarks]
+        recording = unwrap(recording, findings)
+        if repair:
+            recording = fill(recording, settings.repair_s, findings)
+        findings += check_recording(recording, settings, repaired=repair)
+        if all(finding.level != "error" for finding in findings):
+            log = resample(recording, settings, len(ranges))
+            findings += check_motion(log, signals, compared, backward)
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 
-def _in_si(recording: Recording) -> Recording:
-    """Scale the cells to [s], [%], [rad] and [Pa]; a number that is too large counts as none."""
-    signals = recording.signals
-    gain = np.array([1.0 if signal.name in recording.clocks else signal.gain for signal in signals])
-    with np.errstate(all="ignore"):
-        values = recording.values * gain + np.array([signal.offset for signal in signals])
-        values[~(np.abs(values) < 1e100)] = np.nan
-    return replace(recording, values=values)
+def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
+    """Return the signals that the settings ask for, time first; joint ranges [rad, m], shape (J, 2)."""
+    signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
+    for kind in get_args(Kind):
+        for joint, (low, high) in enumerate(ranges.tolist(), 1):
+            if columns := settings.columns(kind, joint):
+                margin = angle_margin(low, high)
+                limits = {
+                    "command": (-100.0 if len(columns.column) == 1 else 0.0, 100.0),
+                    "angle": (low - margin, high + margin),
+                    "pressure": (-5e5, 2e8),  # sensors have an offset, hoses burst
+                }[kind]
+                unit = UNITS[columns.unit.lower()]
+                scale = columns.scale * unit.factor, columns.offset * unit.factor
+                for part, name in enumerate(columns.column):
+                    signals.append(Signal(name, kind, joint, part, *scale, *limits, SHOWN[unit.quantity]))
+    return signals
 
 
-def _to_log(recording: Recording, settings: LogSettings, joints: int, findings: list[LogFinding]) -> Log:
-    """Bring a recording without faults to its period, and add what is worth knowing about that."""
-    rows, period, kinds = len(recording.time), settings.period_s, {s.kind for s in recording.signals}
-    command, measured = np.zeros((rows, joints)), np.full((rows, joints, 3), np.nan)
-    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
-        if signal.kind == "command":
-            command[:, signal.joint - 1] += -values if signal.part else values
-        else:
-            measured[:, signal.joint - 1, (signal.kind == "pressure") + signal.part] = values
-    grid, command, measured = resample(
-        recording.time, command.clip(-100, 100), measured.reshape(rows, -1), period, settings.delay_s
-    )
-    measured = measured.reshape(-1, joints, 3)
-    pressure = measured[..., 1:] if "pressure" in kinds else None
-    log = Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
-    step = sample_period(recording.time)
-    if abs(step - period) > 0.01 * period:
-        findings.append(recording.finding("note", "resampled", step=step, period=period))
-    if "command" in kinds and not log.driven.any():
-        findings.append(recording.finding("warning", "undriven"))
-    return log
+def angle_margin(low: float, high: float) -> float:
+    """Return how far angles may lie outside a range [rad]: sensors are noisy at stops, and ranges rough."""
+    return max(float(np.deg2rad(1.0)), 0.02 * (high - low))
+
+
+def _match(
+    table: Table, wanted: Sequence[Signal], needed: Collection[int], findings: list[LogFinding]
+) -> list[Signal]:
+    """Return the signals whose columns a file has.
+
+    Joints that are not `needed` may be absent from a file that has columns of others. A column of a similar
+    name speaks against it: it is rather misspelt.
+
+    Raises:
+        LogError: a column is missing, stands there twice, or is asked for twice.
+    """
+    free = {name.lower(): name for name in sorted({*table.names} - {signal.name for signal in wanted})}
+    missing = [signal for signal in wanted if signal.name not in table.names]
+    close = {s.name: free[n] for s in missing for n in get_close_matches(s.name.lower(), free, 1, 0.75)}
+    there = {signal.joint for signal in wanted if signal not in missing or signal.name in close} - {0}
+    absent = {signal.joint for signal in wanted} - there - {0, *needed} if there else set[int]()
+    if absent:
+        findings.append(log_finding("note", "absent joints", table.source, *sorted(absent)))
+    wanted = [signal for signal in wanted if signal.joint not in absent]
+    for signal in wanted:
+        count = table.names.count(signal.name)
+        shared = [str(other) for other in wanted if other.name == signal.name]
+        if count == len(shared) == 1:
+            continue
+        what, hint = f"one column cannot be {listed(shared)}", "correct log.joints in the config"
+        if count > 1:
+            what, hint = f"has {count} columns of this name", "rename all but one"
+        elif count == 0:
+            guess = f", did you mean {close[signal.name]!r}?" if signal.name in close else ""
+            what = f"the file lacks {signal.name!r} ({signal}{guess})"
+            hint = (
+                f"it has {listed([*filter(None, table.names)], 6)}: name its columns in log.{signal.kind} "
+                "(`hydroid convert` guesses them); a joint that it lacks is null there"
+            )
+        line = f", line {table.header}" if table.header else ""
+        raise LogError(what, where=f"{table.source}{line}, column {signal.name}", hint=hint)
+    return wanted

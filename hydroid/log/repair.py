@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.log.finding import LogFinding
-from hydroid.log.log import Floats
+from hydroid.log.log import Floats, Log, LogFinding
 from hydroid.log.table import Recording
+from hydroid.settings.log import LogSettings
 
 GAP = 1.95
 """in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2"""
@@ -24,16 +24,23 @@ def sample_period(time: Floats) -> float:
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
-    """Join angles of continuous joints where they jump by one turn, as an encoder's do."""
+    """Join angles of continuous joints where they jump by one turn, as an encoder's do.
+
+    None turns by 180 deg within one sample: other jumps are errors.
+    """
     values, turn = recording.values.copy(), 2 * np.pi
-    for column, signal in enumerate(recording.signals):
+    for signal, column in zip(recording.signals, values.T, strict=True):
         if signal.unit == "deg" and not np.isfinite(signal.high):
-            rows = np.flatnonzero(~np.isnan(values[:, column]))
-            steps = np.diff(values[rows, column])
+            rows = np.flatnonzero(~np.isnan(column))
+            steps = np.diff(column[rows])
             wraps = np.abs(np.abs(steps) - turn) < np.pi / 4  # the motion within one sample
+            jumps = (np.abs(steps) > np.pi) & ~wraps
             if wraps.any():
-                values[rows[1:], column] -= turn * np.cumsum(np.sign(steps) * wraps)
+                column[rows[1:]] -= turn * np.cumsum(np.sign(steps) * wraps)
                 findings.append(recording.finding("note", "wrap", rows[1:][wraps], signal))
+            if jumps.any():
+                step = np.rad2deg(steps[jumps][0])
+                findings.append(recording.finding("error", "jump", rows[1:][jumps], signal, step=step))
     return replace(recording, values=values)
 
 
@@ -43,62 +50,55 @@ def fill(recording: Recording, longest: float, findings: list[LogFinding]) -> Re
     Rows without a time are dropped. Samples that were never recorded are counted: `resample` bridges them.
     """
     timed = ~np.isnan(recording.time)
-    lost = recording.lines[~timed]
-    recording = recording.take(np.flatnonzero(timed))
-    time, period, values = recording.time, sample_period(recording.time), recording.values.copy()
+    values, rows = recording.values[timed], recording.rows[timed]
+    time, empty = values[:, 0], np.isnan(values)
+    period = sample_period(time)
     reach = longest * (1 + 1e-9) + period
     for signal, column in zip(recording.signals[1:], values.T[1:], strict=True):
-        there, holes = np.flatnonzero(~np.isnan(column)), np.flatnonzero(np.isnan(column))
-        after = np.searchsorted(there, holes)
-        inside = (after > 0) & (after < len(there))
-        holes, before, after = holes[inside], there[after[inside] - 1], there[after[inside]]
-        near = time[after] - time[before] <= reach
-        holes, before = holes[near], before[near]
+        there = ~np.isnan(column)
+        before = np.maximum.accumulate(np.where(there, time, -np.inf))
+        after = np.minimum.accumulate(np.where(there, time, np.inf)[::-1])[::-1]
+        holes = ~there & (after - before <= reach)
         if signal.kind == "command":
-            column[holes] = column[before]
-        elif len(holes):
+            last = np.maximum.accumulate(there * np.arange(len(time)))
+            column[holes] = column[last[holes]]
+        elif holes.any():
             column[holes] = np.interp(time[holes], time[there], column[there])
-    filled = np.isnan(recording.values) & ~np.isnan(values)
-    steps = np.diff(time, append=time[-1:])
-    short = (steps > GAP * period) & (steps <= reach)
-    mended = [*recording.lines[filled.any(axis=1) | short], *lost]
-    if mended:
-        first = replace(recording, lines=np.array([min(mended)]))
-        added = np.rint(steps[short] / period - 1).sum()
-        count = {"cells": float(filled.sum()), "samples": float(added), "lost": float(len(lost))}
-        findings.append(first.finding("warning", "repair", [0], None, None, **count))
-    return replace(recording, values=values)
+    steps = np.diff(time)
+    added = np.rint(steps[(steps > GAP * period) & (steps <= reach)] / period - 1).sum()
+    cells, lost = float((empty & ~np.isnan(values)).sum()), float((~timed).sum())
+    if cells or added or lost:
+        findings.append(recording.finding("warning", "repair", cells=cells, samples=added, lost=lost))
+    return replace(recording, values=values, rows=rows)
 
 
-def resample(
-    time: Floats, command: Floats, angle: Floats, period: float, delay: float = 0.0
-) -> tuple[Floats, Floats, Floats]:
-    """Bring a recording to the grid k · period [s], from its first sample to its last.
+def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
+    """Bring a recording without holes to the period of the settings, from its first sample to its last.
 
-    Commands, shape (R, J), act `delay` [s] later than logged, and are 0 % before the first one acts. On a
-    finer grid they change on a line from sample to sample: when between them is not known. Angles
-    and other signals that are interpolated have the shape (R, M); times [s] increase strictly.
-
-    Returns:
-        Grid [s] from 0, shape (T,); command and angle, shapes (T, J) and (T, M).
+    Commands act `settings.delay_s` later than logged, and are 0 % before the first one acts. On a finer grid
+    they change on a line from sample to sample: when between them is not known.
     """
-    time = time - time[0]
+    rows, period, time = len(recording.time), settings.period_s, recording.time - recording.time[0]
+    command, measured = np.zeros((rows, joints)), np.full((rows, joints, 3), np.nan)
+    for signal, values in zip(recording.signals[1:], recording.values.T[1:], strict=True):
+        if signal.kind == "command":
+            command[:, signal.joint - 1] += -values if signal.part else values
+        else:
+            measured[:, signal.joint - 1, (signal.kind == "pressure") + signal.part] = values
     grid = period * np.arange(int(time[-1] / period + 0.01) + 1, dtype=np.float64)
-    if is_on_grid(time, period):
-        time = period * np.rint(time / period)  # whose values then pass unchanged
-    angle = np.stack([np.interp(grid, time, column) for column in angle.T], axis=1)
-    at = grid - delay
+    steps = np.rint(time / period)
+    if (np.abs(time / period - steps) <= 0.01).all():
+        time = period * steps  # whose values then pass unchanged
+    measured = np.stack([np.interp(grid, time, column) for column in measured.reshape(rows, -1).T], axis=1)
+    measured = measured.reshape(-1, joints, 3)
+    at, command = grid - settings.delay_s, command.clip(-100, 100)
     if period > 0.8 * sample_period(time):
-        return grid, hold(time, command, at, period), angle
-    middle = at + 0.5 * period
-    lines = np.stack([np.interp(middle, time, column, left=0.0) for column in command.T], axis=1)
-    return grid, lines, angle
-
-
-def is_on_grid(time: Floats, period: float) -> bool:
-    """Return whether all samples stand on multiples of the period after the first."""
-    steps = (time - time[0]) / period
-    return bool((np.abs(steps - np.rint(steps)) <= 0.01).all())
+        command = hold(time, command, at, period)
+    else:
+        middle = at + 0.5 * period
+        command = np.stack([np.interp(middle, time, column, left=0.0) for column in command.T], axis=1)
+    pressure = measured[..., 1:] if any(signal.kind == "pressure" for signal in recording.signals) else None
+    return Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
 
 
 def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:

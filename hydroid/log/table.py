@@ -1,33 +1,39 @@
 """What every file format is read as: a table of named columns, some of which are read into a recording."""
 
+import re
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import LogError
 from hydroid.findings import Level
-from hydroid.log.cells import clock, number, seconds
-from hydroid.log.finding import LogFinding, log_finding
-from hydroid.log.log import Floats
+from hydroid.log.log import Floats, LogFinding, log_finding
+
+_DAY = 86_400 * 10**9  # [ns]
+_TIME = re.compile(
+    r"(?:.*[T ])?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9})\d*)? *([AaPp])?\.?[Mm]?\.?(?:Z|[+-][\d:]+)?"
+)
+"""a time of day, behind a date or without one"""
 
 
 @dataclass(frozen=True)
 class Signal:
     """One column in use: value = gain · cell + offset in [s], [%], [rad], [m] or [Pa], from `low` to `high`.
 
-    `name` is that in the header, `joint` a number from 1, or 0 for the time. `part` is 0, or 1 for the column
+    `name` is that in the header, `kind` time, command, angle or pressure, `joint` a number from 1, or 0 for
+    the time. `part` is 0, or 1 for the column
     of a command's negative direction and of the pressure in chamber B. `unit` is the one to be read: %, deg,
     mm of a joint that slides, or bar.
     """
 
     name: str
-    kind: Literal["time", "command", "angle", "pressure"]
+    kind: str
     joint: int = 0
     part: int = 0
     gain: float = 1.0
@@ -46,63 +52,43 @@ class Table:
 
     Attributes:
         source: the file.
-        layout: its format in a few words, such as "CSV in UTF-8 separated by semicolons".
         names: of the columns, in order; "" for one without.
         columns: their cells by name, shape (R,): numbers, times or text.
         header: line of the names [1-based]; None where the format stores them.
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
         lines: of the rows [1-based], shape (R,); None: 1, 2, ...
-        torn: rows that have more or fewer cells than there are columns, shape (R,); None: no row.
+        torn: rows that have more or fewer cells than there are columns [0-based].
     """
 
     source: str
-    layout: str
     names: tuple[str, ...]
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict[str, NDArray[Any]])
     header: int | None = None
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     remarks: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
-    torn: NDArray[np.bool_] | None = None
+    torn: Sequence[int] | NDArray[np.int64] = ()
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
-        """Read the columns of signals, as the file holds them.
+        """Read the columns of signals; a number that is too large counts as none.
 
         Raises:
             LogError: columns that cannot be read together.
         """
-        first, clocks = signals[0].name, set[str]()
-        rows = len(self.columns[first])
-        values = np.full((rows, len(signals)), np.nan)
-        for k, signal in enumerate(signals):
+        first = signals[0].name
+        values = np.empty((len(self.columns[first]), len(signals)))
+        for signal, column in zip(signals, values.T, strict=True):
             cells = self.columns[signal.name]
-            if len(cells) != rows:
-                what = f"holds {len(cells)} values, but column {first} holds {rows}"
+            if len(cells) != len(column):
+                what = f"holds {len(cells)} values, but column {first} holds {len(column)}"
                 where = f"{self.source}, column {signal.name}"
                 raise LogError(what, where=where, hint="all columns of a log have one clock: resample it")
-            values[:, k], timed = _as_numbers(cells)
-            if timed:
-                clocks.add(signal.name)
-        said = f"{', '.join(sorted(clocks))}: dates or times of day, taken as seconds from the first"
-        lines = np.arange(1, rows + 1) if self.lines is None else self.lines
-        torn = np.zeros(rows, bool) if self.torn is None else self.torn
-        remarks = (*self.remarks, *([said] if clocks else []))
-        return Recording(self, tuple(signals), values, lines, torn, frozenset(clocks), remarks)
-
-
-def _as_numbers(cells: NDArray[Any]) -> tuple[Floats, bool]:
-    """Return cells as numbers, NaN for those that hold none, and whether they are times from the first."""
-    if cells.dtype.kind in "fiub":
-        return cells.astype(np.float64), False
-    if cells.dtype.kind == "M":
-        there = ~np.isnat(cells)
-        since = (cells - cells[there][:1]).astype("m8[ns]").astype(np.int64) if there.any() else 0
-        return np.where(there, since / 1e9, np.nan), True
-    texts = [str(cell) for cell in cells]
-    if clock(next(filter(None, texts), "")) is None:
-        return np.array([number(text) for text in texts], np.float64), False
-    return seconds(texts), True
+            numbers, timed = _as_numbers(cells)
+            with np.errstate(all="ignore"):
+                column[:] = numbers * (1.0 if timed else signal.gain) + signal.offset
+        values[~(np.abs(values) < 1e100)] = np.nan
+        return Recording(self, tuple(signals), values, np.arange(len(values)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,35 +98,19 @@ class Recording:
     Attributes:
         table: the file.
         signals: of its columns; the first is the time.
-        values: shape (R, C), NaN where the file holds no number.
-        lines: line or row of the file [1-based] of each row, shape (R,).
-        torn: as in the table, shape (R,).
-        clocks: columns that hold dates or times of day: their values are seconds from the first.
-        remarks: what the reader did to get these numbers.
+        values: in the signals' units, shape (R, C), NaN where the file holds no number.
+        rows: of the table [0-based], shape (R,).
     """
 
     table: Table
     signals: tuple[Signal, ...]
     values: Floats
-    lines: NDArray[np.int64]
-    torn: NDArray[np.bool_]
-    clocks: frozenset[str] = frozenset()
-    remarks: tuple[str, ...] = ()
+    rows: NDArray[np.int64]
 
     @property
     def time(self) -> Floats:
         """Time [s], shape (R,)."""
         return self.values[:, 0]
-
-    def take(self, rows: NDArray[np.int64]) -> "Recording":
-        """Return a copy with these rows, in this order."""
-        return replace(self, values=self.values[rows], lines=self.lines[rows], torn=self.torn[rows])
-
-    def text(self, row: int, signal: Signal) -> str:
-        """Return the text in a cell that holds no number; "" where it is empty, or the format has none."""
-        cells, line = self.table.columns[signal.name], self.lines[row]
-        at = line - 1 if self.table.lines is None else np.searchsorted(self.table.lines, line)
-        return str(cells[at] or "") if cells.dtype.kind == "O" else ""
 
     def finding(
         self,
@@ -148,38 +118,74 @@ class Recording:
         kind: str,
         rows: Sequence[int] | NDArray[np.int64] = (),
         signal: Signal | None = None,
-        subject: object = None,
+        *subjects: object,
         **numbers: Any,
     ) -> LogFinding:
-        """Make a finding at the first of `rows`, about a signal or another subject; it counts the others."""
-        more, word = "", "line" if self.table.header else "row"
-        if len(rows) > 1:
-            more = f" (and {len(rows) - 1} more, to {word} {self.lines[rows[-1]]})"
-        place = word, int(self.lines[rows[0]]) if len(rows) else None, signal.name if signal else ""
-        subjects = [subject or signal] if signal else []
-        return log_finding(level, kind, self.table.source, subjects, place, rows=more, **numbers)
+        """Make a finding at the first of `rows`, about a signal or other subjects; it counts the others."""
+        word, of = "line" if self.table.header else "row", self.table.lines
+        at = [f"{word} {row + 1 if of is None else of[row]}" for row in self.rows[[*rows[:1], *rows[-1:]]]]
+        more = f" (and {len(rows) - 1} more, to {at[1]})" if len(rows) > 1 else ""
+        about = subjects or ((signal,) if signal else ())
+        place = {"row": at[0] if at else "", "column": signal.name if signal else ""}
+        return log_finding(level, kind, self.table.source, *about, **place, rows=more, **numbers)
 
 
-def optional_package(package: str, extra: str, source: str) -> Any:
-    """Import a package that only some file formats need.
-
-    Raises:
-        LogError: it is not installed.
-    """
+def number(cell: str) -> float | None:
+    """Return what float() reads, but for the digit groups of Python's literals (1_000); None: no number."""
     try:
-        return import_module(package)
-    except ImportError:
-        what = f"needs the package {package.partition('.')[0]}, which is not installed"
-        raise LogError(what, where=source, hint=f"pip install 'hydroid[{extra}]'") from None
+        return float(cell) if "_" not in cell else None
+    except ValueError:
+        return None
+
+
+def clock(cell: str) -> int | None:
+    """Return the time of day in a cell [ns]; None: there is none."""
+    match = _TIME.fullmatch(cell) if len(cell) < 50 else None
+    if match is None:
+        return None
+    hour, minute, second, fraction, half = match.groups()
+    hours = int(hour) % 12 + 12 * (half in "Pp") if half else int(hour)
+    return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
+
+
+def _as_numbers(cells: NDArray[Any]) -> tuple[Floats, bool]:
+    """Return cells as numbers, NaN for those that hold none, and whether they are times [s] from the first.
+
+    Dates in text do not count, which programs write in many ways: a time of day that falls by more than half
+    a day has passed midnight.
+    """
+    if cells.dtype.kind in "fiub":
+        return cells.astype(np.float64), False
+    if cells.dtype.kind == "M":
+        there = ~np.isnat(cells)
+        ticks = (cells[there] - cells[there][:1]).astype("m8[ns]").astype(np.int64)
+    else:
+        texts = [str(cell) for cell in cells]
+        if clock(next(filter(None, texts), "")) is None:
+            return np.array([number(text) for text in texts], np.float64), False
+        clocks = [clock(text) for text in texts]
+        there = np.array([tick is not None for tick in clocks])
+        ticks = np.array([tick for tick in clocks if tick is not None], np.int64)
+        ticks += _DAY * np.cumsum(np.diff(ticks, prepend=ticks[0]) < -_DAY // 2)
+    seconds = np.full(len(cells), np.nan)
+    seconds[there] = (ticks - ticks[:1]) / 1e9
+    return seconds, True
 
 
 @contextmanager
-def readable(path: Path, kind: str) -> Generator[None]:
-    """Turn what a format's library raises on damaged bytes, errors of any kind, into one line."""
+def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
+    """Yield a library that reads a format; what it raises on damaged bytes, errors of any kind, is one line.
+
+    Raises:
+        LogError: it is not installed, or cannot read the file.
+    """
     try:
-        yield
-    except LogError:
-        raise
+        library = import_module(package)
+    except ImportError:
+        what = f"needs the package {package.partition('.')[0]}, which is not installed"
+        raise LogError(what, where=str(path), hint=f"pip install 'hydroid[{extra}]'") from None
+    try:
+        yield library
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         what = f"cannot be read as {kind} ({reason})"

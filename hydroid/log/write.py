@@ -9,8 +9,8 @@ import numpy as np
 
 from hydroid.errors import LogError
 from hydroid.files import write_atomic
-from hydroid.log.columns import map_signals
 from hydroid.log.log import Floats, Log
+from hydroid.log.read import map_signals
 from hydroid.log.repair import hold
 from hydroid.log.table import Signal
 from hydroid.settings.log import LogSettings
@@ -41,8 +41,7 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
         for signal in signals:
             values, joint = log.time, signal.joint - 1
             if signal.kind == "command":
-                values = (-command if signal.part else command)[:, joint]
-                values = values.clip(min=0.0) if signal.low == 0 else values
+                values = (-command if signal.part else command)[:, joint].clip(min=signal.low)
             elif signal.kind == "angle":
                 values = log.angle[:, joint]
             elif signal.kind == "pressure":
@@ -51,18 +50,19 @@ def write_logs(path: Path, logs: Sequence[tuple[Log, LogSettings]], *, exact: bo
                 values = log.pressure[:, joint, signal.part]
             columns[signal.name] = _cells(signal, values, exact)
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(columns)
-    text.writelines(",".join(row) + "\n" for row in zip(*columns.values(), strict=True))
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
     write_atomic(path, text.getvalue())
 
 
 def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
     """Refuse to lose a command, or to write an angle that is not there."""
-    for joint in range(1, log.joints + 1):
-        if log.driven[joint - 1] and ("command", joint) not in mapped:
+    for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
+        if driven and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"
             raise LogError(what, where=str(path), hint=f"map a column in log.joints.{joint}.command")
-        if not log.measured[joint - 1] and ("angle", joint) in mapped:
+        if not measured and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
             raise LogError(f"joint {joint} has no angle to write", where=str(path), hint=hint)
 

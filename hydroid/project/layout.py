@@ -9,7 +9,7 @@ import numpy as np
 
 from hydroid.errors import LogError, SettingsError
 from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
-from hydroid.log.columns import angle_margin
+from hydroid.log.read import angle_margin
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings

@@ -1,10 +1,11 @@
 """Small logs for the tests of the log room: two joints, the second continuous."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from hydroid.log import Log, LogFinding, check_log, read_log
+from hydroid.log import Log, LogFinding, check_log
 from hydroid.settings.log import LogSettings
 
 RIG = Path(__file__).parents[2] / "examples" / "logs"
@@ -34,8 +35,14 @@ def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
     return path
 
 
-def read(path: Path, settings: LogSettings = SETTINGS, **options: object) -> tuple[Log, list[LogFinding]]:
-    return read_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
+def read(
+    path: Path, settings: LogSettings = SETTINGS, ranges: np.ndarray = RANGES, **options: Any
+) -> tuple[Log, list[LogFinding]]:
+    """A log that can be used, and its findings; else the first error is raised."""
+    log, findings = check_log(path, settings, ranges, **options)
+    if log is None:
+        raise findings[0].error()
+    return log, findings
 
 
 def assert_same(log: Log, other: Log) -> None:
@@ -45,9 +52,14 @@ def assert_same(log: Log, other: Log) -> None:
     np.testing.assert_array_equal(log.angle, other.angle)
 
 
-def faults(path: Path, settings: LogSettings = SETTINGS, **options: object) -> list[LogFinding]:
+def faults(path: Path, settings: LogSettings = SETTINGS, **options: Any) -> list[LogFinding]:
     """Errors only."""
-    log, findings = check_log(path, settings, RANGES, **options)  # type: ignore[arg-type]
+    log, findings = check_log(path, settings, RANGES, **options)
     errors = [finding for finding in findings if finding.level == "error"]
     assert (log is None) == bool(errors)
     return errors
+
+
+def place(finding: LogFinding) -> str:
+    """Line and column, without the file."""
+    return finding.where.partition(", ")[2]

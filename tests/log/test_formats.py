@@ -79,8 +79,7 @@ def test_timestamps_in_parquet(tmp_path: Path) -> None:
     stamps = pyarrow.array(
         (1e9 * T).round().astype(np.int64) + 1_700_000_000 * 10**9, pyarrow.timestamp("ns", "UTC")
     )
-    log, (note,) = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
-    assert note.what == "time_s: dates or times of day, taken as seconds from the first"
+    log, _ = read(write_parquet(tmp_path / "log.parquet", {**COLUMNS, "time_s": stamps}))
     same(log, tmp_path)
 
 

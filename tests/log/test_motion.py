@@ -45,39 +45,6 @@ def test_half_a_second_of_slow_motion_makes_no_dead_band():
     assert JointMotion(replace(log, command=command, angle=angle), 1).dead_band <= 5
 
 
-@pytest.mark.parametrize("early", [0.1, 0.3])
-def test_a_motion_before_its_command_is_told(early):
-    log = joint_log(dead=10, lag=0.06)
-    moved = replace(log, command=np.roll(log.command, round((0.06 + early) / PERIOD), axis=0))
-    assert JointMotion(moved, 1).ahead == pytest.approx(early, abs=0.021)
-    assert JointMotion(log, 1).ahead == 0
-
-
-def spring_arm(command: np.ndarray) -> Log:
-    """8 q̈ + 231.8 q̇ + 53.4 q = 0.2 u: the article's shoulder without gravity, as a log of one joint."""
-    q = np.zeros(len(command))
-    position, speed, h = 0.0, 0.0, 0.001
-    for k in range(len(q)):
-        q[k] = position
-        for _ in range(10):
-            speed = (speed + h / 8 * (0.2 * command[k] - 53.4 * position)) / (1 + h * 231.8 / 8)
-            position += h * speed
-    q += np.deg2rad(0.05) * np.random.default_rng(5).normal(size=len(q))
-    time = np.arange(len(q), dtype=float) * 0.01
-    return Log("spring", time, command[:, None], q[:, None], 0.01)
-
-
-TIME = np.arange(3000) * 0.01
-STEPS = np.repeat(np.random.default_rng(6).uniform(-100, 100, 20), 150)
-SINES = 40 * np.sin(0.6 * TIME) + 30 * np.sin(2.1 * TIME + 1) + 20 * np.sin(4.5 * TIME + 2)
-COMMANDS = {"steps": STEPS, "sines": SINES, "one sine": 60 * np.sin(0.6 * TIME), "short": STEPS[:250]}
-
-
-@pytest.mark.parametrize("command", [*COMMANDS.values(), np.full(3000, 40.0)], ids=[*COMMANDS, "constant"])
-def test_a_spring_that_turns_the_velocity_ahead_raises_no_alarm(command: np.ndarray) -> None:
-    assert JointMotion(spring_arm(command), 1).ahead == 0
-
-
 POSE = np.deg2rad([0.0, 25.0, -60.0, 0.0, 0.0, 0.0, 20.0])
 
 

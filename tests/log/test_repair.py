@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_files import cells, faults, lines, read, save
+from log_files import cells, faults, lines, place, read, save
 
 holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)
 
@@ -50,7 +50,7 @@ def test_a_long_hole_is_not_repaired(tmp_path: Path) -> None:
     for row in table[30:41]:
         row[3] = ""
     (fault,) = faults(save(tmp_path / "log.csv", table), repair=True)
-    assert (fault.line, fault.column) == (31, "q1_deg")
+    assert place(fault) == "line 31, column q1_deg"
     table[40][3] = "10"
     assert faults(save(tmp_path / "log.csv", table), repair=True) == []
 
@@ -60,7 +60,7 @@ def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
     table[1][1] = table[-1][3] = ""
     path = save(tmp_path / "log.csv", table)
     found = faults(path, repair=True)
-    assert {(fault.line, fault.column) for fault in found} == {(2, "u1_pct"), (81, "q1_deg")}
+    assert {place(fault) for fault in found} == {"line 2, column u1_pct", "line 81, column q1_deg"}
     assert all("between good cells" in fault.hint for fault in found)
 
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from log_files import RANGES
+from log_files import RANGES, read
 
 from hydroid.errors import LogError
-from hydroid.log import Log, read_log, write_log
+from hydroid.log import Log, write_log
 from hydroid.settings.log import LogSettings
 
 T = 60
@@ -53,7 +53,7 @@ def test_what_is_written_reads_back(
     elif delay < 0:
         log.command[delay:] = log.command[delay - 1]
     write_log(path, log, mapping)
-    back, _ = read_log(path, mapping, RANGES)
+    back, _ = read(path, mapping, RANGES)
     np.testing.assert_array_equal(back.time, log.time)
     np.testing.assert_allclose(back.command, log.command, atol=1e-7)
     np.testing.assert_allclose(back.angle, log.angle, atol=1e-8)
@@ -71,4 +71,4 @@ def test_nothing_is_lost_silently(tmp_path: Path) -> None:
         write_log(path, unmeasured, LogSettings())
     assert list(tmp_path.iterdir()) == []
     write_log(path, unmeasured, LogSettings(angle=None))
-    assert not read_log(path, LogSettings(angle=None), RANGES)[0].measured.any()
+    assert not read(path, LogSettings(angle=None), RANGES)[0].measured.any()

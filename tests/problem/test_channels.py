@@ -10,7 +10,7 @@ from conftest import TRUTH, step_log
 from hydroid import fit, load_settings, read_logs
 from hydroid.arm.model import add_payload
 from hydroid.errors import SettingsError
-from hydroid.log import read_log, write_log
+from hydroid.log import check_log, write_log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
 
@@ -71,7 +71,7 @@ def test_pressures_survive_a_file(hydraulic, tmp_path, arm):
     write_log(tmp_path / "log.csv", log, settings.log)
     assert "pA2,pB2" in (tmp_path / "log.csv").read_text().splitlines()[0]
     ranges = np.stack([arm.lower, arm.upper], axis=1)
-    again, _ = read_log(tmp_path / "log.csv", settings.log, ranges)
+    again, _ = check_log(tmp_path / "log.csv", settings.log, ranges)
     assert again.pressure[:, 1] == pytest.approx(log.pressure[:, 1], rel=1e-8)
     assert np.isnan(again.pressure[:, 0]).all()
 

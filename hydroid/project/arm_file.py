@@ -87,9 +87,9 @@ def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize],
         actuators = {name: own | areas for name, own in imported.cylinders.items()}
     for joint, size in zip(arm.joints if arm else (), sizes, strict=True):
         own = imported.cylinders.get(joint.name, {"kind": "linear"} if joint.slides else None)
+        area = size.area or size.displacement
         oil: dict[str, Any] = {"kind": "rotary", "displacement": rounded(size.displacement)}
         if own is not None:  # the rod leaves about 65 % of the area
-            area = size.area or size.displacement
             oil = own | {"area_a": rounded(area), "area_b": rounded(0.65 * area)}
         actuators[joint.name] = oil | {"max_opening": rounded(size.opening)}
     flow: dict[str, Any] = {"default_flow_style": True, "sort_keys": False, "width": 1e9}

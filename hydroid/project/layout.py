@@ -1,6 +1,6 @@
 """What a log holds: its columns, and how the joints move in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.errors import LogError, SettingsError
-from hydroid.log import JointMotion, Log, Table, check_log, guess_columns, motion_of
+from hydroid.log import JointMotion, Table, check_log, guess_columns, motion_of
 from hydroid.log.read import angle_margin
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
@@ -65,11 +65,9 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     # A slow log is simulated in two steps a sample; what a fast one adds is not seen on such machines.
     period = section["period_s"]
     section["period_s"] = max(period, 0.02) if period < 0.03 else 0.02 if period < 0.1 else 0.05
-    reasons, entries = [*guessed], section["joints"]
-    if order:
-        entries = {places[k - 1] + 1: entry for k, entry in entries.items()}
-        section["joints"] = entries = dict(sorted(entries.items()))
-    measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    entries = {places[k - 1] + 1: entry for k, entry in section["joints"].items()}
+    section["joints"], reasons = dict(sorted(entries.items())), [*guessed]
+    measured = [joint for joint, entry in section["joints"].items() if entry["angle"]]
     if not measured:
         hint = f"rename them, or write the log section by hand; columns: {', '.join(table.names)}"
         raise LogError("has no column that looks like an angle", where=table.source, hint=hint)
@@ -81,30 +79,31 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
     motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
     wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
     for joint, motion in motions.items():
-        reasons += _outside(motion.log, joint, arm)
-        reasons += (
-            _remarks(motion, arm.joints[joint - 1], joint in wrong) if motion.log.driven[joint - 1] else []
-        )
-        command = entries[joint]["command"]
-        if command is not None and joint in wrong:
-            entries[joint]["command"] = turned(command)
+        reasons += _remarks(motion, arm.joints[joint - 1], joint in wrong)
+        if joint in wrong:
+            entries[joint]["command"] = turned(entries[joint]["command"])
     reasons += [REVERSED] if wrong else []
     driven = [joint for joint in measured if entries[joint]["command"] is not None]
     followed = any(m.travel > 1 for joint, m in motions.items() if joint not in driven)  # [deg]
     return Layout(section, tuple(driven or measured), tuple(reasons), unused, motions, followed)
 
 
-def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> list[str]:
-    """Return what a user should know of a driven joint."""
-    name, lines = joint.name, list[str]()
-    path, against = motion.directed
+def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
+    """Yield what a user should know of a joint and its angles in the log."""
+    angle, (path, against) = motion.log.angle[:, motion.joint - 1], motion.directed
+    what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", float(np.degrees(1)))
+    low, high, margin = float(angle.min()), float(angle.max()), angle_margin(*joint.limits)
+    if not joint.continuous and (low < joint.limits[0] - margin or high > joint.limits[1] + margin):
+        yield (
+            f"{joint.name}: {what} in the log run from {low * factor:.4g} to {high * factor:.4g} {unit}, but "
+            f"the arm allows {joint.range[0]:.6g} to {joint.range[1]:.6g}: give them an offset or a scale of "
+            "-1, or change the range in arm.xml"
+        )
     if wrong:
-        way = f"{np.radians(path):.3g} m" if joint.slides else f"{path:.3g} deg"
-        share = f"for {max(against, 1 - against):.0%} of {way} of travel"
-        lines.append(f"{name} moves against its command ({share}): the sign of the command is reversed")
-    if motion.dead_band > 10:
-        lines.append(f"{name} does not move below about {motion.dead_band:g} % of command: a dead band")
-    return lines
+        share = f"for {max(against, 1 - against):.0%} of {np.radians(path) * factor:.3g} {unit} of travel"
+        yield f"{joint.name} moves against its command ({share}): the sign of the command is reversed"
+    if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
+        yield f"{joint.name} does not move below about {motion.dead_band:g} % of command: a dead band"
 
 
 def turned(command: dict[str, Any]) -> dict[str, Any]:
@@ -113,17 +112,3 @@ def turned(command: dict[str, Any]) -> dict[str, Any]:
         return command | {"column": command["column"][::-1]}
     changed = {"scale": -command.get("scale", 1.0)}
     return command | changed | ({"offset": -command["offset"]} if command.get("offset") else {})
-
-
-def _outside(log: Log, joint: int, arm: Arm) -> list[str]:
-    angle, own = log.angle[:, joint - 1], arm.joints[joint - 1]
-    low, high, margin = float(angle.min()), float(angle.max()), angle_margin(*own.limits)
-    if own.continuous or (low >= own.limits[0] - margin and high <= own.limits[1] + margin):
-        return []
-    ends = (low, high) if own.slides else np.degrees((low, high))
-    what = ("positions", "m") if own.slides else ("angles", "deg")
-    return [
-        f"{own.name}: {what[0]} in the log run from {ends[0]:.4g} to {ends[1]:.4g} {what[1]}, but the arm "
-        f"allows {own.range[0]:.6g} to {own.range[1]:.6g}: give them an offset or a scale of -1, or change "
-        "the range in arm.xml"
-    ]

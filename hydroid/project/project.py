@@ -120,13 +120,12 @@ def write_project(
 
 def next_steps(folder: Path, logs: Sequence[Path]) -> tuple[str, ...]:
     """Return the commands to run; of several logs the last is kept to validate on, of one none is."""
-    names = [shlex.quote(str(log)) for log in logs] or ["LOG.csv", "OTHER.csv"]
-    names += ["OTHER.csv"] if len(names) == 1 else []
-    fitted, other = " ".join(names[:-1] or names), names[-1]
+    names = [shlex.quote(str(log)) for log in logs or ("LOG.csv", "OTHER.csv")]
+    fitted, other = " ".join(names[:-1] or names), names[-1] if names[1:] else "OTHER.csv"
     home = shlex.quote(str(folder))
     config, run = f"--config {home}/fit.yaml", f"{home}/runs/fit"
     return (
-        f"hydroid check {' '.join(names if len(logs) != 1 else names[:1])} {config}",
+        f"hydroid check {' '.join(names)} {config}",
         f"hydroid fit-hyd {fitted} {config} --out {run}",
         f"hydroid validate {other} --fit {run} --out {home}/runs/validation",
         f"hydroid suggest {fitted} --fit {run} --out {home}/runs/suggestions",
@@ -165,22 +164,19 @@ def _stage(folder: Path) -> Generator[Path]:
 
 def _move(stage: Path, folder: Path) -> tuple[str, ...]:
     """Move all files to the project, or none."""
-    names = tuple(name for name in FILES if (stage / name).exists())
-    moved, old = list[Path](), stage / "old"
+    names, old = tuple(name for name in FILES if (stage / name).exists()), stage / "old"
     old.mkdir()
     with undisturbed():
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for name in names:  # of an earlier project
-                if os.path.lexists(folder / name):
-                    os.rename(folder / name, old / name)
             for name in names:
+                if os.path.lexists(folder / name):  # of an earlier project
+                    os.rename(folder / name, old / name)
                 os.rename(stage / name, folder / name)
-                moved.append(folder / name)
         except OSError as error:
-            for path in moved:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-            for path in old.iterdir():
-                os.rename(path, folder / path.name)
+            for name in names:
+                for place, back in ((folder, stage), (old, folder)):
+                    if os.path.lexists(place / name) and not os.path.lexists(back / name):
+                        os.rename(place / name, back / name)
             raise RunError(f"cannot be written ({error.strerror})", where=str(folder)) from None
     return names

@@ -85,85 +85,49 @@ def wrapped(table: Table) -> Table:
     return {**table, "q6_deg": (table["q6_deg"] + 280) % 360 - 180}
 
 
+def exchanged() -> list[Table]:
+    table = rig("rig_shoulder_1")
+    return [{**table, "q2_deg": table["q1_deg"]}]
+
+
+def misspelt() -> list[Table]:
+    return [{name.replace("u2", "U2"): values for name, values in rig().items()}]
+
+
+def pushed() -> list[Table]:
+    return [boom([60, -60, 100, -100], seconds=8)]
+
+
+ROWS = np.insert(np.arange(4100), 900, 900)
+HOLE = np.arange(4100) == 700
+
+
 WRONG = (
     Wrong("commands from −1 to 1", "warning: set log.command.scale: 100", lambda: of("u", lambda u: u / 100)),
     Wrong("commands in ±10 V", "warning: set log.command.scale: 10", lambda: of("u", lambda u: u / 10)),
     Wrong("commands in ±1000", "error: set log.command.scale: 0.1", lambda: of("u", lambda u: u * 10)),
-    Wrong(
-        "commands in 4 to 20 mA",
-        "warning: set log.command.scale: 12.5 and log.command.offset: -150",
-        lambda: of("u2", lambda u: 12 + 0.08 * u),
-    ),
-    Wrong(
-        "a joystick of 0 to 5 V",
-        "warning: set log.command.scale: 40 and log.command.offset: -100",
-        lambda: of("u2", lambda u: 2.5 + 0.025 * u),
-    ),
+    Wrong("commands in 4 to 20 mA", "warning: offset: -150", lambda: of("u2", lambda u: 12 + 0.08 * u)),
+    Wrong("a joystick of 0 to 5 V", "warning: offset: -100", lambda: of("u2", lambda u: 2.5 + 0.025 * u)),
     Wrong("angles in rad, read as deg", "warning: set log.angle.unit: rad", lambda: of("q", np.deg2rad)),
     Wrong(
-        "angles in deg, read as rad",
-        "error: set log.angle.unit: deg",
-        lambda: of("", np.asarray),
-        {"angle": {"unit": "rad"}},
+        "angles in deg, read as rad", "error: angle.unit: deg", lambda: [rig()], {"angle": {"unit": "rad"}}
     ),
     Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
-    Wrong(
-        "a clock in days, read as s", "error: set log.time.unit: day", lambda: of("time", lambda t: t / 86400)
-    ),
-    Wrong(
-        "an angle that counts the other way",
-        "error: set log.joints.elbow.angle.scale: -1",
-        lambda: of("q3", np.negative),
-    ),
-    Wrong(
-        "a command wired the other way",
-        "warning: angle of joint shoulder moves against the command (for 99% of",
-        lambda: of("u2", np.negative),
-    ),
-    Wrong(
-        "0.4 s without a sample",
-        "error: cut the log into two files at longer ones",
-        lambda: without(*range(900, 940)),
-    ),
+    Wrong("a clock in days, read as s", "error: unit: day", lambda: of("time", lambda t: t / 86400)),
+    Wrong("an angle that counts the other way", "error: angle.scale: -1", lambda: of("q3", np.negative)),
+    Wrong("a command wired the other way", "warning: against the command", lambda: of("u2", np.negative)),
+    Wrong("0.4 s without a sample", "error: cut the log into two", lambda: without(*range(900, 940))),
     Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
+    Wrong("a sample that stands twice", "error: does not increase", lambda: of("", lambda v: v[ROWS])),
     Wrong(
-        "a sample that stands twice",
-        "error: time does not increase",
-        lambda: of("", lambda v: np.insert(v, 900, v[900])),
+        "a cell that holds no number", "error: 'nan'", lambda: of("q2", lambda q: np.where(HOLE, np.nan, q))
     ),
-    Wrong(
-        "a cell that holds no number",
-        "error: 'nan' is not a number",
-        lambda: of("q2", lambda q: np.where(np.arange(len(q)) == 700, np.nan, q)),
-    ),
-    Wrong(
-        "a dead sensor",
-        "warning: angle of joint shoulder never changes",
-        lambda: of("q2", lambda q: np.full_like(q, q[0])),
-    ),
-    Wrong(
-        "the angle of another joint",
-        "warning: strong commands hardly move joint shoulder",
-        lambda: [{**(t := rig("rig_shoulder_1")), "q2_deg": t["q1_deg"]}],
-    ),
-    Wrong(
-        "an encoder that wraps",
-        "note: angle of joint rotation wraps by 360 deg and was joined",
-        lambda: [wrapped(rig())],
-    ),
-    Wrong(
-        "a misspelt column",
-        "error: did you mean 'U2_pct'?",
-        lambda: [{n.replace("u2", "U2"): v for n, v in rig().items()}],
-    ),
-    Wrong(
-        "a joint that is pushed against its stop",
-        "note: joint shoulder is driven against the end of its travel for",
-        lambda: [boom([60, -60, 100, -100], seconds=8)],
-    ),
-    Wrong(
-        "no rest before the first command", "note: begins with a command", lambda: of("", lambda v: v[100:])
-    ),
+    Wrong("a dead sensor", "warning: never changes", lambda: of("q2", lambda q: np.full_like(q, q[0]))),
+    Wrong("the angle of another joint", "warning: strong commands hardly move joint shoulder", exchanged),
+    Wrong("an encoder that wraps", "note: wraps by 360 deg and was joined", lambda: [wrapped(rig())]),
+    Wrong("a misspelt column", "error: did you mean 'U2_pct'?", misspelt),
+    Wrong("a joint that is pushed against its stop", "note: against the end of its travel", pushed),
+    Wrong("no rest before the first command", "note: begins with", lambda: of("", lambda v: v[100:])),
 )
 
 

@@ -108,17 +108,9 @@ BAD = {
         lambda p: write_parquet(p / "a.parquet", {**COLUMNS, "u1_pct": [None, *COLUMNS["u1_pct"][1:]]}),
         "row 1, column u1_pct: no value is there",
     ),
-    "out of the range": (
-        lambda p: write_mat(p / "log.mat", {**COLUMNS, "q1_deg": np.where(T == 0.4, 120, COLUMNS["q1_deg"])}),
-        "log.mat, row 41, column q1_deg: angle of joint 1 is 120 deg",
-    ),
     "other length": (
         lambda p: write_mat(p / "log.mat", {**COLUMNS, "q2_deg": T[:40]}),
         "column q2_deg: holds 40 values, but column time_s holds 80",
-    ),
-    "missing": (
-        lambda p: write_mat(p / "log.mat", {k: v for k, v in COLUMNS.items() if k != "q2_deg"}),
-        "the file lacks 'q2_deg'",
     ),
     "workbook": (workbook, "save the sheet as CSV"),
 }

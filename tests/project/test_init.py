@@ -145,14 +145,8 @@ def test_a_telescopes_column_is_its_own(tmp_path: Path):
     way = np.cumsum(0.02 * np.roll(drive, 5)) / 100
     columns = {"t": time, "slew_V": drive / 10, "boom_V": drive / 10, "tele_V": drive / 10, "u9": drive}
     columns |= {"slew_deg": 30 * way, "boom_deg": 20 * way, "tele_length_m": 0.3 + 0.4 * way}
-    np.savetxt(
-        tmp_path / "a.csv",
-        np.stack([*columns.values()], 1),
-        "%.6g",
-        ",",
-        header=",".join(columns),
-        comments="",
-    )
+    rows = np.stack([*columns.values()], 1)
+    np.savetxt(tmp_path / "a.csv", rows, "%.6g", ",", header=",".join(columns), comments="")
     made = init(tmp_path / "mine", robot, [tmp_path / "a.csv"])
     settings = hydroid.load_settings(tmp_path / "mine" / "fit.yaml")
     assert settings.log.columns("angle", 3).column == ("tele_length_m",)

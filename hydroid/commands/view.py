@@ -158,7 +158,7 @@ def view(
         write_atomic(Path(out), film)
         return Result([str(out)], {"out": str(out)}, None)
     from hydroid.plant import Plant
-    from hydroid.viewer.playback import Replay, Sliders
+    from hydroid.viewer.motion import Replay, Sliders
     from hydroid.viewer.window import show
 
     with suppress(KeyboardInterrupt):  # as good as closing the window

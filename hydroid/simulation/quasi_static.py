@@ -119,29 +119,36 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any)
 
 
 @compilable
+def linkage(c: Any, angle: float) -> Any:
+    """Travel of a joint's rod [m] and its moment arm [m/rad] at an angle; of a rotary actuator as `bent`."""
+    if c.kind != LINEAR:
+        way, arm, _ = bent(angle, c)
+        return way, arm
+    psi, first = angle, 1.0
+    if c.rocker > 0.0:
+        psi, first, _ = four_bar(angle, c)
+    out, arm, _ = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
+    return out, first * arm
+
+
+@compilable
 def store_oil(c: Any, z: Any, w: Any, supply: float, speed: float, angle: float) -> None:
     """Store the oil and flows of a joint's chambers as `actuator.observe` reads them.
 
     A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N].
     """
     a, b, tank, edge = c.a.area, c.b.area, c.tank_pressure, c.conductance * abs(w.travel)
-    way, sign = bent(angle, c)[0], 1.0 if w.travel > 0.0 else -1.0
-    if speed == 0.0:
-        pressure_a, pressure_b = max(tank, (tank * b + w.push) / a), max(tank, (tank * a - w.push) / b)
-    elif w.travel > 0.0:
-        pressure_a, pressure_b = (
-            supply - (speed * a / edge) ** 2,
-            tank + (speed * b / (edge * c.b.return_)) ** 2,
-        )
-    else:
-        pressure_a, pressure_b = (
-            tank + (speed * a / (edge * c.a.return_)) ** 2,
-            supply - (speed * b / edge) ** 2,
-        )
-    fill_a, fill_b = way * a / c.dead_volume, -way * b / c.dead_volume
+    sign = 1.0 if w.travel > 0.0 else -1.0
+    pressure_a, pressure_b = max(tank, (tank * b + w.push) / a), max(tank, (tank * a - w.push) / b)
+    if speed != 0.0:
+        pressure_a, pressure_b = supply - (speed * a / edge) ** 2, supply - (speed * b / edge) ** 2
+        if w.travel > 0.0:
+            pressure_b = tank + (speed * b / (edge * c.b.return_)) ** 2
+        else:
+            pressure_a = tank + (speed * a / (edge * c.a.return_)) ** 2
+    out = linkage(c, angle)[0]
+    fill_a, fill_b = out * a / c.dead_volume, -out * b / c.dead_volume
     if c.kind == LINEAR:
-        psi = four_bar(angle, c)[0] if c.rocker > 0.0 else angle
-        out = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[0]
         fill_a = np.log(volume(out, a, c.dead_volume) / c.dead_volume)
         fill_b = np.log(volume(c.stroke - out, b, c.dead_volume) / c.dead_volume)
     z.a.oil = max(pressure_a, 0.0) + c.bulk_modulus * fill_a
@@ -161,13 +168,7 @@ def meter(c: Any, z: Any, w: Any, substeps: int, step: float) -> None:
 @compilable
 def weigh(c: Any, w: Any, angle: float, torque: float) -> None:
     """Lever and load of a joint that a torque [N·m] must hold at an angle [rad]."""
-    if c.kind == LINEAR:
-        psi, first = angle, 1.0
-        if c.rocker > 0.0:
-            psi, first, _ = four_bar(angle, c)
-        w.arm = first * triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)[1]
-    else:
-        w.arm = bent(angle, c)[1]
+    w.arm = linkage(c, angle)[1]
     lever = max(abs(w.arm), LEAST_LEVER)
     w.push, w.thrust, w.drag = (
         torque / w.arm,

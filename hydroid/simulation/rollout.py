@@ -219,12 +219,10 @@ class _Announcement(event.Listener):
 @cache
 def compile_rollout() -> None:
     """Make the compiled loop ready: read it from numba's cache, or compile it and say so in the log."""
-    one = np.ones(1)
-    warnings = np.zeros((2, 2), np.int32)[:, 1]  # MuJoCo's lie apart
-    arm = Handles(
-        0, 0, one, one, one, one, one, warnings, NO_JOINTS, one, NO_JOINTS, 1, one, one, np.empty((0, 2))
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
     )
     nothing = np.empty((0, 1))
     course, record = Course(nothing, nothing), Record(nothing, np.empty((0, 1), JOINT_STATE))
     with event.install_listener("numba:compile", _Announcement()):
-        roll(arm, NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)
+        SteppedArm(model).roll(NO_ACTUATORS, np.empty(0, JOINT_STATE), course, record)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hydroid.errors import RunError, SettingsError
-from hydroid.parameters import Array
 from hydroid.progress import Progress, no_progress
 from hydroid.reporting.outlines import sight
-from hydroid.viewer.motion import Motion
+from hydroid.viewer.motion import Motion, Playback, Replay
 
 Picture = NDArray[np.uint8]
 
@@ -37,20 +36,20 @@ class Stage:
     """
 
     def __init__(self, motion: Motion, size: tuple[int, int]) -> None:
-        self._motion, self._model = motion, motion.machine.model
-        look, (width, height) = self._model.vis, size
+        self._replay, (width, height) = Replay(motion), size
+        model = self._replay.model
+        look = model.vis
         look.global_.offwidth, look.global_.offheight = width, height
         # the map covers what the camera sees, or its border shows as dots on the floor
         look.map.shadowclip, look.quality.shadowsize = 3.0, 4096
         try:
-            self._renderer = mujoco.Renderer(self._model, height=height, width=width)
+            self._renderer = mujoco.Renderer(model, height=height, width=width)
         except (mujoco.FatalError, ImportError, RuntimeError, AttributeError) as error:
             how = f"MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {' '.join(str(error).split())}"
             hint = "install libegl1 or libosmesa6, and set MUJOCO_GL=egl or osmesa before Python starts"
             raise RunError(f"no picture can be rendered ({how})", hint=hint) from None
-        self._data = mujoco.MjData(self._model), mujoco.MjData(self._model)
         self._camera = mujoco.MjvCamera()
-        look_at(self._camera, self._model)
+        look_at(self._camera, model)
 
     def __enter__(self) -> "Stage":
         return self
@@ -60,12 +59,10 @@ class Stage:
 
     def picture(self, time: float, text: str = "") -> Picture:
         """Return the machine at a time [s] with a text above it as RGB, shape (height, width, 3)."""
-        sample, (data, ghost) = self._motion.sample(time), self._data
-        place(self._model, data, self._motion.simulated[sample])
-        self._renderer.update_scene(data, self._camera)
-        if self._motion.measured is not None:
-            place(self._model, ghost, self._motion.measured[sample])
-            add_ghost(self._model, ghost, self._renderer.scene, (AZIMUTH, ELEVATION))
+        replay = self._replay
+        replay.advance(time)
+        self._renderer.update_scene(replay.data, self._camera)
+        add_ghost(replay, self._renderer.scene, (AZIMUTH, ELEVATION))
         picture = Image.fromarray(self._renderer.render())
         letters = picture.height // 30
         place_of_text = letters, letters // 2
@@ -126,26 +123,19 @@ def look_at(camera: mujoco.MjvCamera, model: mujoco.MjModel) -> None:
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
 
 
-def add_ghost(
-    model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene, view: tuple[float, float]
-) -> None:
-    """Add what moves of a machine to a scene, blue and translucent.
+def add_ghost(playback: Playback, scene: mujoco.MjvScene, view: tuple[float, float]) -> None:
+    """Add what moves of a playback's ghost, if it has one, to a scene, blue and translucent.
 
     It stands 4 mm farther away in a view of these angles [deg]: where both machines agree only the
     simulated one is seen, and their surfaces do not flicker.
     """
+    if playback.ghost is None:
+        return
     first, seen = scene.ngeom, (mujoco.MjvOption(), mujoco.MjvPerturb())
-    mujoco.mjv_addGeoms(model, data, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
+    mujoco.mjv_addGeoms(playback.model, playback.ghost, *seen, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
     for geom in scene.geoms[first : scene.ngeom]:
         geom.rgba[:], geom.matid, geom.transparent = (0.12, 0.44, 0.82, 0.42), -1, 1
         geom.pos[:] += 0.004 * sight(*view)[2]
-
-
-def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
-    """Bring all that is drawn of a machine to joint angles [rad], shape (nq,)."""
-    data.qpos[:] = angle
-    for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
-        update(model, data)
 
 
 def _still(pictures: Iterable[Picture], kind: str) -> bytes:

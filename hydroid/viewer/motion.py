@@ -1,8 +1,9 @@
-"""Arms in motion: simulated and measured angles of a machine."""
+"""Arms in motion: a simulated machine beside the measured one, or a plant under its sliders."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
+from hydroid.plant import Plant
 from hydroid.prediction import predict_log
 
 
@@ -32,10 +34,6 @@ class Motion:
     measured: Array | None
     error: float
 
-    def sample(self, time: float) -> int:
-        """Return the number of the last sample at or before a time [s]."""
-        return int(np.clip(np.searchsorted(self.time, time + 1e-9) - 1, 0, len(self.time) - 1))
-
 
 def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     """Simulate the commands of logs, by the name of the arm that they move (`Machine.sides`).
@@ -46,16 +44,14 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     """
     arm, first = model.settings.arm, next(iter(logs.values()))
     machine = load_machine(arm, pair=ALONE not in logs)
-    predicted: dict[int, Log] = {}  # by the log: arms that are mirror images share one
-    errors: list[Array] = []
     for log in logs.values():
         if not log.driven.any():
             raise SettingsError("commands nothing", where=log.source, hint="name a log with commands")
-        predicted[id(log)] = one = predicted.get(id(log)) or predict_log(model, log)
-        shown = np.logical_and(log.driven, _moves(log.angle))
-        errors.append((log.angle - one.angle)[:, shown].ravel())
+    simulated = {side: predict_log(model, log).angle for side, log in logs.items()}
+    errors = [
+        (log.angle - simulated[side])[:, log.driven & _moves(log.angle)].ravel() for side, log in logs.items()
+    ]
     rest, error = arm.pose(model.settings.start_pose), np.concatenate(errors)
-    simulated = {side: predicted[id(log)].angle for side, log in logs.items()}
     moved = {side: log.angle for side, log in logs.items() if _moves(log.angle).any()}
     measured = machine.joined(simulated | moved, rest) if moved else None
     rms = float(np.degrees(np.sqrt(np.mean(error**2)))) if error.size else np.nan
@@ -65,3 +61,75 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
 def _moves(angle: Array) -> NDArray[np.bool_]:
     """Which angles, shape (T, J), are of a motion, (J,); a log of commands stands in its start pose."""
     return np.nan_to_num(np.ptp(angle, axis=0)) > 0
+
+
+def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
+    """Bring all that is drawn of a machine to joint angles [rad], shape (nq,)."""
+    data.qpos[:] = angle
+    for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_tendon):
+        update(model, data)
+
+
+class Sliders:
+    """A plant with all joints on the viewer's sliders; its physics can be pushed about.
+
+    Args:
+        plant: the plant.
+        pose: where it begins, a pose of the arm's file; by default the settings' start pose.
+    """
+
+    duration, ghost = np.inf, None
+
+    def __init__(self, plant: Plant, pose: str | None = None) -> None:
+        self.plant, self._start = plant, pose
+        self.restart()
+        self.model, self.data = plant.model, plant.data  # of the plant in its pose, where it locks joints
+
+    def restart(self) -> None:
+        """Go back to the start."""
+        self.plant.reset(self._start)
+        self.advance(0.0)
+
+    def advance(self, until: float) -> None:
+        """Step to the period before `until` [s].
+
+        Raises:
+            RunError: the simulation diverged.
+        """
+        plant = self.plant
+        while plant.time + plant.period <= until + 1e-9:
+            plant.step(plant.command)
+        place(plant.model, plant.data, plant.data.qpos)  # `mj_step` leaves what is drawn a step behind
+        self.time = plant.time
+
+
+class Replay:
+    """A simulated motion from its start to its end.
+
+    Args:
+        motion: what is shown.
+    """
+
+    def __init__(self, motion: Motion) -> None:
+        self.model, self._motion = motion.machine.model, motion
+        self.data, self.duration = mujoco.MjData(self.model), float(motion.time[-1])
+        self.ghost = None if motion.measured is None else mujoco.MjData(self.model)
+        self.restart()
+
+    def restart(self) -> None:
+        """Go back to the start."""
+        self.advance(0.0)
+
+    def advance(self, until: float) -> None:
+        """Go on to the sample before `until` [s]."""
+        motion = self._motion
+        sample = max(0, int(np.searchsorted(motion.time, until + 1e-9)) - 1)
+        self.time = self.data.time = float(motion.time[sample])
+        place(self.model, self.data, motion.simulated[sample])
+        if self.ghost is not None and motion.measured is not None:
+            place(self.model, self.ghost, motion.measured[sample])
+
+
+Playback = Sliders | Replay
+"""what is drawn (`model`, `data` and, where something was measured, `ghost`), the `time` that is shown and
+the `duration` after which all stands still [s]"""

@@ -9,7 +9,7 @@ from typing import Any
 
 from hydroid.errors import RunError
 from hydroid.viewer.film import add_ghost, look_at
-from hydroid.viewer.playback import Playback
+from hydroid.viewer.motion import Playback
 
 FRAME = 1 / 60  # between two pictures of the viewer [s]
 LATE = 0.1  # a machine too slow by this [s] shows slow motion instead of jumps
@@ -35,9 +35,7 @@ def play(
         begun += max(0.0, late) if playback.time < playback.duration else 0.0
         playback.advance(frame - begun)
         viewer.user_scn.ngeom = 0
-        if playback.ghost is not None:
-            view = viewer.cam.azimuth, viewer.cam.elevation
-            add_ghost(playback.model, playback.ghost, viewer.user_scn, view)
+        add_ghost(playback, viewer.user_scn, (viewer.cam.azimuth, viewer.cam.elevation))
         before = playback.data.time
         viewer.sync()
         if playback.data.time < before:

@@ -17,8 +17,7 @@ from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.viewer import film
 from hydroid.viewer.film import Stage
-from hydroid.viewer.motion import Motion, simulated_motion
-from hydroid.viewer.playback import Replay, Sliders
+from hydroid.viewer.motion import Motion, Replay, Sliders, simulated_motion
 from hydroid.viewer.window import LATE, play
 
 SHOULDER = 1

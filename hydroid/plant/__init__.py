@@ -10,7 +10,48 @@ It gives, bit for bit, what the simulations of a fit give; contacts are off as t
 `qfrc_applied` is its own. Between two steps use `mj_kinematics` to refresh the positions of bodies.
 """
 
-from hydroid.plant.load import load_plant
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hydroid.errors import SettingsError
+from hydroid.identified_model import load_identified
 from hydroid.plant.plant import Plant
 
 __all__ = ["Plant", "load_plant"]
+
+
+def load_plant(
+    source: Any,
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    joints: Sequence[int | str] | None = None,
+    period: float | None = None,
+    payload: float = 0.0,
+) -> Plant:
+    """Read a plant.
+
+    Args:
+        source: the result of a fit, or an `IdentifiedModel`; a run folder, or a folder that `Plant.save`
+            wrote; or settings of stage hyd, a path or a shipped name such as "article-hyd". Parameters that
+            these do not fix are then nominal: as the hydraulics and the arm's file have them, and 0 for
+            dampers and springs.
+        overrides: settings to replace in what is read, by dotted key.
+        joints: numbers, from 1, or names of the joints that take commands; by default those that the fit
+            drove or compared, or those of the saved plant.
+        period: how long one command is held [s].
+        payload: mass in the gripper [kg].
+
+    Raises:
+        RunError: the folder holds no estimate.
+        SettingsError: what `Plant` refuses, a file that cannot be read, or nominal parameters of stage mech.
+    """
+    if not isinstance(source, str | Path):
+        identified = getattr(source, "model", source)
+    elif Path(source).is_dir():
+        identified = load_identified(source, overrides=overrides)
+    else:
+        identified = load_identified(None, source, overrides, nominal=True)
+        if identified.settings.stage == "mech":
+            raise SettingsError("stage mech has no nominal gain", where=str(source), hint="name a run folder")
+    return Plant(identified, joints=joints, period=period, payload=payload)

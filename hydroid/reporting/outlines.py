@@ -32,8 +32,8 @@ def shapes(model: mujoco.MjModel) -> list[Shape]:
     directions = trimesh.creation.icosphere(subdivisions=1).vertices.T
     found: list[Shape] = []
     for geom in np.flatnonzero(model.geom_group <= SHOWN).tolist():
-        if (mesh := geom_mesh(model, geom)) is not None:
-            turn, points = np.empty(9), np.asarray(mesh.vertices, float)
+        if (points := _points(model, geom)) is not None:
+            turn = np.empty(9)
             mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
             # the corners that lie farthest out in any direction give the outline
             outermost = points[np.unique((points @ directions).argmax(axis=0))]
@@ -70,24 +70,20 @@ def _lines(model: mujoco.MjModel) -> list[Shape]:
     return found
 
 
-def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
-    """Return a shape of a model as triangles in its own frame [m]; None: it has no volume."""
-    number, size = int(model.geom_dataid[geom]), model.geom_size[geom]
-    kinds = mujoco.mjtGeom
+def _points(model: mujoco.MjModel, geom: int) -> Array | None:
+    """Return points of a shape's surface in its own frame [m], shape (n, 3); None: it is no solid."""
+    kinds, make, size = mujoco.mjtGeom, trimesh.creation, model.geom_size[geom]
     match kinds(int(model.geom_type[geom])):
         case kinds.mjGEOM_MESH:
-            vertices = model.mesh_vert[model.mesh_vertadr[number] :][: model.mesh_vertnum[number]]
-            faces = model.mesh_face[model.mesh_faceadr[number] :][: model.mesh_facenum[number]]
-            return trimesh.Trimesh(vertices, faces)
+            mesh = model.mesh(int(model.geom_dataid[geom]))
+            return model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]].astype(float)
         case kinds.mjGEOM_BOX:
-            return trimesh.creation.box(extents=2 * size)
-        case kinds.mjGEOM_SPHERE:
-            return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
+            return make.box(extents=2 * size).vertices
+        case kinds.mjGEOM_SPHERE | kinds.mjGEOM_ELLIPSOID:
+            return make.icosphere(subdivisions=2).vertices * model.geom_aabb[geom, 3:]
         case kinds.mjGEOM_CYLINDER:
-            return trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=24)
+            return make.cylinder(radius=size[0], height=2 * size[1], sections=24).vertices
         case kinds.mjGEOM_CAPSULE:
-            return trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[16, 16])
-        case kinds.mjGEOM_ELLIPSOID:
-            return trimesh.creation.icosphere(subdivisions=2, radius=1.0).apply_scale(size)
+            return make.capsule(radius=size[0], height=2 * size[1], count=[16, 16]).vertices
         case _:
             return None

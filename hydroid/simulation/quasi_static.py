@@ -28,7 +28,7 @@ from hydroid.hydraulics.joint import command, move_spool, net_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
 from hydroid.hydraulics.pump import begin_line, come_up, delivery
 from hydroid.hydraulics.records import LINEAR
-from hydroid.simulation.rollout import mujoco_library
+from hydroid.simulation.rollout import mujoco_library, write_sample
 
 for _name in ("mj_kinematics", "mj_comPos", "mj_rne"):
     llvmlite.binding.add_symbol(_name, ctypes.cast(getattr(mujoco_library, _name), ctypes.c_void_p).value)
@@ -45,16 +45,18 @@ SETTLED = 1e-9
 
 
 @compilable
-def rod_speed(c: Any, side: Any, other: Any, w: Any, supply: float, sign: float) -> Any:
+def rod_speed(c: Any, w: Any, supply: float) -> Any:
     """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P.
 
     Args:
-        c: the joint's COEFFICIENTS, `side` and `other` its sides that fill and empty.
-        w: its scratch space: net opening `travel` [m²], load `push` of gravity and springs, dry friction
-            `thrust` [N], damping `drag` [N·s/m]; of a rotary actuator torques and angles.
+        c: the joint's COEFFICIENTS.
+        w: its scratch space: net opening `travel` [m²], above 0 towards A, load `push` of gravity and
+            springs, dry friction `thrust` [N], damping `drag` [N·s/m]; torques and angles of a rotary actuator.
         supply: P [Pa].
-        sign: of the motion, 1 towards A.
     """
+    if w.travel == 0.0:
+        return 0.0, 0.0, 0.0
+    side, other, sign = (c.a, c.b, 1.0) if w.travel > 0.0 else (c.b, c.a, -1.0)
     area, load, drag = abs(w.travel), sign * w.push + w.thrust, w.drag
     pump_edge, tank_edge = c.conductance * area, c.conductance * area * other.return_
     back = (other.area / tank_edge) ** 2 * other.area
@@ -77,16 +79,6 @@ def rod_speed(c: Any, side: Any, other: Any, w: Any, supply: float, sign: float)
 
 
 @compilable
-def directed_speed(c: Any, w: Any, supply: float) -> Any:
-    """`rod_speed` of a joint in the direction of its valve."""
-    if w.travel > 0.0:
-        return rod_speed(c, c.a, c.b, w, supply, 1.0)
-    if w.travel < 0.0:
-        return rod_speed(c, c.b, c.a, w, supply, -1.0)
-    return 0.0, 0.0, 0.0
-
-
-@compilable
 def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any) -> float:
     """Pressure of the line [Pa] at which the actuators take what the pump gives with its φ at `share`.
 
@@ -101,7 +93,7 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any)
         for a in range(plugin.idle, plugin.order.size):
             j = plugin.order[a]
             c = plugin.coefficients[j]
-            _, flow, rise = directed_speed(c, work[j], min(pressure, c.supply_pressure))
+            _, flow, rise = rod_speed(c, work[j], min(pressure, c.supply_pressure))
             excess += flow
             if pressure <= c.supply_pressure:
                 slope += rise
@@ -224,13 +216,10 @@ def roll_quasi_static(
             j, place = order[a], arm.columns[order[a]]
             c, z, w = plugin.coefficients[j], state[j], pad.joints[j]
             supply = min(pressure, c.supply_pressure)
-            speed = directed_speed(c, w, supply)[0]
+            speed = rod_speed(c, w, supply)[0]
             after = z.angle + period * (speed if w.travel > 0.0 else -speed) / w.arm
             after = min(max(after, min(arm.limits[place, 0], z.angle)), max(arm.limits[place, 1], z.angle))
             arm.angle[place], z.velocity = after, (after - z.angle) / period
             if observed:
                 store_oil(c, z, w, supply, speed, after)
-        if (k + 1) % arm.steps == 0:
-            record.angle[k // arm.steps] = arm.angle
-            if record.states.size:
-                record.states[k // arm.steps] = state
+        write_sample(arm, record, state, k)

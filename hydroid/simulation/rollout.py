@@ -23,6 +23,7 @@ from numba import njit, types
 from numba.core import event
 from numpy.typing import NDArray
 
+from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE, Array
 
@@ -179,6 +180,15 @@ def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
     return addresses[threading.get_ident()]
 
 
+@compilable
+def write_sample(arm: Any, record: Any, state: Any, k: int) -> None:
+    """Record the sample that step k ends, if it ends one."""
+    if (k + 1) % arm.steps == 0:
+        record.angle[k // arm.steps] = arm.angle
+        if record.states.size:
+            record.states[k // arm.steps] = state
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def roll(arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
@@ -195,10 +205,7 @@ def roll(arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source:
         if arm.warnings.any():
             return
         take_over(plugin, state, arm, pad)
-        if (k + 1) % arm.steps == 0:
-            record.angle[k // arm.steps] = arm.angle
-            if record.states.size:
-                record.states[k // arm.steps] = state
+        write_sample(arm, record, state, k)
 
 
 class _Announcement(event.Listener):

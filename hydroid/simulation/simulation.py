@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, Array, has_force_curve
@@ -23,7 +24,6 @@ from hydroid.simulation.chain import Chain
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
 from hydroid.simulation.scenario import Candidates, Response, Scenario
-from hydroid.simulation.sensor import reading
 
 Follow = Callable[[SteppedArm, int], tuple[Array, Observation | None]]
 """simulates one of n candidates: angles of the moving joints [rad], (1 + T, V), and what its actuators do"""
@@ -131,3 +131,21 @@ class Simulation:
             return angle, observe(one.coefficients, record, angle[:, chain.columns]) if observed else None
 
         return follow
+
+
+def reading(angle: Array, sensors: NDArray[np.void], period: float) -> Array:
+    """Return what the sensors of K joints read, shape (T, K) like their angles [rad], `period` [s] apart.
+
+    That is the turn since the start times a scale, with a first-order lag (ours).
+    Between samples an angle is taken for a straight line. A reading starts at the angle, at rest. With scale
+    1 and no lag it is the angle, to the bit.
+    """
+    scale, lag = sensors["sensor_scale"], sensors["sensor_lag"]
+    if np.all(scale == 1.0) and np.all(lag == 0.0):
+        return angle
+    turned = scale * (angle - angle[0])
+    for k in np.flatnonzero(lag):
+        left = np.exp(-period / lag[k])
+        mean = (1.0 - left) * lag[k] / period
+        turned[:, k] = lfilter([1.0 - mean, mean - left], [1.0, -left], turned[:, k])
+    return angle[0] + turned

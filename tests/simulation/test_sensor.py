@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hydroid.simulation.sensor import reading
+from hydroid.simulation.simulation import reading
 
 TIME = 0.01 * np.arange(300)
 

@@ -51,7 +51,7 @@ def rod_speed(c: Any, w: Any, supply: float) -> Any:
     Args:
         c: the joint's COEFFICIENTS.
         w: its scratch space: net opening `travel` [m²], above 0 towards A, load `push` of gravity and
-            springs, dry friction `thrust` [N], damping `drag` [N·s/m]; torques and angles of a rotary actuator.
+            springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of a rotary actuator torques.
         supply: P [Pa].
     """
     if w.travel == 0.0:

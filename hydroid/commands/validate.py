@@ -70,7 +70,7 @@ def validate(
     from hydroid.fitting.verdict import judge
     from hydroid.reporting.fit_report import draw
     from hydroid.reporting.page import unique
-    from hydroid.reporting.validation_report import validation_page
+    from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
     from hydroid.run.identity import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
@@ -154,7 +154,7 @@ def report(
 
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
-    from hydroid.reporting.validation_report import merged_tables
+    from hydroid.reporting.parameters_report import merged_tables
     from hydroid.run.collection import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], out)

@@ -13,11 +13,12 @@ from hydroid.reporting import page_file
 from hydroid.reporting.page import Page, Section
 from hydroid.reporting.parameters_report import (
     parameter_section,
+    quantity_section,
+    speed_section,
     unknown_sections,
     warnings,
 )
 from hydroid.reporting.predictions import prediction_sections
-from hydroid.reporting.quantities_report import quantity_section, speed_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.verdict_table import lead, next_step, verdict_section

@@ -6,13 +6,14 @@ from itertools import cycle
 
 import numpy as np
 
+from hydroid.findings import Finding
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import motion_section
-from hydroid.reporting.page import Plot, Section, Tab, log_names, short_name
+from hydroid.reporting.page import Page, Plot, Section, Tab, log_names, short_name
 from hydroid.reporting.table import Table
-from hydroid.reporting.verdict_table import Verdicts, horizon_section
+from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, verdict_section
 from hydroid.settings.arm import Arm
 from hydroid.words import number
 
@@ -116,3 +117,10 @@ def draw_response(
     command = Mark("step", log.time, log.command[:, column], color="grey")
     panels.append(Panel("time [s]", "command [%]", (command,), height=140, y_limits=(-108, 108)))
     return Chart(tuple(panels), linked=True, bins=bins)
+
+
+def validation_page(predictions: Sequence[Prediction], fits: Verdicts, arm: Arm, *steps: Finding) -> Page:
+    """Return the page of several fits on several logs; its tables are `verdict`, `errors` and `horizons`."""
+    ordered = sorted(predictions, key=lambda p: p.unseen is not True)
+    sections = verdict_section(fits, *steps), *prediction_sections(ordered, arm, fits)
+    return Page("validation", "Validation", lead(fits), sections)

@@ -19,8 +19,8 @@ from hydroid.fitting.verdict import judge
 from hydroid.reporting.fit_report import fit_page
 from hydroid.reporting.page import Page, Section
 from hydroid.reporting.page_file import html, write_figures, write_page
+from hydroid.reporting.predictions import validation_page
 from hydroid.reporting.table import Table
-from hydroid.reporting.validation_report import validation_page
 from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
 
 HOSTILE = "<b>&_%$.csv"

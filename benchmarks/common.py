@@ -2,14 +2,13 @@
 
 import argparse
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.estimate import read_estimate
 from hydroid.fitting.refinement import refine
 from hydroid.log import Log
@@ -58,6 +57,42 @@ class Clock:
     def __str__(self) -> str:
         wall, cpu = time.perf_counter() - self._begun[0], time.process_time() - self._begun[1]
         return f"{wall:.0f} s, {cpu:.0f} s of CPU"
+
+
+def pseudo_random_log(
+    pose: np.ndarray,
+    joints: list[int],
+    duration: float = 75.0,
+    period: float = 0.01,
+    seed: int = 0,
+    allowed: Callable[[Log], bool] = lambda log: True,
+) -> Log:
+    """Make a log of commands without motion: `joints` (1-based) driven, every joint at `pose` [rad].
+
+    Levels and dwells are random, as in the article's figure 17.
+
+    A level after which `allowed` is false of the log so far is turned round or reduced, as by an operator who
+    keeps the arm off its stops.
+    """
+    rng = np.random.default_rng(seed)
+    samples = round(duration / period)
+    command = np.zeros((samples, len(pose)))
+
+    def upto(end: int) -> Log:
+        angle = np.tile(pose, (end, 1))
+        return Log("pseudo-random", np.arange(end, dtype=float) * period, command[:end], angle, period)
+
+    for joint in joints:
+        start = 0
+        while start < samples:
+            dwell = round(rng.uniform(1.0, 5.0) / period)
+            level = rng.uniform(-100.0, 100.0)
+            for factor in (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0):
+                command[start : start + dwell, joint - 1] = round(factor * level, 1)
+                if allowed(upto(min(start + dwell, samples))):
+                    break
+            start += dwell
+    return upto(samples)
 
 
 def true_log(

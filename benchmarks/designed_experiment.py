@@ -23,9 +23,8 @@ import numpy as np
 from common import ARTICLE_TRUTH, Clock, noisy, options, refined, table
 
 from hydroid import load_settings
-from hydroid.advice.design import design
+from hydroid.advice.design import ExperimentSimulator, design
 from hydroid.advice.experiment import RandomExperiments
-from hydroid.advice.information import ExperimentSimulator
 from hydroid.log import Log
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.prediction import simulate_log

@@ -13,10 +13,9 @@ both, lowers the error on the halves left out. It is first where nothing ranks b
 from dataclasses import replace
 
 import numpy as np
-from common import near, options, refined, row, table
+from common import near, options, pseudo_random_log, refined, row, table
 
 from hydroid import load_settings
-from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.advice.suggestions import advice
 from hydroid.arm.model import load_model
 from hydroid.log import Log

@@ -13,11 +13,10 @@ from functools import partial
 
 import mujoco
 import numpy as np
-from common import ARTICLE_TRUTH, row, table
+from common import ARTICLE_TRUTH, pseudo_random_log, row, table
 from mujoco.batch import Batch
 
 from hydroid import load_settings
-from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
 from hydroid.plant import load_plant

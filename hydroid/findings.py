@@ -118,19 +118,10 @@ WORDS: dict[str, tuple[str, str]] = {
     ),
     # an assumption
     "sign doubted": (
-        "The logs contradict the sign of {0}'s angle: turned round, the error falls from {before:.2g}° "
-        "to {after:.2g}°.",
+        "The logs contradict the sign of {0}'s angle: turned round, the arm's weight explains its speeds "
+        "better.",
         "Does gravity pull it the other way? Then set scale: -1 for its angle and its command, or turn the "
         "axis in the arm's model, and fit again. Change one joint at a time.",
-    ),
-    "zero doubted": (
-        "The logs prefer another zero of {0}'s angle: with {change:.0f}° added the error falls from "
-        "{before:.2g}° to {after:.2g}°.",
-        "Check where the arm's model has its 0, or set log.joints.{0}.angle.offset.",
-    ),
-    "scale doubted": (
-        "The logs prefer {change:g} times {0}'s angle: the error falls from {before:.2g}° to {after:.2g}°.",
-        "Check the unit and log.joints.{0}.angle.scale.",
     ),
     "columns exchanged": (
         "{0} moves with the command of {1}, and {1} with that of {0}.",

@@ -1,5 +1,6 @@
 """The article's studies: cells and seeds, the truth, what is shown, and what is claimed."""
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -8,11 +9,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from common import pseudo_random_log
 from measures import Directions, true_directions, with_truth
 from pydantic import Field
 
 from hydroid import read_logs
-from hydroid.advice.pseudo_random import pseudo_random_log
 from hydroid.errors import RunError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log

@@ -1,260 +1,176 @@
-"""Tests of what a fit takes for granted: which way an angle counts, where its 0 is, its scale, its columns.
+"""Tests of what a fit takes for granted: which way an angle counts, and which columns are whose.
 
-A wrong sign turns gravity round. A fit hides much of that behind other parameters, but not how the load
-changes with the pose. Two fits tell, each of a few steps of least squares with the quasi-static model on a
-few logs, as assumed and with the assumption changed. First a joint alone, while the others follow their
-logged motion. If the change is better there, all joints together: a change that only makes up for
-another error of the model spoils the load of other joints. With n independent samples, and sums of squares S
-and S' of residuals and priors, the logs make the change more likely by the factor (S / S')^(n/2).
+Gravity slows what lifts and speeds up what lowers. So a joint's speed follows its command, late and unevenly,
+times what its lever arm and the pump do, less a part in proportion to the load: the torque that holds the arm
+in its pose. This law is linear in its unknowns, and needs no simulation. Where the angle of a joint counts
+the wrong way, the loads are those of other poses. With n independent samples, and sums of squares S and S' of
+what the laws of all joints leave, the logs make a joint turned round more likely by (S / S')^(n/2).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
 from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.parameters import Array
-from hydroid.posterior.noise import prior_weight, problem_noise
-from hydroid.problem.problem import Problem
-from hydroid.search.least_squares import least_squares
+from hydroid.posterior.noise import fit_noise
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.search import RefinementSettings
 
-Kind = Literal["sign", "zero", "scale"]
-CHANGES: Mapping[Kind, tuple[float, ...]] = {"sign": (-1.0,), "zero": (-20.0, 20.0), "scale": (0.5, 2.0)}
-"""of a logged angle: factor on it and on its command, degrees that are added to it, factor on it"""
-DOUBTED: Mapping[Kind, str] = {"sign": "sign doubted", "zero": "zero doubted", "scale": "scale doubted"}
-"""kinds of findings"""
-ENOUGH = 4.0
-"""evidence that names a joint: the change is 55 times as likely"""
-LOWER = 0.97
-"""part of the rms error that the change must leave at most"""
-LIKELY = 2.0
-"""evidence of a joint alone below which a change is not tried on all joints"""
-MOST_TRIED = 2
-"""changes that are tried on all joints"""
-MOST_LOGS = 4
-"""logs that are fitted again, spread over all"""
-SHORT = RefinementSettings(iterations=8, gain_tolerance=0.01)
-LONG = RefinementSettings(iterations=40, gain_tolerance=1e-3)
-TINY = np.finfo(float).tiny
+ENOUGH = 6.0
+"""evidence that names a joint: turned round is 400 times as likely"""
+LOWER = 0.99
+"""part of the laws' rms error, on geometric average, that turning a joint round must leave at most"""
 FOLLOWED = 0.2
 """by how much a joint's speed must correlate better with another joint's command than with its own"""
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """An assumption about one joint (number, from 1) that the logs contradict.
-
-    change: of the logged angle, as CHANGES has it. rms_deg: of all compared angles as assumed, and with the
-    change. evidence: logarithm of how much more likely the logs make the change.
-    """
-
-    kind: Kind
-    joint: int
-    change: float
-    rms_deg: tuple[float, float] = (np.inf, np.inf)
-    evidence: float = -np.inf
-
-    @property
-    def holds(self) -> bool:
-        """Whether the logs contradict the assumption clearly."""
-        return self.evidence >= ENOUGH and self.rms_deg[1] < LOWER * self.rms_deg[0]
+PERIOD, WINDOW, LATEST = 0.05, 0.2, 0.8
+"""of the samples; over which speeds and commands are averaged; from a command to its effect at most [s]"""
+TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)
+"""between the commands that a speed follows [s]"""
+KNOTS = np.linspace(-100.0, 100.0, 11)
+"""of the piecewise linear effect of each of them [%]"""
+FROM_STOPS, FROM_ZERO = 0.02, 3.0
+"""angle from a stop [rad], and largest command [%], above which a sample counts"""
+TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
-class _Refit:
-    """What some logs say of a model with some joints compared.
+class _Motion:
+    """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints, shape (n, J).
 
-    weight: of the priors. values: by name, at the best fit so far, with half its sum of squares, `cost`.
-    rms_deg: of the angles there. samples: independent ones.
+    joints: those that a log drives and all measure, 0-based. commands: means of each log's, shape (m, J) [%],
+    over windows that begin `period` [s] after each other.
     """
 
-    settings: FitSettings
-    logs: Sequence[Log]
-    weight: float
-    values: Mapping[str, float]
-    cost: float = np.inf
-    rms_deg: float = np.inf
-    samples: float = 0.0
+    joints: list[int]
+    period: float
+    speed: Array
+    angle: Array
+    commands: Sequence[Array]
 
-    def evidence(self, other: "_Refit") -> float:
-        """Logarithm of how much more likely another model is, for the same logs."""
-        return float(0.5 * self.samples * np.log(max(self.cost, TINY) / max(other.cost, TINY)))
+    def command(self, joint: int, earlier: int) -> Array:
+        """A joint's commands some windows earlier, shape (n,)."""
+        columns = [np.pad(one[:, joint], (earlier, 0), "edge")[: len(one)] for one in self.commands]
+        return np.concatenate(columns)
+
+    def follows(self, joint: int, other: int) -> tuple[float, int]:
+        """How a joint's speed correlates with a joint's command, and the windows after which it does most."""
+        speed, found = self.speed[:, joint] - self.speed[:, joint].mean(), list[tuple[float, int]]()
+        for late in range(round(LATEST / self.period) + 1):
+            command = self.command(other, late)
+            command -= command.mean()
+            size = np.linalg.norm(command) * np.linalg.norm(speed)
+            found.append((float(abs(command @ speed) / max(size, TINY)), -late))
+        best, late = max(found)
+        return best, -late
 
 
-def doubts(problem: Problem, theta: Array, kinds: Sequence[Kind] = ("sign",)) -> tuple[Doubt, ...]:
-    """Test assumptions about every compared joint at an estimate, shape (P,); what is doubted most first.
+def doubts(settings: FitSettings, logs: Sequence[Log]) -> dict[int, float]:
+    """Return the joints (number, from 1) whose logged angle counts the wrong way, with the evidence for it.
 
-    Stage 1, and logs that do not measure how each driven joint moves, cannot tell.
+    The clearest comes first. Stage 1 has no law of speed.
     """
-    settings, values = problem.settings, problem.parameters.mapping(theta)
-    if settings.stage != "hyd" or not all(log.measured[log.driven].all() for log in problem.logs):
-        return ()
-    logs = [_coarse(log) for log in problem.logs]
-    likely = list[tuple[Doubt, _Refit]]()
-    for joint in settings.outputs:
-        own = [log.driving(joint) for log in logs if log.driven[joint - 1]]
-        if own and settings.acting_on(joint):
-            before = _begun(_of_joint(settings, joint, values), own, values)
-            for kind in kinds:
-                tests = (_tested(before, Doubt(kind, joint, change)) for change in CHANGES[kind])
-                best = max(tests, key=lambda test: test[0].evidence)
-                likely += [best] if best[0].evidence >= LIKELY else []
-    if not likely or len(settings.outputs) == 1:
-        return tuple(doubt for doubt, _ in likely if doubt.holds)
-    whole = _begun(_quasi_static(settings), logs, values)
-    likely = sorted(likely, key=lambda one: -one[0].evidence)[:MOST_TRIED]
-    found = [_tested(whole, doubt, alone.values)[0] for doubt, alone in likely]
-    return tuple(sorted((one for one in found if one.holds), key=lambda one: -one.evidence))
+    motion, laws = _motion(settings, logs), dict[int, Callable[[Array], Array]]()
+    for joint in motion.joints:
+        if settings.stage == "hyd" and joint + 1 in settings.outputs:
+            laws |= _law(settings, motion, joint)
+    model, numbers = load_model(settings.arm).compile(), np.arange(len(settings.arm.joints))
+
+    def left(turned: int | None = None) -> list[Array]:
+        signs = np.where(numbers == turned, -1.0, 1.0)
+        loads = signs * _loads(model, signs * motion.angle)
+        return [law(loads[:, joint]) for joint, law in laws.items()]
+
+    before, found = left(), dict[int, float]()
+    samples = [fit_noise(one).effective_sample_size for one in before]
+    for joint in laws:
+        sizes = np.array([[np.linalg.norm(one) for one in each] for each in (before, left(joint))])
+        gains = np.log(sizes[0] / sizes[1])
+        evidence = float(np.dot(samples, gains))
+        if evidence >= ENOUGH and gains.mean() > -np.log(LOWER):
+            found[joint + 1] = evidence
+    return dict(sorted(found.items(), key=lambda one: -one[1]))
 
 
-def _coarse(log: Log) -> Log:
-    """Return a log with no more than 20 samples a second, its commands averaged."""
-    step = max(round(0.05 / log.period), 1)
-    size = len(log.time) // step * step
-    command = log.command[:size].reshape(-1, step, log.joints).mean(axis=1)
-    kept = {"time": log.time[:size:step], "angle": log.angle[:size:step], "period": step * log.period}
-    rest = None if log.rest is None else log.rest // step
-    return log if step == 1 else replace(log, **kept, command=command, pressure=None, rest=rest)
-
-
-def _quasi_static(settings: FitSettings) -> FitSettings:
-    return settings.changed({"simulation.model": "quasi-static", "free_start": False})
-
-
-def _of_joint(settings: FitSettings, joint: int, values: Mapping[str, float]) -> FitSettings:
-    """Return the settings of one joint alone, what it shares with others free."""
-    others = {n for other in settings.outputs if other != joint for n in settings.acting_on(other)}
-    held = {n: settings.parameters[n].changed({"fixed": values[n]}) for n in others}
-    priors = {n: p for n, p in settings.priors.items() if others.isdisjoint(p.factors)}
-    alone = _quasi_static(settings.with_parameters(held))
-    changes = {"outputs": (joint,), "simulation.other_joints": "measured", "priors": priors}
-    return alone.changed(changes)
-
-
-def _begun(settings: FitSettings, logs: Sequence[Log], values: Mapping[str, float]) -> _Refit:
-    """Refine a model as it is, on some of the logs."""
-    chosen = logs[:: -(-len(logs) // MOST_LOGS)]
-    problem = Problem(settings, chosen)
-    row = problem.residuals(problem.parameters.started(values)[None])[0]
-    weight = prior_weight(problem, row)
-    return _refined(_Refit(settings, chosen, weight, values), problem)
-
-
-def _refined(begun: _Refit, problem: Problem, how: RefinementSettings = SHORT) -> _Refit:
-    """Refine from its values, and from those before any fit: a wrong sign leads far from the right ones.
-
-    With several joints only the masses are as before any fit.
-    """
-    parameters, values = problem.parameters, begun.values
-    first = parameters.mapping(parameters.start)
-    if len(problem.settings.outputs) > 1:
-        first = {n: v for n, v in first.items() if problem.settings.parameters[n].link is not None}
-
-    def rows(unit: Array) -> Array:
-        theta = parameters.from_unit(unit)
-        return np.hstack([problem.residuals(theta), begun.weight * problem.priors.scores(theta)])
-
-    starts = (parameters.to_unit(parameters.started(one)) for one in (values, {**values, **first}))
-    end = min((least_squares(start, rows, how) for start in starts), key=lambda end: end.cost)
-    if not end.cost < begun.cost:
-        return begun
-    error = end.residual[: problem.measured.size]
-    return replace(
-        begun,
-        values={**values, **parameters.mapping(parameters.from_unit(end.point))},
-        cost=end.cost,
-        rms_deg=float(np.degrees(problem.rms(error[None])[0])),
-        samples=sum(one.effective_sample_size for one in problem_noise(problem, error)),
-    )
-
-
-def _tested(before: _Refit, doubt: Doubt, start: Mapping[str, float] | None = None) -> tuple[Doubt, _Refit]:
-    """Test one assumption, from values that have it changed or that are to be changed.
-
-    A change that helps must still do so where the fit without it goes on from it.
-    """
-    kind, change = doubt.kind, doubt.change
-    after = _changed(before, doubt, start or _moved_alike(before, before.values, doubt, change))
-    if before.evidence(after) >= ENOUGH:
-        back = replace(before, values=_moved_alike(before, after.values, doubt, 1 / change))
-        before = _refined(back, Problem(before.settings, before.logs), LONG)
-        after = _changed(before, doubt, after.values, LONG)
-    rms = (before.rms_deg, after.rms_deg)
-    return Doubt(kind, doubt.joint, change, rms, before.evidence(after)), after
-
-
-def _changed(
-    before: _Refit, doubt: Doubt, values: Mapping[str, float], how: RefinementSettings = SHORT
-) -> _Refit:
-    """Refine with an assumption about a joint changed, from some values; the joint's stops move with it."""
-    arm, spec, kind = before.settings.arm, load_model(before.settings.arm), doubt.kind
-    own = np.arange(len(arm.joints)) == doubt.joint - 1
-    factor, shift = (1.0, np.radians(doubt.change)) if kind == "zero" else (doubt.change, 0.0)
-    factors, signs = np.where(own, factor, 1.0), np.where(own & (kind == "sign"), -1.0, 1.0)
-    logs = [
-        replace(log, angle=factors * log.angle + shift * own, command=signs * log.command)
-        for log in before.logs
-    ]
-    joint = spec.joint(arm.joint_names[doubt.joint - 1])
-    joint.range = np.sort(factor * np.array(joint.range) + shift)
-    weights = before.settings.objective.weights
-    weights = weights | {doubt.joint: weights.get(doubt.joint, 1.0) / abs(factor)}
-    settings = before.settings.changed({"objective.weights": weights})
-    return _refined(replace(before, values=values, cost=np.inf), Problem(settings, logs, spec=spec), how)
-
-
-def _moved_alike(
-    before: _Refit, values: Mapping[str, float], doubt: Doubt, factor: float
-) -> dict[str, float]:
-    """Return values that move a changed joint as before: sides exchanged, or openings for other speeds."""
-    after = dict(values)
-    own = {p.quantity: n for n, p in before.settings.parameters.items() if p.joints == (doubt.joint,)}
-    for quantity, name in own.items():
-        other = own.get(f"{quantity[:-1]}b") if quantity.endswith("_a") else None
-        if doubt.kind == "sign" and other and not quantity.startswith("area"):
-            after[name], after[other] = values[other], values[name]
-        elif doubt.kind == "sign" and quantity == "lever_slope":
-            after[name] = -values[name]
-        elif doubt.kind == "scale" and quantity in ("opening", "opening_a", "opening_b"):
-            after[name] = factor * values[name]
-    return after
-
-
-def exchanged(logs: Sequence[Log]) -> tuple[tuple[int, int], ...]:
+def exchanged(settings: FitSettings, logs: Sequence[Log]) -> tuple[tuple[int, int], ...]:
     """Return pairs of joints (numbers, from 1) each of which follows the other's command, not its own."""
-    joints = np.flatnonzero(np.all([log.driven & log.measured for log in logs], axis=0)).tolist()
-    follows = {(j, k): _follows(logs, j, k) for j in joints for k in joints} if len(joints) > 1 else {}
-
-    def prefers(j: int, k: int) -> bool:
-        return follows[j, k] > follows[j, j] + FOLLOWED
-
-    pairs = ((j, k) for j in joints for k in joints if j < k and prefers(j, k) and prefers(k, j))
-    return tuple((j + 1, k + 1) for j, k in pairs)
+    motion = _motion(settings, logs)
+    follows = {(j, k): motion.follows(j, k)[0] for j in motion.joints for k in motion.joints}
+    prefers = {(j, k) for (j, k), size in follows.items() if size > follows[j, j] + FOLLOWED}
+    return tuple((j + 1, k + 1) for j, k in sorted(prefers) if j < k and (k, j) in prefers)
 
 
-def _follows(logs: Sequence[Log], joint: int, other: int) -> float:
-    """Largest correlation over all logs of a joint's speed with a joint's command up to 0.8 s earlier."""
-    coarse = [_coarse(log) for log in logs]
-    best, longest = 0.0, round(0.8 / coarse[0].period)
-    for late in range(min(longest, min(len(log.time) for log in coarse) - 3) + 1):
-        command = [log.command[: len(log.time) - late - 1, other] for log in coarse]
-        speed = [np.diff(log.angle[late:, joint]) for log in coarse]
-        best = max(best, abs(np.corrcoef(np.concatenate(command), np.concatenate(speed))[0, 1]))
-    return float(best)
-
-
-def assumption_findings(problem: Problem, doubted: Sequence[Doubt]) -> Iterator[Finding]:
-    """Yield what the logs contradict, by the joints' names."""
-    names = problem.settings.arm.joint_names
-    for j, k in exchanged(problem.logs):
+def assumption_findings(
+    settings: FitSettings, logs: Sequence[Log], doubted: Mapping[int, float]
+) -> Iterator[Finding]:
+    """Yield what the logs contradict, by the joints' names; `doubted`: what `doubts` returns."""
+    names = settings.arm.joint_names
+    for j, k in exchanged(settings, logs):
         yield Finding("columns exchanged", "warning", (names[j - 1], names[k - 1]))
-    for doubt in doubted:
-        before, after = doubt.rms_deg
-        numbers = {"before": before, "after": after, "change": doubt.change}
-        yield Finding(DOUBTED[doubt.kind], "warning", (names[doubt.joint - 1],), numbers)
+    for joint, evidence in doubted.items():
+        yield Finding("sign doubted", "warning", (names[joint - 1],), {"evidence": evidence})
+
+
+def _motion(settings: FitSettings, logs: Sequence[Log]) -> _Motion:
+    """The motion in all logs that are long enough and show the pose; what is not driven may be unmeasured."""
+    step = max(round(PERIOD / logs[0].period), 1)
+    period, pose = step * logs[0].period, settings.arm.pose(settings.start_pose)
+    width, windows = step * max(round(WINDOW / period), 1), list[tuple[Array, ...]]()
+    shortest = 2 * LATEST + WINDOW
+    logs = [log for log in logs if log.duration > shortest and log.measured[log.driven].all()]
+    for log in logs:
+        angle = np.where(log.measured, log.angle, pose)
+        begin, end = angle[:-width:step], angle[width::step]
+        total = np.cumsum(np.pad(log.command, ((1, 0), (0, 0))), axis=0)
+        command = (total[width:-1:step] - total[: -width - 1 : step]) / width
+        windows.append(((end - begin) / (width * log.period), (end + begin) / 2, command))
+    if not windows:
+        return _Motion([], period, pose[None], pose[None], ())
+    driven, measured = (np.array([getattr(log, what) for log in logs]) for what in ("driven", "measured"))
+    speed, angle, commands = zip(*windows, strict=True)
+    joints = np.flatnonzero(driven.any(axis=0) & measured.all(axis=0)).tolist()
+    return _Motion(joints, period, np.concatenate(speed), np.concatenate(angle), commands)
+
+
+def _law(settings: FitSettings, motion: _Motion, joint: int) -> dict[int, Callable[[Array], Array]]:
+    """What a joint's law leaves of its speeds, by loads, shape (n,); nothing where it moves too little."""
+    taps = [round(tap / motion.period) for tap in TAPS]
+    first = max(motion.follows(joint, joint)[1] - taps[-1] // 2, 0)
+    commands = np.stack([motion.command(joint, first + tap) for tap in taps], axis=1)
+    angle, (low, high) = motion.angle[:, joint], settings.arm.joints[joint].limits
+    used = (angle > low + FROM_STOPS) & (angle < high - FROM_STOPS)
+    used &= np.abs(commands).max(axis=1) > FROM_ZERO
+    angle, speeds = angle[used], motion.speed[used]
+    hats = np.maximum(1 - np.abs(commands[used, :, None] - KNOTS) / (KNOTS[1] - KNOTS[0]), 0)
+    rows = hats.reshape(len(hats), -1)
+    rows = rows[:, rows.sum(axis=0) > 3]
+    if len(rows) < 2 * rows.shape[1] or not speeds[:, joint].any():
+        return {}
+    speed = rows @ np.linalg.lstsq(rows, speeds[:, joint])[0]
+    off, others = angle - angle.mean(), speeds[:, [k for k in motion.joints if k != joint]]
+    factors = np.column_stack([off, off**2, np.maximum(others, 0), np.minimum(others, 0)])
+    basis, sizes, _ = np.linalg.svd(np.hstack([rows, speed[:, None] * factors]), full_matrices=False)
+    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    rest = speeds[:, joint] - basis @ (basis.T @ speeds[:, joint])
+
+    def left(load: Array) -> Array:
+        """A load slows what lifts it; it cannot do the contrary."""
+        effect = -np.abs(speed) * load[used]
+        effect -= basis @ (basis.T @ effect)
+        return rest - max(effect @ rest, 0.0) / max(effect @ effect, TINY) * effect
+
+    return {joint: left}
+
+
+def _loads(model: mujoco.MjModel, poses: Array) -> Array:
+    """Torques or forces of all joints that hold an arm in poses, shape (n, J)."""
+    data, loads = mujoco.MjData(model), np.empty_like(poses)
+    for pose, load in zip(poses, loads, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_rne(model, data, 0, load)
+    return loads

@@ -3,39 +3,159 @@
 Optimal experiment design (V. V. Fedorov, 1972; E. Walter and L. Pronzato, 1997) by random draws and random
 changes of the best. The design is local: motions and sensitivities are simulated at the present estimate.
 Where that is far from the truth, design again after the next fit.
+Only the simulated motion is kept within the limits; an arm that differs from the model moves differently.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
-from hydroid.advice.experiment import RandomExperiments
-from hydroid.advice.information import PRIOR_SD, ExperimentSimulator, Trial, forecast
+from hydroid.advice.experiment import (
+    Experiment,
+    RandomExperiments,
+    Violation,
+    experiment_samples,
+    repaired,
+    violation,
+)
+from hydroid.arm.model import load_machine, load_model
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
+from hydroid.posterior.noise import Noise
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.priors import Priors
-from hydroid.problem.problem import Problem
+from hydroid.problem.problem import Problem, make_simulation
 from hydroid.progress import Progress, no_progress
+from hydroid.search.axes import differentiate
+from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
+
+PRIOR_SD = 1.0
+"""relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is
+so weak that a direction which stays unknown would outweigh all that an experiment can do"""
+
+
+def forecast(known: Posterior) -> Posterior:
+    """Return what is known if every parameter is known to PRIOR_SD at least."""
+    return known.add(np.eye(len(known.root)) / PRIOR_SD)
+
+
+def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
+    """Return rows N of the information N' N that a least-squares fit gains from signals, shape (p, p)."""
+    parts = [(slopes @ slopes.T, noise.covariance_of(slopes)) for slopes, noise in signals]
+    bread, scatter = np.sum(parts, axis=0)
+    floor = 1e-12 * np.trace(scatter) + np.finfo(float).tiny
+    lower = np.linalg.cholesky(scatter + floor * np.eye(len(scatter)))
+    return np.asarray(solve_triangular(lower, bread, lower=True), dtype=float)
+
+
+def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise:
+    """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
+    level, time = float(np.radians(settings.noise_deg)), settings.noise_correlation_s
+    reflection = np.array([-np.exp(-period / time)]) if time > 0 else np.empty(0)
+    return Noise(samples, level, reflection, "settings")
+
+
+class Trial(NamedTuple):
+    """A simulated experiment that keeps the limits.
+
+    experiment: its commands. gained: rows of its information (`measured`), shape (p, p). log: its commands
+    with the simulated angles.
+    """
+
+    experiment: Experiment
+    gained: Array
+    log: Log
+
+
+class ExperimentSimulator:
+    """Simulates experiments at an estimate within the limits of the settings."""
+
+    def __init__(self, settings: FitSettings, known: Posterior) -> None:
+        if settings.simulation.other_joints == "measured":  # an experiment has no measured motion
+            settings = settings.changed({"simulation.other_joints": "locked"})
+        self._settings, self._design, self._bindings = settings, settings.design, Bindings(settings)
+        self._outputs, self._period = [j - 1 for j in settings.outputs], settings.log.period_s
+        self._noise = sensor_noise(settings.design, experiment_samples(settings), self._period)
+        arm, margin = settings.arm, settings.design.clearance_m
+        self._spec, self._pose = load_model(arm), arm.pose(settings.start_pose)
+        self._machine = None if margin is None else load_machine(arm, pair=arm.pair is not None)
+        self._box, self._axes = known.box, known.axes(1e-5).one_sided  # little curvature
+
+    def trial(self, experiment: Experiment) -> Trial | None:
+        """Return the experiment, changed to keep the limits, with its information; None where it cannot."""
+        kept = self.within_limits(experiment)
+        gained = None if kept is None else self.information(kept[0], kept[1].angle)
+        return None if kept is None or gained is None else Trial(kept[0], gained, kept[1])
+
+    def within_limits(self, experiment: Experiment) -> tuple[Experiment, Log] | None:
+        """Reverse or reduce levels until the experiment keeps the limits; return it and its predicted log.
+
+        None where it still breaks them, or its simulation diverges.
+        """
+        for _ in range(60):
+            (angle,) = self._simulate(experiment, self._box.at[None])
+            if not np.isfinite(angle).all():
+                return None
+            first = violation(angle, self._period, self._settings.arm, self._design)
+            first = first or self._too_near(angle)
+            if first is None:
+                return experiment, replace(experiment.log(self._settings), angle=angle)
+            if first.sample == 0:
+                return None  # the start pose itself
+            experiment = repaired(experiment, first)
+        return None
+
+    def _too_near(self, angle: Array) -> Violation | None:
+        """Where a motion [rad], shape (T, J), first brings bodies nearer to each other than the margin."""
+        if (machine := self._machine) is None:
+            return None
+        motion, margin = machine.joined({machine.sides[0]: angle}, self._pose), self._design.clearance_m
+        if (found := machine.checker.first_below(motion, margin or 0.0)) is None:
+            return None
+        # the cause is the joint that turned most lately; joints far out on the arm count as the others do
+        turned = np.ptp(angle[max(0, found[0] - 20) : found[0] + 1], axis=0)
+        return Violation(found[0], int(np.argmax(turned)), False)
+
+    def information(self, experiment: Experiment, angle: Array) -> Array | None:
+        """Return the information of an experiment whose angles are known, (T, J); None where it diverges."""
+
+        def outputs(theta: Array) -> Array:
+            return self._simulate(experiment, theta)[:, :, self._outputs].reshape(len(theta), -1)
+
+        slopes = differentiate(outputs, self._box, self._axes, angle[:, self._outputs].ravel())
+        if not np.isfinite(slopes).all():
+            return None
+        each = np.moveaxis(slopes.reshape(len(slopes), -1, len(self._outputs)), -1, 0)
+        return measured((one, self._noise) for one in each)
+
+    def _simulate(self, experiment: Experiment, theta: Array) -> Array:
+        """All joints' angles [rad] of candidates, (n, P) -> (n, T, J); NaN where one diverged."""
+        log = experiment.log(self._settings)
+        passive = self._settings.simulation.other_joints == "passive"
+        moving = np.flatnonzero(log.driven | passive | np.isin(np.arange(log.joints), self._outputs))
+        simulation = make_simulation(self._spec, log, moving.tolist(), self._settings)
+        response = simulation.simulate(self._bindings.candidates(theta))
+        angle = np.tile(log.angle, (len(theta), 1, 1))
+        angle[:, :, moving] = response.angle
+        angle[~response.feasible] = np.nan
+        return angle
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
-    Attributes:
-        best: the experiment.
-        random: those drawn at random that keep the limits.
-        known: what is known without it.
-        directions: orthonormal basis of the directions that such experiments improve on PRIOR_SD, (p, d). The
-            others stay at it, and must not hide them.
-        names: of the p parameters.
+    random: those drawn at random that keep the limits. known: what is known without it. directions:
+    orthonormal basis of the directions that such experiments improve on PRIOR_SD, (p, d); the others stay at
+    it, and must not hide them. names: of the p parameters.
     """
 
     best: Trial
@@ -60,14 +180,10 @@ class Design:
         """Relative standard deviation of each parameter after a random experiment, the median; (p,)."""
         return np.median([self.known.add(t.gained).deviations for t in self.random], axis=0)
 
-    @property
-    def random_weakest(self) -> float:
-        """Relative standard deviation of the weakest direction after a random experiment, the median."""
-        return float(np.median([self.weakest(self.known.add(t.gained))[0] for t in self.random]))
 
-    def weakest(self, known: Posterior) -> tuple[float, Array]:
-        """Relative standard deviation and unit vector (p,) of the least known of `directions`."""
-        return weakest(known, self.directions)
+def weakest(known: Posterior, directions: Array) -> float:
+    """Relative standard deviation of the least known of some directions, (p, d)."""
+    return float(np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1]))
 
 
 def design(
@@ -109,10 +225,12 @@ def design(
             where="design",
             hint="allow more speed, less margin or clearance, a smaller command, or other poses",
         )
-    directions = _improved(fitted, np.mean([t.gained.T @ t.gained for t in random], axis=0))
+    typical = np.mean([t.gained.T @ t.gained for t in random], axis=0)
+    values, vectors = np.linalg.eigh(fitted.root.T @ fitted.root + typical)
+    directions = vectors[:, (values > 1 / PRIOR_SD**2) | (values == values[-1])]
 
     def score(trial: Trial) -> float:
-        return -weakest(known.add(trial.gained), directions)[0]
+        return -weakest(known.add(trial.gained), directions)
 
     elite = sorted(((score(t), i, t) for i, t in enumerate(random)), reverse=True)[:4]
     for tried in range(first + 1, effort + 1):
@@ -120,21 +238,6 @@ def design(
         child = simulator.trial(experiments.change(parent.experiment))
         if child is not None and score(child) > elite[-1][0]:
             elite = sorted([*elite[:-1], (score(child), tried, child)], reverse=True)
-        least, _ = weakest(known.add(elite[0][2].gained), directions)
-        progress(f"improving: weakest {100 * least:.3g} %", tried, effort)
+        progress(f"improving: weakest {-100 * elite[0][0]:.3g} %", tried, effort)
     names = tuple(np.array(parameters.names)[known.box.varied].tolist())
     return Design(elite[0][2], tuple(random), known, directions, names)
-
-
-def weakest(known: Posterior, directions: Array) -> tuple[float, Array]:
-    """Relative standard deviation and unit vector, (p,), of the least known of some directions, (p, d)."""
-    values, vectors = np.linalg.eigh(directions.T @ known.covariance @ directions)
-    return float(np.sqrt(values[-1])), directions @ vectors[:, -1]
-
-
-def _improved(fitted: Posterior, typical: Array) -> Array:
-    """Directions that experiments with a mean information, (p, p), improve on PRIOR_SD; at least one."""
-    values, vectors = np.linalg.eigh(fitted.root.T @ fitted.root + typical)
-    improved = values > 1 / PRIOR_SD**2
-    improved[-1] = True
-    return vectors[:, improved]

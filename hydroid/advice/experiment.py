@@ -5,6 +5,7 @@ A command is a sequence of levels, each held for a random time, as in the articl
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +20,7 @@ from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
 
 
-@dataclass(frozen=True, eq=False)
-class Input:
+class Input(NamedTuple):
     """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
 
     start: NDArray[np.int64]
@@ -43,23 +43,23 @@ class Experiment:
             held = np.diff(np.append(signal.start, samples))
             command[signal.start[0] :, joint] = np.repeat(signal.level, held)
             if slew is not None:
-                command[:, joint] = limited(command[:, joint], slew * period)
+                command[:, joint] = _limited(command[:, joint], slew * period)
         angle = np.tile(self.pose, (samples, 1))
         return Log("design", period * np.arange(samples, dtype=float), command, angle, period)
 
     def with_level(self, joint: int, place: slice | int, level: Array | float) -> "Experiment":
         """Return the experiment with other levels of one joint, rounded to 0.1 %."""
-        levels = self.inputs[joint].level.copy()
+        start, levels = self.inputs[joint].start, self.inputs[joint].level.copy()
         levels[place] = np.round(level, 1)
-        return replace(self, inputs={**self.inputs, joint: replace(self.inputs[joint], level=levels)})
+        return replace(self, inputs={**self.inputs, joint: Input(start, levels)})
 
 
-def limited(command: Array, step: float) -> Array:
-    """Return a command [%], shape (T,), that follows another with at most `step` per sample."""
-    slow, value = np.empty_like(command), 0.0
-    for i, wanted in enumerate(command.tolist()):
-        slow[i] = value = min(max(wanted, value - step), value + step)
-    return slow
+def _limited(command: Array, step: float) -> list[float]:
+    """A command [%], shape (T,), that follows another with at most `step` per sample, from 0."""
+    slow = accumulate(
+        command.tolist(), lambda now, wanted: min(max(wanted, now - step), now + step), initial=0.0
+    )
+    return [*slow][1:]
 
 
 def experiment_samples(settings: FitSettings) -> int:
@@ -82,7 +82,7 @@ class RandomExperiments:
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower, self._upper = lower + inward, upper - inward
         self._samples, self._rest = experiment_samples(settings), round(limits.rest_s / period)
-        self._dwell = tuple(max(1, round(t / period)) for t in limits.dwell_s)
+        self._shortest, self._longest = (max(1, round(t / period)) for t in limits.dwell_s)
 
     def draw(self) -> Experiment:
         """Draw an experiment: half of them drive all allowed joints, the others a random part of them."""
@@ -92,7 +92,7 @@ class RandomExperiments:
 
     def change(self, experiment: Experiment) -> Experiment:
         """Change an experiment in one to three places: its pose, a joint's input, or some levels of it."""
-        rng = self._rng
+        rng, limit = self._rng, self._limit
         for _ in range(int(rng.integers(1, 4))):
             kind, joint = rng.random(), int(rng.choice(self._joints))
             if kind < 0.1:
@@ -103,18 +103,16 @@ class RandomExperiments:
                 level = experiment.inputs[joint].level
                 first = int(rng.integers(len(level)))
                 place = slice(first, first + 1 + int(rng.integers(4)))
-                near = np.clip(level[place] + rng.normal(0.0, 0.25 * self._limit), -self._limit, self._limit)
+                near = np.clip(level[place] + rng.normal(0.0, 0.25 * limit), -limit, limit)
                 far = self._levels(len(near))
                 experiment = experiment.with_level(joint, place, near if kind < 0.5 else far)
         return experiment
 
     def _input(self) -> Input:
-        shortest, longest = self._dwell
-        starts = [self._rest]
-        while (
-            begin := starts[-1] + int(self._rng.integers(shortest, longest + 1))
-        ) < self._samples - shortest:
-            starts.append(begin)
+        starts, start = list[int](), self._rest
+        while not starts or start < self._samples - self._shortest:
+            starts.append(start)
+            start += int(self._rng.integers(self._shortest, self._longest + 1))
         return Input(np.array(starts), self._levels(len(starts)))
 
     def _levels(self, count: int) -> Array:
@@ -134,12 +132,12 @@ class RandomExperiments:
 
 def _driven_joints(settings: FitSettings) -> list[int]:
     """Joints that may be driven, 0-based; refuse one that the arm lacks, or that stage 1 has no gain for."""
-    joints = sorted(settings.design.joints or settings.outputs)
-    if joints[-1] > len(settings.arm.joints):
-        raise SettingsError(f"the arm has joints 1 to {len(settings.arm.joints)}", where="design.joints")
-    driven = np.isin(np.arange(len(settings.arm.joints)) + 1, joints)
+    count, joints = len(settings.arm.joints), sorted(settings.design.joints or settings.outputs)
+    if joints[-1] > count:
+        raise SettingsError(f"the arm has joints 1 to {count}", where="design.joints")
+    driven = np.isin(np.arange(count) + 1, joints)
     Bindings(settings).refuse_idle(driven, [j - 1 for j in settings.outputs])
-    return [j - 1 for j in joints]
+    return np.flatnonzero(driven).tolist()
 
 
 def _start_poses(settings: FitSettings) -> Array:
@@ -171,21 +169,17 @@ class Violation(NamedTuple):
 def violation(angle: Array, period: float, arm: Arm, limits: DesignSettings) -> Violation | None:
     """Return where a motion [rad], shape (T, J), first leaves the joints' ranges or is too fast; or None."""
     margin = np.radians(limits.margin_deg)
-    speed = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / period
-    out = (angle < arm.lower + margin) | (angle > arm.upper - margin)
+    fast = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) / period > np.radians(limits.speed_deg_s)
     # a joint that stands at the end of its range, and never moves, breaks no limit
-    out &= np.ptp(angle, axis=0) > 0
-    at = np.argwhere(out | (speed > np.radians(limits.speed_deg_s)))
-    if not len(at):
-        return None
-    sample, joint = map(int, at[0])
-    return Violation(sample, joint, not out[sample, joint])
+    out = ((angle < arm.lower + margin) | (angle > arm.upper - margin)) & (np.ptp(angle, axis=0) > 0)
+    for sample, joint in np.argwhere(out | fast)[:1].tolist():
+        return Violation(sample, joint, not out[sample, joint])
+    return None
 
 
 def repaired(experiment: Experiment, first: Violation) -> Experiment:
     """Reduce the last level before a violation; turn it round where it leads out of a range."""
-    signal = experiment.inputs.get(first.joint)
-    if signal is not None:
+    if (signal := experiment.inputs.get(first.joint)) is not None:
         left = np.flatnonzero((signal.start < first.sample) & (signal.level != 0.0))
         if len(left):
             level = (0.7 if first.fast else -0.7) * signal.level[left[-1]]

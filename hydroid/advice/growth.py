@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.advice.score import Explained, Score, explained, holm
-from hydroid.advice.terms import ExtendedModel, Term, terms
+from hydroid.advice.terms import Term, terms
 from hydroid.parameters import Array
 from hydroid.posterior.linear import least_squares_rows
-from hydroid.posterior.uncertainty import Uncertainty, uncertainty
+from hydroid.posterior.noise import prior_weight
+from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
+from hydroid.search.descent import Descent
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
@@ -56,15 +58,6 @@ class Candidate:
     chance: float
     gain: float
 
-    def problem(self, problem: Problem) -> Problem:
-        """Return the problem with the parameter free."""
-        return problem.varied(problem.settings.with_parameters(self.term.entries))
-
-    def theta(self, problem: Problem, theta: Array) -> Array:
-        """Return where to refine that problem from an estimate of `problem`, shape (P,)."""
-        values = problem.parameters.mapping(theta) | {self.term.name: self.start}
-        return np.array([values[name] for name in self.problem(problem).parameters.names])
-
 
 @dataclass(frozen=True, eq=False)
 class Refit:
@@ -80,23 +73,18 @@ class Refit:
     rms: float
     left_out: float
 
-
-def candidates(problem: Problem, theta: Array) -> list[Candidate]:
-    """Return the terms that a model lacks at an estimate, shape (P,), by their predicted gain."""
-    return promising(score_terms(problem, uncertainty(problem, theta)))
+    @property
+    def degrees(self) -> dict[str, float]:
+        """Its errors [deg], as JSON has them."""
+        return {"rms_deg": math.degrees(self.rms), "left_out_deg": math.degrees(self.left_out)}
 
 
 def score_terms(problem: Problem, known: Uncertainty, progress: Progress = no_progress) -> list[Candidate]:
     """Test every term of a problem at an estimate; those that the logs cannot show are left out."""
-    every = terms(problem, known.theta)
-    model, fit, tests = (
-        ExtendedModel(problem, known.theta, every),
-        explained(problem, known),
-        list[Candidate](),
-    )
+    every, fit, tests = terms(problem, known.theta), explained(problem, known), list[Candidate]()
     for done, term in enumerate(every):
         progress("terms", done, len(every))
-        tests += _tested(term, model, fit)
+        tests += _tested(term, problem, known, fit)
     return tests
 
 
@@ -112,19 +100,22 @@ def promising(tests: Sequence[Candidate]) -> list[Candidate]:
     return list(best.values())
 
 
-def refitted(problem: Problem, theta: Array, prior_weight: float) -> Refit:
+def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Refit:
     """Refine an estimate, shape (P,), with all samples, and without each part of them.
 
-    The parts are the logs, in three groups at most, or the halves of one log. `prior_weight` is that of a
-    prior's score beside the residuals [rad].
+    The parts are the logs, in three groups at most, or the halves of one log. `weight` is that of a prior's
+    score beside the residuals [rad]; None: as the noise at theta has it.
     """
     parameters, size = problem.parameters, problem.measured.size
-    rows = least_squares_rows(problem, theta, prior_weight)
+    if weight is None:
+        row = problem.residuals(theta[None])[0]
+        weight = prior_weight(problem, row)
+    rows = least_squares_rows(problem, theta, weight)
 
-    def residuals(points: Array) -> Array:
-        return rows(parameters.from_unit(points))
+    def fitted(point: Array, kept: slice | NDArray[np.bool_] = slice(None)) -> Descent:
+        return least_squares(point, lambda points: rows(parameters.from_unit(points))[:, kept], SHORT)
 
-    whole = least_squares(parameters.to_unit(theta), residuals, SHORT)
+    whole = fitted(parameters.to_unit(theta))
     if not np.isfinite(whole.cost):
         return Refit(theta, np.inf, np.inf)
     number, unseen = np.zeros(whole.residual.size), np.empty(size)
@@ -132,25 +123,21 @@ def refitted(problem: Problem, theta: Array, prior_weight: float) -> Refit:
         halves = np.arange(len(c.measured)) >= len(c.measured) // 2
         number[c.rows] = 1 + (c.log % 3 if len(problem.logs) > 1 else halves)
     for part in np.unique(number[:size]):
-        kept = number != part
-
-        def others(points: Array, kept: NDArray[np.bool_] = kept) -> Array:
-            return residuals(points)[:, kept]
-
-        point = least_squares(whole.point, others, SHORT).point
-        unseen[~kept[:size]] = residuals(point[None])[0, ~kept]
+        out = number == part
+        unseen[out[:size]] = rows(parameters.from_unit(fitted(whole.point, ~out).point)[None])[0, out]
     rms = problem.rms(np.stack([whole.residual[:size], unseen])).tolist()
     return Refit(parameters.from_unit(whole.point), *rms)
 
 
-def _tested(term: Term, model: ExtendedModel, fit: Explained) -> list[Candidate]:
+def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) -> list[Candidate]:
     """Test one term by the largest change whose effect is small, a limit by each that acts."""
     (low, high), limit = term.span, math.isinf(term.value)
     end = high if high - term.value >= term.value - low else low
-    parts = 4.0 ** np.arange(-5.0, 1.0)
+    parts = np.zeros(16) if limit else 4.0 ** np.arange(-5.0, 1.0)
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
-    effects = model.residuals([(term, value) for value in values.tolist()]) - model.residual
-    unit = max(float(np.sqrt(np.mean(model.residual**2))), MIN_RESIDUAL)
+    residual = known.linear.residual
+    effects = term.residuals(problem, known.theta, values.tolist()) - residual
+    unit = max(float(np.sqrt(np.mean(residual**2))), MIN_RESIDUAL)
     sizes = np.sqrt(np.mean(effects**2, axis=1)) / unit
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
@@ -159,7 +146,7 @@ def _tested(term: Term, model: ExtendedModel, fit: Explained) -> list[Candidate]
     scores: list[tuple[float, Score, float]] = []
     for i in acting:
         score = fit.score(effects[i])
-        if limit or score.strength >= VISIBLE * parts[i]:
+        if score.strength >= VISIBLE * parts[i]:
             gain = 0.0 if one_sided and score.statistic <= 0 else score.part
             away = values[i] - term.value
             start = values[i] if limit else term.value + np.copysign(away, away * score.amount)

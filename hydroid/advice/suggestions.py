@@ -3,17 +3,21 @@
 import math
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 import yaml
 
-from hydroid.advice.actions import STATED_SD, next_actions
 from hydroid.advice.assumptions import assumption_findings, doubts
+from hydroid.advice.design import ExperimentSimulator, forecast
+from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, score_terms
+from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.findings import Finding
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.parameters import Array
+from hydroid.posterior.posterior import Posterior
+from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress, no_progress
 from hydroid.quantity_table import MECHANICAL
@@ -22,6 +26,12 @@ from hydroid.settings.fit import FitSettings
 MOST_TRIED = 6
 """terms that are really freed, the most promising first"""
 
+STATED_SD = {"weigh": 0.02, "state": 0.05}
+"""relative standard deviation of a mass that was weighed, and of a value from a data sheet (ours)"""
+FEWEST_TIMES = 1.5
+"""factor by which an action must improve a parameter to be listed"""
+MOST_ACTIONS = 5
+"""actions that are listed"""
 Content = Mapping[str, Any]
 
 
@@ -47,27 +57,76 @@ def advice(
         }
         if i < MOST_TRIED:
             progress(f"freeing {one.term.name}", i, min(MOST_TRIED, len(best)))
-            more = one.problem(problem)
-            freed = refitted(more, one.theta(problem, known.theta), weight)
+            more = one.term.added_to(problem)
+            freed = refitted(more, one.term.theta(problem, known.theta, one.start), weight)
             value = more.parameters.mapping(freed.theta)[one.term.name]
-            row |= {"freed": value, "rms_deg": finite(math.degrees(freed.rms))}
-            row |= {"left_out_deg": finite(math.degrees(freed.left_out))}
+            row |= {"freed": value} | {name: finite(error) for name, error in freed.degrees.items()}
             if freed.left_out < (1 - MIN_GAIN) * without.left_out:
                 entries = proposed(one, value)
                 row |= {"parameters": entries, "command": freeing_command(problem, entries, run)}
         rows.append(row)
     rows.sort(key=lambda row: ("command" not in row, row.get("left_out_deg") or math.inf))
-    doubted = doubts(problem, known.theta, ("sign", "zero", "scale"))
+    doubted = doubts(problem.settings, problem.logs)
     content = {
-        "rms_deg": math.degrees(without.rms),
-        "left_out_deg": math.degrees(without.left_out),
+        **without.degrees,
         "tested": len(tests),
         "terms": rows,
         "actions": next_actions(problem, known),
-        "assumptions": [asdict(doubt) for doubt in doubted],
+        "assumptions": [{"kind": "sign", "joint": j, "evidence": e} for j, e in doubted.items()],
     }
-    said = *assumption_findings(problem, doubted), *missing_findings(content)
+    said = *assumption_findings(problem.settings, problem.logs, doubted), *missing_findings(content)
     return content, (*said, *action_findings(content, problem.settings))
+
+
+def next_actions(problem: Problem, known: Uncertainty) -> list[dict[str, Any]]:
+    """Return the actions that would help most, the best first, as JSON has them (docs/json.md)."""
+    now = forecast(known.posterior)
+    wide, names = now.deviations, np.array(problem.parameters.names)[now.box.varied]
+    useful: list[tuple[int, float, dict[str, Any]]] = []
+    for kind, subject, rows in _forecasts(problem, known, now):
+        narrow = now.add(rows).deviations
+        before, after = (int(np.sum(each <= WEAK_ABOVE)) for each in (wide, narrow))
+        # the one that improves most, but for the one that is stated
+        best = int(np.argmax(np.where(names == subject, 0.0, wide / narrow)))
+        if after > before or wide[best] > FEWEST_TIMES * narrow[best]:
+            action = {"action": kind, "of": subject, "known_before": before, "known_after": after}
+            action |= {"total": len(names), "parameter": str(names[best])}
+            action |= {"before_percent": 100 * wide[best], "after_percent": 100 * narrow[best]}
+            # by which all deviations shrink on geometric average
+            useful.append((after, float(np.mean(np.log(wide / narrow))), action))
+    return [action for *_, action in sorted(useful, key=lambda one: one[:2], reverse=True)[:MOST_ACTIONS]]
+
+
+def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator[tuple[str, str, Array]]:
+    """Yield actions, their subjects, and rows of the information that each adds, shape (k, p).
+
+    A weighed link, a value of a data sheet, and the best of six random experiments for the designed one, with
+    the noise of the fit's worst angle.
+    """
+    settings, names = problem.settings, np.array(problem.parameters.names)[now.box.varied].tolist()
+    for name, row in zip(names, np.eye(len(names)), strict=True):
+        quantity = settings.parameters[name].quantity
+        # in stage 1 these stand for the hydraulics: no data sheet has them
+        if settings.stage != "mech" or quantity not in ("gain", "damping", "stiffness"):
+            kind = "weigh" if quantity == "mass" else "state"
+            yield kind, name, row[None] / STATED_SD[kind]
+    level, time = max(
+        (noise.level / channel.weight, noise.correlation_time * problem.logs[channel.log].period)
+        for channel, noise in zip(problem.channels, known.noise, strict=True)
+        if channel.quantity == "angle"
+    )
+    # what the best of a few could measure; hydroid design then looks for one free of collisions
+    noise = {"noise_deg": float(np.degrees(level)), "noise_correlation_s": time}
+    settings = settings.changed({"design": settings.design.changed(noise | {"clearance_m": None})})
+    try:
+        draws = RandomExperiments(settings, np.random.default_rng(1))
+    except SettingsError:
+        return  # no pose that an experiment may start from: hydroid design says so
+    simulator = ExperimentSimulator(settings, now)
+    gained = [t.gained for _ in range(6) if (t := simulator.trial(draws.draw())) is not None]
+    if gained:
+        best = max(gained, key=lambda rows: float(np.sum(np.log(np.diag(now.add(rows).root)))))
+        yield "experiment", f"{settings.design.duration_s:g}", best
 
 
 def proposed(one: Candidate, value: float) -> dict[str, dict[str, Any]]:

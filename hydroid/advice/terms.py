@@ -1,4 +1,4 @@
-"""Terms: changes of the settings that give a model one more parameter, and a model in which each can change.
+"""Terms: changes of the settings that give a model one more parameter.
 
 A term is a quantity that the fit holds fixed, one that it leaves at its nominal value, or the share of one
 side or joint in a parameter that serves several.
@@ -20,9 +20,6 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.problem import ParameterSettings
 
-Atom = tuple[str, int | str]
-"""one quantity of one side, and its joint (from 1) or link; 0: the pump"""
-
 
 @dataclass(frozen=True)
 class Term:
@@ -32,13 +29,11 @@ class Term:
         name: of it.
         entries: of the settings' parameters that add it: its own, and that of what it is split from.
         value: that it has now; inf of a limit that is switched off.
-        atoms: that it sets.
     """
 
     name: str
     entries: Mapping[str, ParameterSettings]
     value: float
-    atoms: tuple[Atom, ...]
 
     @property
     def span(self) -> tuple[float, float]:
@@ -47,11 +42,25 @@ class Term:
         assert bounds is not None
         return bounds
 
+    def added_to(self, problem: Problem) -> Problem:
+        """Return a problem with the parameter free."""
+        return problem.varied(problem.settings.with_parameters(self.entries))
+
+    def theta(self, problem: Problem, theta: Array, value: float) -> Array:
+        """Return an estimate of a problem, (P,), for the problem `added_to`, with the term at a value."""
+        values = problem.parameters.mapping(theta) | {self.name: value}
+        return np.array([values[name] for name in problem.settings.parameters | dict(self.entries)])
+
+    def residuals(self, problem: Problem, theta: Array, values: Sequence[float]) -> Array:
+        """Residuals [rad] of a problem at an estimate, (P,), with the term at n values, shape (n, R)."""
+        more = self.added_to(problem).with_open_starts(with_open_start(problem, theta).open_starts)
+        return more.residuals(np.array([self.theta(problem, theta, value) for value in values]))
+
     @property
-    def kind(self) -> tuple[str, frozenset[int | str]]:
+    def kind(self) -> tuple[object, ...]:
         """What it is, with both sides of an actuator alike: the same for `delay` and `delay_a` of a joint."""
-        quantity = self.atoms[0][0].removesuffix("_a").removesuffix("_b")
-        return quantity, frozenset(place for _, place in self.atoms)
+        own = self.entries[self.name]
+        return own.quantity.removesuffix("_a").removesuffix("_b"), own.joints, own.link
 
 
 def terms(problem: Problem, theta: Array) -> tuple[Term, ...]:
@@ -68,7 +77,7 @@ def _held(settings: FitSettings) -> Iterator[Term]:
             span = min(low, p.fixed), max(high, p.fixed)
             if span[0] < span[1]:
                 free = p.changed({"fixed": None, "bounds": span})
-                yield Term(name, {name: free}, p.fixed, _atoms(settings, p))
+                yield Term(name, {name: free}, p.fixed)
 
 
 def _split(problem: Problem, theta: Array) -> Iterator[Term]:
@@ -78,26 +87,23 @@ def _split(problem: Problem, theta: Array) -> Iterator[Term]:
         name, p = parameter.name, settings.parameters[parameter.name]
         if p.fixed is not None or p.logs is not None:
             continue
-        sides, joints = TARGETS[p.quantity], sorted({j for _, j in _atoms(settings, p) if isinstance(j, int)})
-        moving = [j for j in joints if j in problem.active_joints]
-        parts: list[tuple[str, dict[str, Any], dict[str, Any]]] = []
+        sides, joints, parts = TARGETS[p.quantity], _joints(settings, p), dict[str, list[dict[str, Any]]]()
         if len(sides) == 2:
-            parts.append(("b", {"quantity": sides[0]}, {"quantity": sides[1]}))
-        if len(moving) > 1:
-            others = {joint: tuple(j for j in joints if j != joint) for joint in moving}
-            parts += [(str(j), {"joints": rest}, {"joints": (j,)}) for j, rest in others.items()]
+            parts["b"] = [{"quantity": side} for side in sides]
+        if len(moving := [j for j in joints if j in problem.active_joints]) > 1:
+            rests = [tuple(other for other in joints if other != j) for j in moving]
+            parts |= {str(j): [{"joints": r}, {"joints": (j,)}] for j, r in zip(moving, rests, strict=True)}
         free = p.changed({"bounds": (parameter.lower, parameter.upper)})
-        for ending, rest, own in parts:
-            new, entry = f"{name}_{ending}", free.changed(own)
-            if new not in settings.parameters:
-                entries = {name: free.changed(rest), new: entry}
-                yield Term(new, entries, value, _atoms(settings, entry))
+        for ending, (rest, own) in parts.items():
+            if (new := f"{name}_{ending}") not in settings.parameters:
+                yield Term(new, {name: free.changed(rest), new: free.changed(own)}, value)
 
 
 def _nominal(problem: Problem) -> Iterator[Term]:
     """Yield what no parameter sets: of all joints together and each, of both sides together and each."""
     settings, joints = problem.settings, problem.active_joints
-    taken = {atom for p in settings.parameters.values() for atom in _atoms(settings, p)}
+    always = [p for p in settings.parameters.values() if p.logs is None]
+    taken = {(t, j) for p in always for t in TARGETS[p.quantity] for j in _joints(settings, p) or (0,)}
     gauged, alone = any(log.pressure is not None for log in problem.logs), len(joints) == 1
     for row in ROWS:
         pump = row.of_the_pump
@@ -110,67 +116,28 @@ def _nominal(problem: Problem) -> Iterator[Term]:
             if quantity == row.name and not pump and not alone:
                 groups.append(joints)
             for group in groups:
-                atoms = tuple((target, joint) for target in TARGETS[quantity] for joint in group)
-                values = {_nominal_value(problem, target, joint or 1) for target, joint in atoms}
+                atoms = [(target, joint) for target in TARGETS[quantity] for joint in group]
+                values = {_nominal_value(settings, target, joint or 1) for target, joint in atoms}
                 if len(values) == 1 and taken.isdisjoint(atoms):
                     name = quantity if alone or pump or len(group) > 1 else f"{quantity}_{min(group)}"
                     while name in settings.parameters:
                         name += "_"
-                    entry = ParameterSettings(
+                    own = ParameterSettings(
                         quantity=quantity, joints=None if pump else group, bounds=row.span
                     )
-                    yield Term(name, {name: entry}, values.pop(), atoms)
+                    yield Term(name, {name: own}, values.pop())
 
 
-def _atoms(settings: FitSettings, p: ParameterSettings) -> tuple[Atom, ...]:
-    """All that a parameter sets; what is added in some logs is none of it."""
-    if p.logs is not None:
+def _joints(settings: FitSettings, p: ParameterSettings) -> tuple[int, ...]:
+    """Joints that a parameter acts on; a link's mass, and the pump's numbers, act on none."""
+    if p.link is not None or CHOICES[p.quantity].of_the_pump:
         return ()
-    places: Sequence[int | str] = p.joints or range(1, len(settings.arm.joints) + 1)
-    places = [p.link] if p.link is not None else [0] if CHOICES[p.quantity].of_the_pump else places
-    return tuple((target, place) for target in TARGETS[p.quantity] for place in places)
+    return p.joints or tuple(range(1, len(settings.arm.joints) + 1))
 
 
-def _nominal_value(problem: Problem, quantity: str, joint: int) -> float:
+def _nominal_value(settings: FitSettings, quantity: str, joint: int) -> float:
     """Value of a quantity that no parameter sets; inf of a limit that is switched off."""
-    settings = problem.settings
     value = actuator_values(settings.arm.joints[joint - 1].actuator, settings.hydraulics)[quantity]
-    if quantity == "start_pressure" and value is None:
-        return START_PRESSURE / QUANTITIES[quantity].factor
-    return math.inf if value is None else value
-
-
-class ExtendedModel:
-    """A problem at an estimate in which terms can change.
-
-    Attributes:
-        residual: at the estimate [rad], shape (R,).
-    """
-
-    def __init__(self, problem: Problem, theta: Array, terms: Sequence[Term]) -> None:
-        settings, moved = problem.settings, {atom for term in terms for atom in term.atoms}
-        parameters, values, atoms = dict[str, ParameterSettings](), list[float](), dict[Atom, float]()
-        for (name, p), value in zip(settings.parameters.items(), theta.tolist(), strict=True):
-            own = _atoms(settings, p)
-            if moved.isdisjoint(own):
-                parameters[name] = p
-                values.append(value)
-            else:
-                atoms |= dict.fromkeys(own, value)
-        atoms |= {atom: term.value for term in terms for atom in term.atoms if atom not in atoms}
-        for target, place in atoms:
-            where = {"link": place} if target == "mass" else {"joints": (place,) if place else None}
-            entry = ParameterSettings(quantity=target, bounds=(0.1, 0.2), **where)  # pyright: ignore[reportArgumentType]
-            parameters[f"{target}_of_{place}"] = entry
-        self._base = np.array([*values, *atoms.values()])
-        self._columns = {atom: len(values) + i for i, atom in enumerate(atoms)}
-        varied = problem.varied(settings.changed({"parameters": parameters, "priors": {}}))
-        self._problem = varied.with_open_starts(with_open_start(problem, theta).open_starts)
-        self.residual = self.residuals([])[0]
-
-    def residuals(self, changes: Sequence[tuple[Term, float]]) -> Array:
-        """Residuals [rad] with one term at another value each, shape (n, R); of none those as they are."""
-        rows = np.tile(self._base, (max(len(changes), 1), 1))
-        for row, (term, value) in zip(rows, changes, strict=False):
-            row[[self._columns[atom] for atom in term.atoms]] = value
-        return self._problem.residuals(rows)
+    if value is None:
+        return START_PRESSURE / QUANTITIES[quantity].factor if quantity == "start_pressure" else math.inf
+    return value

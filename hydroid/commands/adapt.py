@@ -50,16 +50,16 @@ def adapt(
 
     with Progress() as progress:
         path = steps(model, read, names(free), progress)
-    chosen = [step.parameter for step in path[1:]]
+    chosen = [step["parameter"] for step in path[1:]]
     if not chosen:
         hint = "name parameters with --free, or fit anew with --start RUN"
         raise SettingsError("no parameter lowers the error on parts left out", where=model.source, hint=hint)
     settings = adapted(model, chosen)
     with FitProgress(settings) as watcher:
         result = run_fit(settings, read, out and Path(out), progress=watcher)
-    rows = [vars(step) | {"parameter": step.parameter or "none"} for step in path]
+    rows = [step | {"parameter": step["parameter"] or "none"} for step in path]
     columns = {"parameter": "freed", "rms_deg": "rms [deg]", "left_out_deg": "left out [deg]"}
     note = "left out: the error on parts of the logs, each predicted by an adaptation without it."
     steps_table = Table.of("Parameters freed one after another", columns, rows, note)
-    content = {**result.content, "steps": [vars(step) for step in path]}
+    content = {**result.content, "steps": path}
     return replace(result, lines=[steps_table, *result.lines], content=content)

@@ -160,7 +160,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     last, baselines = problem.varied(settings), baselines_of(settings, problem.logs)
     predictions = fitted(last, fit)
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
-    doubted = assumption_findings(last, doubts(last, fit.best.theta))
+    doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
     changes = {"verdict": verdict, "findings": (*summary.findings, *doubted)}
     summary = summary.model_copy(update=changes)
     source = "the fit" if folder is None else str(folder / NAME)

@@ -65,7 +65,7 @@ def suggest(
 
     Tests every parameter that is kept fixed, switched off or shared, such as a delay or dry friction. The
     most promising ones are freed: does that lower the error on parts of the logs left out? Tests whether the
-    logs contradict the sign, zero or scale of an angle, and predicts for the best actions, from weighing a
+    logs contradict the sign of an angle, and predicts for the best actions, from weighing a
     link to a new experiment, how much each would reduce the uncertainty.
 
     Example: hydroid suggest --fit runs/hyd

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from hydroid.advice.growth import refitted
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.refinement import refine
 from hydroid.fitting.search import Searched, search
@@ -24,7 +25,8 @@ from hydroid.search.pareto import average, best, non_dominated, utopia
 _log = logging.getLogger(__name__)
 
 NEARER = 0.95
-"""part of the quasi-static model's rms error that the dynamic one must reach to be preferred"""
+"""part of the rms error that is left at most by what is kept: the dynamic model, and terms also on parts of
+the logs left out"""
 TOO_FAR = 5.0
 """times the rms error of the last estimate from which the dynamic model is not refined"""
 
@@ -131,11 +133,14 @@ def fit(problem: Problem, watch: Watcher | None = None, checkpoints: Checkpoints
         if other_model and not own.rms(own.residuals(theta[None]))[0] < TOO_FAR * start.rms:
             return
         result = refine(own, theta, settings.refinement, watch.refining, checkpoints, name)
-        new = _estimates(own, {name: own.parameters.from_unit(result.point)})
-        if not if_nearer or new[name].rms < NEARER * start.rms:
-            final, last, start = name, own, new[name]
-        estimates.update(new)
-        refinements[name] = result
+        estimates.update(_estimates(own, {name: own.parameters.from_unit(result.point)}))
+        refinements[name], new = result, estimates[name]
+        nearer = new.rms < NEARER * start.rms
+        if nearer and own.settings.terms != last.settings.terms:
+            with_it, without = refitted(own, new.theta), refitted(last, start.theta)
+            nearer = with_it.left_out < NEARER * without.left_out
+        if nearer or not if_nearer:
+            final, last, start = name, own, new
 
     if settings.refinement is not None:
         ladder = settings.stage == "hyd" and settings.simulation.model == "ladder"

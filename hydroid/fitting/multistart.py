@@ -23,7 +23,6 @@ from hydroid.fitting.refinement import refine
 from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 from hydroid.search.chromosomes import Genes
-from hydroid.search.descent import Descent
 from hydroid.search.genetic import Population
 from hydroid.settings.search import RefinementSettings
 
@@ -61,8 +60,8 @@ class Multistart:
         self._descent = RefinementSettings(
             iterations=self.settings.iterations, gain_tolerance=self.settings.gain_tolerance
         )
-        self._best: dict[int, Descent] = {}
-        """the best fit of each joint alone, over the starts so far"""
+        self._best: dict[int, tuple[float, Array]] = {}
+        """the best fit of each joint alone, over the starts so far: its cost, and theta"""
         self._rms = np.inf
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
@@ -75,10 +74,9 @@ class Multistart:
             rows = self._problem.residuals(theta[None])
             self._rms = float(np.sqrt(np.mean(rows**2))) if np.isfinite(rows).all() else np.inf
         else:
-            result = self._grown(self._problem, theta, f"start {number + 1}")
-            theta = _theta(self._problem, result)
+            cost, theta = self._grown(self._problem, theta, f"start {number + 1}")
             size = self._problem.measured.size + len(self._problem.priors)
-            self._rms = float(np.sqrt(2 * result.cost / size))
+            self._rms = float(np.sqrt(2 * cost / size))
         return theta[None]
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
@@ -108,14 +106,13 @@ class Multistart:
         for joint in joints:
             problem, name = alone(self._problem, joint, theta), f"start {number + 1} joint {joint}"
             tried = [self._grown(problem, theta, name)]
-            for other, start in enumerate(self._drawn(problem, joint, theta)):
-                tried.append(self._grown(problem, start, f"{name} draw {other + 1}"))
-            result = min(tried, key=lambda r: r.cost)
-            for other, start in enumerate(splits(problem, joint, _theta(problem, result))):
-                tried.append(self._grown(problem, start, f"{name} split {other + 1}"))
-            result = min(tried, key=lambda r: r.cost)
-            best = self._best[joint] = min(self._best.get(joint, result), result, key=lambda r: r.cost)
-            reached = _theta(problem, best if number == self.settings.generations else result)
+            for i, start in enumerate(self._drawn(problem, joint, theta), 1):
+                tried.append(self._grown(problem, start, f"{name} draw {i}"))
+            for i, start in enumerate(splits(problem, joint, min(tried, key=_cost)[1]), 1):
+                tried.append(self._grown(problem, start, f"{name} split {i}"))
+            result = min(tried, key=_cost)
+            best = self._best[joint] = min(self._best.get(joint, result), result, key=_cost)
+            _, reached = best if number == self.settings.generations else result
             theta = np.where(problem.parameters.free, reached, theta)
         return theta
 
@@ -123,17 +120,17 @@ class Multistart:
         """Draw free parameters from their priors; return the best few candidates, shape (BEST, P)."""
         rng = np.random.default_rng([problem.settings.search.seed, joint])
         drawn = np.tile(theta, (DRAWS, 1))
-        for i, p in enumerate(problem.parameters.parameters):
+        for column, p in zip(drawn.T, problem.parameters.parameters, strict=True):
             scores = rng.normal(size=DRAWS)
             if p.fixed is None and p.prior is not None:
-                drawn[:, i] = np.clip([p.prior.value(score) for score in scores], p.lower, p.upper)
+                column[:] = np.clip([p.prior.value(score) for score in scores], p.lower, p.upper)
         self._memo.elsewhere += DRAWS
         errors = np.nan_to_num(np.sum(problem.residuals(drawn) ** 2, axis=1), nan=np.inf)
         return drawn[np.argsort(errors, kind="stable")[:BEST]]
 
-    def _grown(self, problem: Problem, theta: Array, name: str) -> Descent:
-        """Fit theta, shape (P,), to growing parts of the records; the last part is all of them."""
-        result = None
+    def _grown(self, problem: Problem, theta: Array, name: str) -> tuple[float, Array]:
+        """Fit theta, (P,), to growing parts of the records, at last all of them; return its cost, and it."""
+        cost = np.inf
         for number, part in enumerate(self._parts(problem), 1):
             before = self._memo.simulated
             result = refine(
@@ -144,24 +141,25 @@ class Multistart:
                 self._checkpoints,
                 f"{name} part {number}",
             )
-            theta = _theta(part, result)
+            cost, theta = result.cost, part.parameters.from_unit(result.point)
             self._memo.elsewhere += result.evaluations
-        assert result is not None
-        return result
+        return cost, theta
 
     def _parts(self, problem: Problem) -> list[Problem]:
         """The problem's first seconds, more and more of them, and at last all of it.
 
         A part in which nothing moves yet, as at the start from a stop, would only lead a start astray.
         """
-        longest = max(log.duration for log in problem.logs)
-        settings = problem.settings.changed({"objective.segments": 1})
-        parts = [
-            problem.varied(settings, [log.first(seconds) for log in problem.logs])
-            for seconds in self.settings.horizons
-            if seconds < longest
-        ]
-        return [*(part for part in parts if _moves(part, problem)), problem]
+        longest, settings = (
+            max(log.duration for log in problem.logs),
+            problem.settings.changed({"objective.segments": 1}),
+        )
+        travels, parts = [MOVES * np.ptp(c.measured) for c in problem.channels], list[Problem]()
+        for seconds in (one for one in self.settings.horizons if one < longest):
+            part = problem.varied(settings, [log.first(seconds) for log in problem.logs])
+            if any(np.ptp(c.measured) > far for c, far in zip(part.channels, travels, strict=True)):
+                parts.append(part)
+        return [*parts, problem]
 
 
 def lone_joints(problem: Problem) -> tuple[int, ...]:
@@ -192,16 +190,13 @@ def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:
     optimum of its own. A start has half of all in the delay, or nothing, and the rest in one of the lags.
     """
     own = dict[str, list[int]]()
-    for i, parameter in enumerate(problem.parameters.parameters):
-        settings = problem.settings.parameters[parameter.name]
-        name = settings.quantity.removesuffix("_a").removesuffix("_b")
-        if settings.fixed is None and settings.joints == (joint,) and name in LATE:
+    for i, one in enumerate(problem.settings.parameters.values()):
+        name = one.quantity.removesuffix("_a").removesuffix("_b")
+        if one.fixed is None and one.joints == (joint,) and name in LATE:
             own.setdefault(name, []).append(i)
-    if len(own) < 2:
-        return []
     late = sum(LATE[name] * float(np.mean(theta[places])) for name, places in own.items())
     starts = list[Array]()
-    for name in own:
+    for name in own if len(own) > 1 else ():
         shares = {"delay": 0.5, name: 0.5} if "delay" in own and name != "delay" else {name: 1.0}
         start = theta.copy()
         for other, places in own.items():
@@ -210,11 +205,5 @@ def splits(problem: Problem, joint: int, theta: Array) -> list[Array]:
     return starts
 
 
-def _theta(problem: Problem, result: Descent) -> Array:
-    return problem.parameters.from_unit(result.point)
-
-
-def _moves(part: Problem, whole: Problem) -> bool:
-    """Whether any signal moves in the first part of the records."""
-    both = zip(part.channels, whole.channels, strict=True)
-    return any(np.ptp(first.measured) > MOVES * np.ptp(all_.measured) for first, all_ in both)
+def _cost(reached: tuple[float, Array]) -> float:
+    return reached[0]

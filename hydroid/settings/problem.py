@@ -48,7 +48,8 @@ class ParameterSettings(Settings):
     otherwise, around 0 with standard deviation `sd`. All other logs are predicted without it"""
     term: Annotated[str, Field(pattern="^[A-Za-z_]+$")] | None = None
     """name of a term of the model, of one parameter or several: a fit begins without it, adds it after the
-    refinement, and keeps it where it brings the model clearly nearer to the logs; null: always there"""
+    refinement, and keeps it where it lowers the error on parts of the logs left out by 5 %; null: always
+    there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":

@@ -15,8 +15,8 @@ def test_what_changed_is_freed_and_found(tmp_path):
     settings = two_joints(tmp_path)
     model, log = identified(settings, TRUTH, "a fit"), drive(settings, 3, SLOWER)
     path = steps(model, [log])
-    assert [step.parameter for step in path] == ["", "flow"]
-    assert path[1].left_out_deg < 0.1 * path[0].left_out_deg
+    assert [step["parameter"] for step in path] == ["", "flow"]
+    assert path[1]["left_out_deg"] < 0.1 * path[0]["left_out_deg"]
     result = hydroid.adapt(log, fit=model, free="flow", out=tmp_path / "run")
     assert result.summary.values["flow"] == pytest.approx(90.0, rel=0.02)
     assert {n: v for n, v in result.summary.values.items() if n != "flow"} == {
@@ -28,7 +28,7 @@ def test_what_changed_is_freed_and_found(tmp_path):
 def test_an_unchanged_machine_needs_no_adaptation(tmp_path):
     settings = two_joints(tmp_path)
     model = identified(settings, TRUTH, "a fit")
-    assert [step.parameter for step in steps(model, [drive(settings, 4)])] == [""]
+    assert [step["parameter"] for step in steps(model, [drive(settings, 4)])] == [""]
     with pytest.raises(SettingsError, match="no parameter lowers the error"):
         hydroid.adapt(drive(settings, 4), fit=model, out=None)
 

@@ -35,7 +35,7 @@ excavator: setup  ## a real excavator: fitted to its twelve logs, judged on the 
 	$(BIN)/hydroid fit-hyd examples/excavator/fit_*.csv --config examples/excavator/fit.yaml --out runs/excavator/fit
 	$(BIN)/hydroid validate examples/excavator/check_*.csv --fit runs/excavator/fit --out runs/excavator/validation
 
-article: setup  ## the article's tables and figures over ten seeds (docs/reproduction.md); two hours, goes on where it was
+article: setup  ## docs/reproduction.md: adds runs that are missing, the most telling first (ARGS="--minutes 60" of seven hours)
 	$(BIN)/python benchmarks/article/run.py $(ARGS)
 
 B ?= structure

@@ -1,93 +1,137 @@
-"""Verdicts on claims that one cell of a study has a lower measure than another, over the same seeds.
+"""Verdicts on claims that a ratio of two measures over the same seeds lies below a limit, or near 1.
 
-The ratio of both measures is the geometric mean over seeds that both cells have, its interval Student's t of
-the logarithms. It covers 95 % for all claims of one item of the article together (Bonferroni): an item with m
-claims has intervals of 1 - 0.05 / m.
+The ratio is the geometric mean over seeds that both cells have, its interval Student's t of the logarithms.
+The intervals of one item are Holm's: that of the smallest of m p-values has the level 0.05 / m, the next
+0.05 / (m - 1), and so on up to the first that does not reject; all others have its level.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from scipy.stats import nct
 from scipy.stats import t as student
-from studies import Claim, Table
+from studies import Claim, Runs, Table, of_cell
 
 from hydroid.parameters import Array
-from hydroid.studies import Row
+
+NEAR = 1.25
+"""two measures are equal if their ratio is between 1 / NEAR and NEAR"""
+ASSUMED = 0.5
+"""the effect where the article prints none: the ratio over its limit"""
+POWER, MOST = 0.8, 200
+"""power at which a claim has enough seeds, and the number above which nobody looks"""
 
 
 class Outcome(StrEnum):
-    """What the runs say of a claim that a ratio lies below 1, as the article printed it or not."""
+    """What the runs say of a claim."""
 
     HOLDS = "holds"
     OPPOSITE = "opposite"
-    EXCLUDED = "an effect of the article's size is excluded"
+    EXCLUDED = "excluded"
     UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A claim, the ratio of its two measures with the interval, the article's own ratio, and the outcome."""
+    """A claim, the ratio of its two measures with the interval, the article's own ratio, and the outcome.
+
+    power: chance that this many seeds find the article's effect. enough: number of seeds for POWER.
+    """
 
     claim: Claim
     seeds: int
     ratio: float
     interval: tuple[float, float]
     printed: float | None
+    power: float
+    enough: int
     outcome: Outcome
 
 
-def verdicts(claims: Sequence[Claim], rows: Sequence[Row], tables: Sequence[Table]) -> list[Verdict]:
-    """Return the verdict on every claim of a study."""
-    together = Counter(claim.item for claim in claims)
-    made: list[Verdict] = []
-    for claim in claims:
-        pairs = np.log(pairs_of(claim, rows))
-        printed = printed_ratio(claim, tables)
-        middle, half = ratio_of(pairs, 0.05 / together[claim.item])
-        low, high = float(np.exp(middle - half)), float(np.exp(middle + half))
-        outcome = judge(low, high, printed)
-        made.append(Verdict(claim, len(pairs), float(np.exp(middle)), (low, high), printed, outcome))
-    return made
+def verdicts(claims: Sequence[Claim], runs: Runs, tables: Sequence[Table]) -> list[Verdict]:
+    """Return the verdict on every claim of a study, in their order."""
+    made: dict[str, Verdict] = {}
+    for item, equal in dict.fromkeys((claim.item, claim.equal) for claim in claims):
+        together = [(claim, log_ratios(claim, runs)) for claim in claims]
+        together = [each for each in together if (each[0].item, each[0].equal) == (item, equal)]
+        together.sort(key=lambda each: chance(each[1] - np.log(each[0].below)))
+        level, stopped = 0.05, False
+        for rank, (claim, logs) in enumerate(together):
+            level = level if stopped else 0.05 / (len(together) - rank)
+            one = verdict(claim, logs, level, printed_ratio(claim, tables))
+            stopped = stopped or one.outcome not in (Outcome.HOLDS, Outcome.OPPOSITE)
+            made[claim.says] = one
+    return [made[claim.says] for claim in claims]
 
 
-def judge(low: float, high: float, printed: float | None) -> Outcome:
-    """Return the outcome of an interval of the ratio that is claimed to be below 1."""
-    if high < 1:
-        return Outcome.HOLDS
-    if low > 1:
-        return Outcome.OPPOSITE
-    excluded = printed is not None and not low <= printed <= high
-    return Outcome.EXCLUDED if excluded else Outcome.UNDECIDED
-
-
-def ratio_of(pairs: Array, chance: float) -> tuple[float, float]:
-    """Return the mean difference of pairs of logarithms, (n, 2), and half its interval; infinite below 3."""
-    difference, n = pairs[:, 0] - pairs[:, 1], len(pairs)
-    if n < 3:
-        return 0.0, np.inf
-    half = student.ppf(1 - chance / 2, n - 1) * np.std(difference, ddof=1) / np.sqrt(n)
-    return float(np.mean(difference)), float(half)
-
-
-def pairs_of(claim: Claim, rows: Sequence[Row]) -> Array:
-    """Return the measure of both cells on the seeds that both have, shape (n, 2)."""
-    lower, than = (
-        {row.seed: row.values[claim.column] for row in rows if row.cell == cell and not row.failed}
-        for cell in (claim.lower, claim.than)
+def verdict(claim: Claim, logs: Array, level: float, printed: float | None) -> Verdict:
+    """Return the verdict on logarithms of a ratio, (n,), with an interval of 1 - level."""
+    n, middle, low, high, deviation = len(logs), 0.0, -np.inf, np.inf, np.inf
+    if n > 2:
+        middle, deviation = float(np.mean(logs)), max(float(np.std(logs, ddof=1)), 1e-12)
+        low, high = student.interval(1 - level, n - 1, middle, deviation / np.sqrt(n))
+    expected = None if claim.equal else printed or ASSUMED * claim.below
+    effect = np.log(expected / claim.below) if expected else 0.0
+    enough = (k for k in range(3, MOST + 1) if power(effect, deviation, k, level) >= POWER)
+    return Verdict(
+        claim,
+        n,
+        float(np.exp(middle)),
+        (float(np.exp(low)), float(np.exp(high))),
+        printed,
+        power(effect, deviation, n, level),
+        next(enough, MOST + 1),
+        judge(claim, float(np.exp(low)), float(np.exp(high)), expected),
     )
-    pairs = np.array([(lower[seed], than[seed]) for seed in lower if seed in than], float).reshape(-1, 2)
-    return pairs[(np.isfinite(pairs) & (pairs > 0)).all(axis=1)]
+
+
+def judge(claim: Claim, low: float, high: float, expected: float | None) -> Outcome:
+    """Return the outcome of an interval of the ratio."""
+    bottom, top = (1 / NEAR, NEAR) if claim.equal else (0.0, claim.below)
+    if bottom <= low and high < top:
+        return Outcome.HOLDS
+    if low > top or high < bottom:
+        return Outcome.OPPOSITE
+    return Outcome.EXCLUDED if expected and not low <= expected <= high else Outcome.UNDECIDED
+
+
+def power(effect: float, deviation: float, seeds: int, level: float) -> float:
+    """Return the chance that this many seeds decide, if the logarithm of the ratio is `effect` off its limit.
+
+    An effect of 0 means that the ratio is 1 and shall be found within NEAR.
+    """
+    if seeds < 3 or not np.isfinite(deviation):
+        return 0.0
+    error, limit = deviation / np.sqrt(seeds), float(student.isf(level / 2, seeds - 1))
+    if effect:  # beyond 30 errors the chance is 1
+        return float(nct.sf(limit, seeds - 1, min(abs(effect) / error, 30.0)))
+    return max(0.0, 2 * float(student.cdf(np.log(NEAR) / error - limit, seeds - 1)) - 1)
+
+
+def chance(logs: Array) -> float:
+    """Return the p-value of a mean of 0; 1 where there are too few or all are 0: runs that are the same."""
+    if len(logs) < 3 or not np.any(logs):
+        return 1.0
+    error = max(float(np.std(logs, ddof=1)), 1e-12) / np.sqrt(len(logs))
+    return 2 * float(student.sf(abs(np.mean(logs)) / error, len(logs) - 1))
+
+
+def log_ratios(claim: Claim, runs: Runs) -> Array:
+    """Return the logarithm of a claim's ratio on every seed that has it, shape (n,)."""
+    upper = of_cell(runs, claim.lower, claim.column)
+    lower = of_cell(runs, claim.than, claim.to or claim.column) if claim.than else dict.fromkeys(upper, 1.0)
+    pairs = [(upper[seed], lower[seed]) for seed in upper if seed in lower]
+    return np.array([np.log(a / b) for a, b in pairs if a > 0 and b > 0], dtype=float)
 
 
 def printed_ratio(claim: Claim, tables: Sequence[Table]) -> float | None:
     """Return the ratio of the values that the article prints; None where it does not print both."""
+    asked = (claim.lower, claim.column), (claim.than, claim.to or claim.column)
     for table in tables:
-        if claim.column in table.columns and {claim.lower, claim.than} <= table.article.keys():
-            column = table.columns.index(claim.column)
-            lower, than = table.article[claim.lower][column], table.article[claim.than][column]
-            if lower is not None and than is not None:
-                return lower / than
+        if all(cell in table.article and column in table.columns for cell, column in asked):
+            upper, lower = (table.article[cell][table.columns.index(column)] for cell, column in asked)
+            if upper is not None and lower is not None:
+                return upper / lower
     return None

@@ -1,43 +1,42 @@
-"""Measures that need the true parameters, and how soon a search has converged.
+"""Measures of an estimate, of a search's course, and of what a record can tell.
 
 The article sums the relative errors of all parameters. A sum counts directions that the data do not
 determine: there an estimate is where chance left it. `identifiable error` sums the same relative errors after
-projecting them on the directions that the data determine (choices.md).
+projecting them on the directions that the data determine (page.md).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
 from hydroid.parameters import Array, ParameterSet
 from hydroid.posterior.linear import linearised
 from hydroid.posterior.uncertainty import WEAK_ABOVE
 from hydroid.problem.problem import Problem
-from hydroid.studies import Result, Row
 
 CONVERGED = 0.05
 """part of the objective's whole descent that is left when a search counts as converged"""
 DETERMINED_AT_DEG = 0.1
 """noise of the angle for which a direction counts as identifiable [deg]"""
-BLIND, CENTRE = "blind draw", "centre of the box"
-"""cells of estimates that no data went into"""
-UNITS = dict.fromkeys(("largest error", "mean absolute error", "rms error"), "deg")
-UNITS |= {"mean squared error": "deg²", "total mass": "kg", "mass error": "kg"}
-"""of measures that have one; `value NAME` has the parameter's, `check NAME` deg"""
+PEAK_DEG = 3.0
+"""how far a maximum of the angle stands out to count as a peak [deg]"""
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
     """What the data determine at the true parameters.
 
-    parameters: all P. truth: their values, (P,). rank: how many directions are known to WEAK_ABOVE of the
-    values or better. axes: these directions, relative changes of the p free ones, of unit length, (rank, p).
+    parameters: all P. truth: their values, (P,). slopes: derivatives of the output by relative changes of the
+    p free ones [rad], (p, R). axes: the identifiable directions, of unit length, (rank, p).
     """
 
     parameters: ParameterSet
     truth: Array
-    rank: int
+    slopes: Array
     axes: Array
 
     def measures(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -49,47 +48,77 @@ class Directions:
         result = {f"error {n}": abs(float(c)) for n, c in zip(names, change, strict=True)}  # tables 1 and 6
         result["parameter error"] = float(np.abs(change).sum())
         result["identifiable error"] = float(np.abs(self.axes.T @ (self.axes @ change)).sum())
-        if masses:
+        if free[masses].any():
             result["mass error"] = abs(float(np.sum((estimate - self.truth)[masses])))
         return result
 
-    def without_data(self, draws: int) -> Iterator[Row]:
-        """Yield the errors of estimates drawn blindly within the bounds, and of the box's centre."""
-        unit = np.random.default_rng(0).random((draws, int(self.parameters.free.sum())))
-        middle = np.full_like(unit[:1], 0.5)
-        for cell, points in ((BLIND, unit), (CENTRE, middle)):
-            for seed, theta in enumerate(self.parameters.from_unit(points), 1):
-                yield Row(cell, seed, self.measures(self.parameters.mapping(theta)))
+    def sensitivities(self, segments: NDArray[np.int64]) -> dict[str, float]:
+        """Return how strongly the output depends on each parameter, in all and by segment, (S, 2)."""
+        names = [n for n, free in zip(self.parameters.names, self.parameters.free, strict=True) if free]
+        rms = np.degrees(0.01 * np.sqrt(np.mean(self.slopes**2, axis=1)))
+        parts = [self.slopes[:, first:end] for first, end in segments]
+        damping, stiffness = names.index("D"), names.index("S")
+        ratios = [float(np.linalg.norm(p[damping]) / np.linalg.norm(p[stiffness])) for p in parts]
+        return {f"slope {n}": float(s) for n, s in zip(names, rms, strict=True)} | {
+            "D over S, lowest segment": min(ratios),
+            "D over S, highest segment": max(ratios),
+            "directions of the record": len(self.axes),
+            "directions of one segment": max(len(determined(part)) for part in parts),
+        }
+
+
+def determined(slopes: Array) -> Array:
+    """Return the directions, (rank, p), known to WEAK_ABOVE at DETERMINED_AT_DEG of white noise."""
+    axes, singular, _ = np.linalg.svd(slopes, full_matrices=False)
+    with np.errstate(divide="ignore"):  # the largest comes first
+        rank = int(np.sum(np.radians(DETERMINED_AT_DEG) / singular <= WEAK_ABOVE))
+    return axes.T[:rank]
 
 
 def true_directions(problem: Problem, truth: Mapping[str, float]) -> Directions:
-    """Return what the data determine at the truth, with white noise of DETERMINED_AT_DEG."""
+    """Return what the data determine at the truth."""
     theta = problem.parameters.vector(truth, "truth")
-    axes, singular, _ = np.linalg.svd(linearised(problem, theta).slopes, full_matrices=False)
-    with np.errstate(divide="ignore"):  # the largest comes first
-        rank = int(np.sum(np.radians(DETERMINED_AT_DEG) / singular <= WEAK_ABOVE))
-    return Directions(problem.parameters, theta, rank, axes.T[:rank])
+    slopes = linearised(problem, theta).slopes
+    return Directions(problem.parameters, theta, slopes, determined(slopes))
 
 
-def with_truth(row: Row, result: Result, directions: Directions | None) -> Row:
-    """Return a run's measures with those of the article."""
-    if row.failed:
-        return row
-    values = dict(row.values) | {"generations": generations_to_converge(result["history"])}
-    values["mean squared error"] = values["rms error"] ** 2
-    values["total mass"] = sum(v for name, v in result["theta"].items() if name.startswith("M"))
-    return replace(row, values=values | (directions.measures(result["theta"]) if directions else {}))
+def output_errors(problem: Problem, theta: Array) -> dict[str, float]:
+    """Return the errors of the first log's compared angle [deg] for parameters (P,), and those at its peaks.
+
+    `peak height` is the rise over the start at the measured angle's maxima, simulated over measured.
+    """
+    log = problem.logs[0]
+    measured = np.degrees(log.angle[:, problem.outputs[0]])
+    response = np.degrees(problem.responses(theta[None])[0].angle[0, :, 0])
+    error, peaks = response - measured, find_peaks(measured, prominence=PEAK_DEG)[0]
+    found = {
+        "largest error": float(np.abs(error).max()),
+        "mean absolute error": float(np.abs(error).mean()),
+        "mean squared error": float(np.mean(error**2)),
+        "rms error": float(np.sqrt(np.mean(error**2))),
+        "error over motion": float(np.abs(error).max() / np.ptp(measured)),
+        "total mass": float(
+            sum(theta[i] for i, p in enumerate(problem.parameters.parameters) if p.unit == "kg")
+        ),
+    }
+    if peaks.size:
+        rise = float(np.mean(measured[peaks]) - measured[0])
+        found["peak error"] = float(np.mean(error[peaks]))
+        found["peak height"] = 1 + found["peak error"] / rise
+    return found
 
 
-def generations_to_converge(history: Sequence[Sequence[float | None]]) -> float:
-    """Return the generation after which CONVERGED of the best objective's descent is left.
+def course(history: Sequence[Sequence[float | None]]) -> dict[str, Any]:
+    """Return the generation after which CONVERGED of the best objective's descent is left, and its course.
 
     `history` has rows of generation, simulations and best objective; the descent begins with the first
     finite one.
     """
-    best = np.array([np.inf if row[2] is None else row[2] for row in history], dtype=float)
+    best = np.array([np.nan if row[2] is None else row[2] for row in history], dtype=float)
     finite = best[np.isfinite(best)]
-    if not finite.size:
-        return np.nan
     limit = finite[-1] + CONVERGED * (finite[0] - finite[-1])
-    return float(history[int(np.argmax(best <= limit))][0] or 0)
+    return {
+        "generations": float(history[int(np.argmax(best <= limit))][0] or 0),
+        "objective at half": float(best[(len(best) - 1) // 2]),
+        "history": " ".join(f"{value:.4g}" for value in best),
+    }

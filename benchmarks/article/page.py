@@ -2,157 +2,129 @@
 
     python benchmarks/article/page.py
 
-docs/reproduction/ has one CSV of all runs for each study, the figures that are the article's, about.json, and
-note.txt, written by hand, on how the runs were made. choices.md beside this file ends the page.
+docs/reproduction/ has one CSV of all runs for each study, and the figures; page.md here has the words.
 """
 
-import csv
-import json
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 
 import numpy as np
-from claims import Outcome, Verdict, verdicts
-from measures import BLIND, CENTRE, UNITS
-from studies import FOLDER, ArticleStudy, Table, load_studies
-
-from hydroid.settings.study import cell_settings
-from hydroid.studies import Row
+from claims import ASSUMED, MOST, POWER, Outcome, Verdict, verdicts
+from studies import BLIND, CENTRE, FOLDER, RECORDS, Plan, Runs, Table, load_studies, of_cell, read_runs
 
 DOCS = FOLDER.parents[1] / "docs"
-Rows = Mapping[str, Sequence[Row]]
-"""runs by study"""
-QUICK = "\n> **The short form: few seeds, short data, few generations. It shows that the studies run.**\n"
-HEAD = """# The article, put to the test
-
-The article (Montazeri, West, Monk and Taylor, 2017: [the two stages](two_stages.md) cites it) judges searches
-by the sum of the parameters' relative errors. **That sum carries no signal here.** Within 0.25 to 2.5 times
-the truth a blind draw has {blind:.2f} (median of {draws}) and the centre of the box {centre:.2f}; the simple
-GA ends at {simple:.2f}, the multi-objective one at {multi:.2f}.
-
-Of the article's {count} claims that runs can test: {tally}.
-
-`make article` makes the tables and figures anew: {seeds} runs with different random numbers where the article
-shows one. No machine was measured: the data of tables 1 to 7 are simulated at the article's true parameters
-with our geometry, those of tables 8 and 9 are a virtual rig's. So the numbers cannot be the article's.
-`python benchmarks/article/page.py` writes this page from the results in `docs/reproduction/`.
-"""
-MEANING = """
-The ratio is that of the two measures that a claim compares, over pairs of runs with the same seed: below 1
-the claim is right. Its interval is of 95 % for all claims of one item together. *Holds*, *opposite*: the
-interval lies on one side of 1. *An effect of the article's size is excluded*: it does not, and the ratio that
-the article prints lies outside of it. *Undecided*: more seeds could tell.
-"""
+QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
+WORDS = {o: str(o) for o in Outcome} | {Outcome.EXCLUDED: "an effect of that size is excluded"}
+TALLY = {
+    Outcome.HOLDS: "**{} hold**: {}",
+    Outcome.OPPOSITE: "**in {} the opposite holds**: {}",
+    Outcome.EXCLUDED: "**in {} an effect of the article's size is excluded** (without one, a halving): {}",
+    Outcome.UNDECIDED: "**{} are undecided**",
+}
 
 
-def page(results: Path) -> str:
+def page(results: Path, *, quick: bool = False) -> str:
     """Return the page of the results in a folder."""
-    about, studies = json.loads((results / "about.json").read_text(encoding="utf-8")), load_studies()
-    rows = {name: read_rows(results / f"{name}_runs.csv") for name, study in studies.items() if study.seeds}
-    made = [v for n, study in studies.items() for v in verdicts(study.claims, rows.get(n, []), study.tables)]
-    parts = [head(rows["mechanical"], made), QUICK if about["quick"] else ""]
-    for title, ours in (("What the article claims", False), ("Claims of ours", True)):
-        lines = [verdict_row(v) for v in made if v.claim.ours == ours]
-        header = ("item", "claim", "measure", "ratio", "article's", "verdict", "seeds")
-        parts += [f"\n## {title}\n", "" if ours else MEANING, table("", header, lines)]
+    studies = load_studies()
+    runs = {name: read_runs(results / f"{name}_runs.csv") for name in studies}
+    made = {name: verdicts(study.claims, runs[name], study.tables) for name, study in studies.items()}
+    every = [verdict for each in made.values() for verdict in each]
+    parts = [""]
     for name, study in studies.items():
-        items, settings = ", ".join(study.items).capitalize(), f"../benchmarks/article/{name}.yaml"
-        parts.append(f"\n## {study.title}\n\n{items} ([settings]({settings})). {study.about.strip()}\n\n")
-        parts += [f"- {what}: {text}\n" for what, text in about["facts"][name].items()]
-        parts += results_of(name, study, rows.get(name, []), results)
-    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
-    parts.append(f"\n## How the runs were made\n\nMachine: {about['machine']}; {versions}.\n")
-    if (note := results / "note.txt").is_file():
-        parts.append(f"\n{note.read_text(encoding='utf-8').strip()}\n")
-    return "".join((*parts, "\n", (FOLDER / "choices.md").read_text(encoding="utf-8")))
-
-
-def head(mechanical: Sequence[Row], made: Sequence[Verdict]) -> str:
-    """Return the first paragraphs."""
-    errors = {cell: of_cell(mechanical, cell, "parameter error") for cell in {r.cell for r in mechanical}}
-    middle = {cell: float(np.median(values)) for cell, values in errors.items() if values}
-    theirs = [verdict for verdict in made if not verdict.claim.ours]
-    counts = Counter(verdict.outcome for verdict in theirs)
-    return HEAD.format(
-        blind=middle[BLIND],
-        draws=len(errors[BLIND]),
-        centre=middle[CENTRE],
-        simple=middle.get("simple GA", np.nan),
-        multi=middle.get("multi-objective, 8 segments", np.nan),
-        count=len(theirs),
-        tally=", ".join(f"{outcome} {counts[outcome]}" for outcome in Outcome),
-        seeds=max(verdict.seeds for verdict in made),
+        link = f"[{study.title}](../benchmarks/article/{name}.yaml)"
+        parts.append(f"\n## {link}\n\n{study.about.strip()}\n")
+        parts += results_of(Plan(name, study), runs[name])
+    text = (
+        (FOLDER / "page.md")
+        .read_text(encoding="utf-8")
+        .format(
+            theirs=claims_table(verdict for verdict in every if not verdict.claim.ours),
+            ours=claims_table(verdict for verdict in every if verdict.claim.ours),
+            studies="".join(parts),
+            enough=POWER,
+            assumed=ASSUMED,
+            **head(runs["mechanical"], made),
+        )
     )
+    return QUICK + text if quick else text
 
 
-def verdict_row(verdict: Verdict) -> tuple[str, ...]:
-    """Return a claim's line of the table."""
-    claim, printed = verdict.claim, "" if verdict.printed is None else f"{verdict.printed:.2g}"
-    ratio = f"{verdict.ratio:.2g} [{verdict.interval[0]:.2g}, {verdict.interval[1]:.2g}]"
-    return (claim.item, claim.says, claim.column, ratio, printed, verdict.outcome, str(verdict.seeds))
+def head(runs: Runs, made: Mapping[str, Sequence[Verdict]]) -> dict[str, object]:
+    """Return what the first paragraphs state."""
+
+    def middle(cell: str, column: str) -> str:
+        return number(median(of_cell(runs, cell, column).values() or [np.nan]))
+
+    says = "ulti-objective GA: lower parameter error than simple GA"
+    narrow, wide = (next(v for v in made[n] if says in v.claim.says) for n in ("mechanical", "wide"))
+    theirs = [verdict for each in made.values() for verdict in each if not verdict.claim.ours]
+    said = {o: [v.claim.says for v in theirs if v.outcome is o] for o in Outcome}
+    cells = {"blind": BLIND, "centre": CENTRE, "simple": "simple GA", "multi": "multi-objective"}
+    return {
+        "main": f"{interval(narrow)}: {WORDS[narrow.outcome]}",
+        "wide": f"{interval(wide)}: {WORDS[wide.outcome]}",
+        "rank": middle(RECORDS, "directions of the record"),
+        "count": len(theirs),
+        "tally": "".join(f"- {TALLY[o].format(len(s), '; '.join(s))}.\n" for o, s in said.items() if s),
+        **{name: middle(cell, "parameter error") for name, cell in cells.items()},
+        **{f"output_{name}": middle(cell, "largest error") for name, cell in cells.items()},
+    }
+
+
+def interval(verdict: Verdict) -> str:
+    """Return a ratio with its interval."""
+    if not np.isfinite(verdict.interval[1]):
+        return "too few runs"
+    return f"{verdict.ratio:.2g} [{verdict.interval[0]:.2g}, {verdict.interval[1]:.2g}]"
+
+
+def claims_table(made: Iterable[Verdict]) -> str:
+    """Return the table of verdicts; an item stands at its first claim."""
+    lines: list[tuple[str, ...]] = []
+    item = ""
+    for v in made:
+        printed = "" if v.printed is None else f"{v.printed:.2g}"
+        open_still = v.outcome is Outcome.UNDECIDED and 2 < v.seeds < v.enough
+        more = f"/{v.enough if v.enough <= MOST else f'{MOST}+'}" if open_still else ""
+        numbers = (interval(v), printed, f"{v.power:.2f}", v.outcome, f"{v.seeds}{more}")
+        lines.append(("" if v.claim.item == item else v.claim.item, v.claim.says, *numbers))
+        item = v.claim.item
+    return table("", ("item", "claim", "ratio", "article's", "power", "verdict", "seeds"), lines)
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
     """Return a table in Markdown."""
     above = f"\n**{title}**\n\n" if title else "\n"
-    lines = [header, ["---"] * len(header), *rows]
-    text = "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in lines)
+    text = "".join(f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows))
     return above + text + (f"\n{note}\n" if note else "")
 
 
-def results_of(name: str, study: ArticleStudy, rows: Sequence[Row], results: Path) -> Iterator[str]:
+def results_of(plan: Plan, runs: Runs) -> Iterator[str]:
     """Yield the tables and the figures of a study."""
-    cells = cell_settings(study, FOLDER / name)
-    units = {f"value {n}": p.unit for n, p in next(iter(cells.values())).parameters.items()}
-    units |= UNITS | {f"check {check}": "deg" for check in study.checks}
-    for shown in study.tables:
-        yield study_table(shown, rows, [*cells, BLIND, CENTRE], units)
-    for figure in study.figures:
-        (file,) = results.glob(f"{figure.item.replace(' ', '_')}.*")
-        yield f"\n![{figure.title}](reproduction/{file.name})\n"
+    for shown in plan.study.tables:
+        yield study_table(shown, runs, [*plan.cells])
+    for figure in plan.study.figures:
+        yield f"\n![{figure.title}](reproduction/{figure.file})\n"
 
 
-def study_table(shown: Table, rows: Sequence[Row], cells: Sequence[str], units: dict[str, str]) -> str:
-    """Return a table with median and spread of each cell, and the article's values below it."""
+def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
+    """Return a table with median and spread of each cell, and the article's values."""
     lines: list[list[str]] = []
-    for cell in (*shown.cells, BLIND, CENTRE) if shown.cells else cells:
-        columns = [of_cell(rows, cell, column) for column in shown.columns]
-        if any(columns):
-            lines.append([cell, "ours", str(max(map(len, columns))), *map(spread, columns)])
-        if cell in shown.article:
-            values = ("" if v is None else f"{v:g}" for v in shown.article[cell])
-            lines.append([cell, "article", "", *values])
-    named = (f"{c} [{units[c]}]" if units.get(c) else c for c in shown.columns)
-    note = f"Ours: median of the seeds [lowest, highest]. {shown.note}".strip()
-    return table(shown.title, ("cell", "from", "runs", *named), lines, note)
+    without_search = () if shown.cells == (RECORDS,) else (BLIND, CENTRE)
+    for cell in dict.fromkeys((*(shown.cells or cells), *shown.article, *without_search)):
+        columns = [[*of_cell(runs, cell, column).values()] for column in shown.columns]
+        texts = [number(median(values)) if values else "" for values in columns]
+        printed = shown.article.get(cell, [None] * len(columns))
+        texts = [t if v is None else f"{t} ({v:g})".strip() for t, v in zip(texts, printed, strict=True)]
+        if any(texts):
+            lines.append([cell, str(max(map(len, columns)) or ""), *texts])
+    return table(shown.title, ("", "runs", *shown.columns), lines, shown.note)
 
 
-def of_cell(rows: Sequence[Row], cell: str, column: str) -> list[float]:
-    """Return a measure of the runs of a cell that have it."""
-    values = [row.values.get(column, np.nan) for row in rows if row.cell == cell and not row.failed]
-    return [value for value in values if np.isfinite(value)]
-
-
-def spread(values: Sequence[float]) -> str:
-    """Return median, lowest and highest of some values, with three digits or all before the point."""
-    if not values:
-        return ""
-    three = (float(np.median(values)), min(values), max(values))
-    middle, low, high = (f"{v:.0f}" if abs(v) >= 100 else f"{v:.3g}" for v in three)
-    return f"{middle} [{low}, {high}]" if len(values) > 1 else middle
-
-
-def read_rows(file: Path) -> list[Row]:
-    """Read the runs of a study."""
-    rows: list[Row] = []
-    with file.open(newline="", encoding="utf-8") as text:
-        for line in csv.DictReader(text):
-            cell, seed, failed = line.pop("cell"), int(line.pop("seed")), line.pop("failed")
-            rows.append(
-                Row(cell, seed, {n: float(v or "nan") for n, v in line.items() if not failed}, failed)
-            )
-    return rows
+def number(value: float) -> str:
+    """Return a number in two digits, or all before the point."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
 if __name__ == "__main__":

@@ -1,78 +1,141 @@
 """The article's tables and figures over many seeds: `make article`, and `make article ARGS=--quick`.
 
-    python benchmarks/article/run.py [--quick] [--processes N] [STUDY ...]
+    python benchmarks/article/run.py [--quick] [--minutes N] [--processes N] [STUDY ...]
 
-Every run leaves a file in runs/article; what was stopped goes on with the same command, and studies share the
-runs that they have in common. The results (a CSV of all runs for each study, figures, about.json) go to
-docs/reproduction/, and the page that is written from them to docs/reproduction.md. The short form has two
-seeds, 15 s of data and few generations, and writes to runs/article-quick alone.
+The results in docs/reproduction/ count as done: a CSV of all runs for each study, written after every run.
+Only what they lack is run, up to the seeds that the studies state: first the claims that the fewest runs
+would decide, if the effect is as large as the article's. No run begins after N minutes. In the end
+figures and docs/reproduction.md are made from what there is. The short form has one seed, 15 s of data
+and few generations, and writes to runs/article-quick alone.
 """
 
 import argparse
-import json
 import os
-import platform
-from importlib.metadata import version
+import time
+from collections.abc import Mapping
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from pathlib import Path
 
-import pandas
+import numpy as np
+from claims import Outcome, verdicts
 from figures import draw
-from measures import DETERMINED_AT_DEG
 from page import page
-from studies import Plan, Runs, load_studies
+from pandas import DataFrame
+from studies import BLIND, CENTRE, RECORDS, Plan, Runs, load_studies, read_runs
 
-from hydroid.posterior.uncertainty import WEAK_ABOVE
-from hydroid.studies import processes
+from hydroid.errors import HydroidError
+from hydroid.files import write_atomic
+from hydroid.studies import Result, perform, processes
 
 ROOT = Path(__file__).parents[2]
+Key = tuple[str, str, int]
+"""study, cell, seed"""
+ATTEMPT = 6
+"""number of seeds after which a claim's spread can be guessed"""
 
 
-def main(chosen: list[str], processes_at_most: int, *, quick: bool) -> None:
-    """Run the studies, and write results and page."""
-    folder = ROOT / "runs" / ("article-quick" if quick else "article")
-    results = folder / "results" if quick else ROOT / "docs" / "reproduction"
+def main(chosen: list[str], minutes: float, at_once: int, *, quick: bool) -> None:
+    """Perform what is missing, and write results and page."""
+    results = ROOT / ("runs/article-quick/results" if quick else "docs/reproduction")
     results.mkdir(parents=True, exist_ok=True)
-    plans = [Plan(n, study, quick) for n, study in load_studies().items() if n in chosen or not chosen]
-    with processes(processes_at_most) as executor:
-        made = [plan.run(folder, executor) for plan in plans]
-    for runs in made:
-        if runs.rows:
-            rows = [{"cell": r.cell, "seed": r.seed, "failed": r.failed, **r.values} for r in runs.rows]
-            pandas.DataFrame(rows).to_csv(results / f"{runs.plan.name}_runs.csv", index=False)
-        for figure in runs.plan.study.figures:
-            draw(runs, figure, results / f"{figure.item.replace(' ', '_')}.svg")
-    if not chosen:
-        about = {
-            "versions": {name: version(name) for name in ("hydroid", "mujoco", "numpy", "scipy")},
-            "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-            "quick": quick,
-            "facts": {runs.plan.name: facts(runs) for runs in made},
-        }
-        text = json.dumps(about, indent=1, ensure_ascii=False) + "\n"
-        (results / "about.json").write_text(text, encoding="utf-8")
-        target = results.with_suffix(".md")
-        target.write_text(page(results), encoding="utf-8")
-        print(target)
+    studies = {name: study for name, study in load_studies().items() if name in chosen or not chosen}
+    plans = {name: Plan(name, study, quick=quick) for name, study in studies.items()}
+    runs = {name: read_runs(results / f"{name}_runs.csv") for name in plans}
+    for name, plan in plans.items():
+        runs[name] = with_what_needs_no_search(plan, runs[name])
+    with processes(at_once) as executor:
+        work(plans, runs, results, executor, at_once, 60 * minutes)
+    for name, plan in plans.items():
+        if runs[name]:
+            write(results, name, runs[name])
+        for figure in plan.study.figures:
+            draw(plan, runs[name], figure, results / figure.file)
+    target = results.with_suffix(".md")
+    target.write_text(page(results, quick=quick), encoding="utf-8")
+    print(target)
 
 
-def facts(runs: Runs) -> dict[str, str]:
-    """Return what was run on what."""
-    plan, log = runs.plan, runs.problem.logs[0]
-    data = "simulated at the truth under random commands, no noise"
-    if plan.study.simulated is None:
-        data = ", ".join(Path(one.source).name for one in plan.logs)
-    found = {"base settings": plan.study.base, "data": f"{log.duration:.3g} s, {data}"}
-    if (known := runs.directions) is not None:
-        limit = f"to {100 * WEAK_ABOVE:g} % or better at {DETERMINED_AT_DEG:g} deg of white noise"
-        count = int(known.parameters.free.sum())
-        found["identifiable directions"] = f"{known.rank} of {count} ({limit})"
-    return found
+def work(
+    plans: Mapping[str, Plan],
+    runs: dict[str, Runs],
+    results: Path,
+    executor: Executor,
+    at_once: int,
+    seconds: float,
+) -> None:
+    """Perform what is missing, the most telling first, until that many seconds have passed."""
+    begun, pending = time.monotonic(), dict[Future[Result], Key]()
+    while True:
+        if time.monotonic() - begun < seconds:
+            todo = [key for key in telling(plans, runs) if key not in pending.values()]
+            for name, cell, seed in todo[: at_once - len(pending)]:
+                pending[executor.submit(perform, plans[name].task(cell, seed))] = (name, cell, seed)
+        if not pending:
+            return
+        for done in wait(pending, return_when=FIRST_COMPLETED).done:
+            name, cell, seed = pending.pop(done)
+            try:
+                result = done.result()
+            except HydroidError as error:
+                result = {"failed": str(error)}
+            runs[name].append(plans[name].row(cell, seed, result))
+            write(results, name, runs[name])
+            print(f"{time.monotonic() - begun:.0f} s: {name}, {cell}, seed {seed}", flush=True)
+
+
+def write(results: Path, name: str, runs: Runs) -> None:
+    """Write the runs of a study, by cell and seed."""
+    first = ["cell", "seed", "failed", "history", "segment bests"]
+    columns = [*first, *sorted({column for run in runs for column in run} - {*first})]
+    ordered = sorted(runs, key=lambda run: (run["cell"], run["seed"]))
+    write_atomic(results / f"{name}_runs.csv", DataFrame(ordered, columns=columns).to_csv(index=False))
+
+
+def telling(plans: Mapping[str, Plan], runs: Mapping[str, Runs]) -> list[Key]:
+    """Return what is missing: for the article's undecided claims, the cheapest first; for ours; all else."""
+    have = {(name, run["cell"], run["seed"]) for name, made in runs.items() for run in made}
+    claims: list[tuple[bool, float, list[Key]]] = []
+    for name, plan in plans.items():
+        for verdict in verdicts(plan.study.claims, runs[name], plan.study.tables):
+            cells = [c for c in dict.fromkeys((verdict.claim.lower, verdict.claim.than)) if c in plan.cells]
+            if cells and verdict.outcome is Outcome.UNDECIDED:
+                most = min(len(plan.seeds(cell)) for cell in cells)
+                upto = ATTEMPT if verdict.seeds < ATTEMPT else verdict.enough
+                keys = [(name, cell, seed) for seed in range(1, 1 + min(upto, most)) for cell in cells]
+                cost = len(set(keys) - have) if upto <= most else np.inf
+                claims.append((verdict.claim.ours, cost, keys))
+    wanted = [key for *_, keys in sorted(claims, key=lambda each: each[:2]) for key in keys]
+    rest = [(n, c, s) for n, plan in plans.items() for c in plan.cells for s in plan.seeds(c)]
+    return [key for key in dict.fromkeys([*wanted, *rest]) if key not in have]
+
+
+def with_what_needs_no_search(plan: Plan, runs: Runs) -> Runs:
+    """Return the runs with blind draws, the box's centre, records at the truth, and measures they lack."""
+    rows, known = list(runs), {(run["cell"], run["seed"]) for run in runs}
+    parameters, seeds = plan.problem(1).parameters, plan.seeds(BLIND)
+    unit = np.random.default_rng(0).random((len(seeds), int(parameters.free.sum())))
+    points = [(BLIND, seed, point) for seed, point in zip(seeds, unit, strict=True)]
+    points += [(CENTRE, 1, np.full(unit.shape[1], 0.5))] if points else []
+    for cell, seed, point in points:
+        theta = parameters.mapping(parameters.from_unit(point[None])[0])
+        if (cell, seed) not in known:
+            rows.append({"cell": cell, "seed": seed} | {f"value {n}": float(v) for n, v in theta.items()})
+    for i, row in enumerate(rows):
+        if "value " + parameters.names[0] in row and "peak error" not in row:
+            rows[i] = plan.judged(row)
+    first = plan.study.same_record + 1  # every one has a truth of its own
+    for seed in range(first, first + min(plan.study.records, len(seeds))):
+        if (RECORDS, seed) not in known:
+            segments = plan.problem(seed).bounds
+            rows.append({"cell": RECORDS, "seed": seed} | plan.directions(seed).sensitivities(segments))
+    return rows
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("studies", nargs="*")
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--processes", type=int, default=0)
+    parser.add_argument("--minutes", type=float, default=np.inf)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     given = parser.parse_args()
-    main(given.studies, given.processes, quick=given.quick)
+    main(given.studies, given.minutes, given.processes, quick=given.quick)

@@ -1,10 +1,8 @@
-"""The article's studies: cells and seeds, the truth, what is shown, and what is claimed."""
+"""The article's studies: what runs on which record, the truth, what is shown, and what is claimed."""
 
+import csv
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,37 +11,29 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from common import pseudo_random_log
-from measures import Directions, true_directions, with_truth
+from measures import Directions, course, output_errors, true_directions
 from pydantic import Field
 
 from hydroid import read_logs
 from hydroid.errors import RunError
-from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.parameters import Array
-from hydroid.prediction import predict, simulate_log
+from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.progress import no_progress
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 from hydroid.settings.study import Changes, StudySettings, cell_settings
-from hydroid.studies import Result, Row, Task, make_tasks, measured, run_all
+from hydroid.studies import Result, Task
 
 FOLDER = Path(__file__).parent
-QUICK_S, QUICK_SEEDS = 15.0, 2
-"""length of the data and number of seeds in the short form"""
-BLIND_DRAWS = 100
-
-
-class Simulated(Settings):
-    """Data simulated at the true parameters under pseudo-random commands, as in the article's figure 17."""
-
-    pose: str = "study"
-    joints: tuple[int, ...] = (2,)
-    duration_s: float = 75.0
-    seed: int = 0
-    range_deg: tuple[float, float] | None = None
-    """a level that would move a compared joint out of this range is turned round or reduced [deg]"""
+SECONDS, QUICK_SECONDS = 75.0, 15.0
+"""length of the data; in the short form, which has one seed"""
+TRUTHS_FROM = 0.7
+"""a seed with a record of its own has true values of 0.7 to 1 / 0.7 times the article's"""
+Runs = list[dict[str, Any]]
+"""runs as a CSV has them: TEXTS (why it failed, best parameters of each segment), seed and measures"""
+TEXTS = ("cell", "failed", "history", "segment bests")
+BLIND, CENTRE, RECORDS = "blind draw", "centre of the box", "records"
+"""cells without a search: estimates that no data went into, and what records say at the truth"""
 
 
 class Table(Settings):
@@ -67,167 +57,168 @@ class Figure(Settings):
     normalized: bool = False
 
     @property
-    def item(self) -> str:
-        """The article's item that the figure is, as its title says."""
-        return self.title.lower().partition(":")[0]
+    def file(self) -> str:
+        """Name of the file: the article's item, as the title says."""
+        return self.title.lower().partition(":")[0].replace(" ", "_") + ".svg"
 
 
 class Claim(Settings):
-    """A statement that is tested over the seeds: one cell has the lower measure than another."""
+    """A statement that is tested over the seeds: a ratio of two measures is below a limit, or near 1.
+
+    lower, column: the cell and the measure above the line. than, to: those below it; without `to` the same
+    measure, without `than` 1. equal: the claim is that the ratio is near 1. ours: it is not the article's.
+    """
 
     says: str
     item: str
-    column: str
     lower: str
-    than: str
+    column: str
+    than: str = ""
+    to: str = ""
+    below: float = 1.0
+    equal: bool = False
     ours: bool = False
-    """the statement is not the article's"""
-
-
-class CheckLog(Settings):
-    """A log that every estimate predicts, and settings of its own, by dotted key."""
-
-    log: str
-    set: Changes = Field(default_factory=dict[str, Any])
 
 
 class ArticleStudy(StudySettings):
-    """A study with what the article prints and says of it."""
+    """A study with what the article prints and says of it.
+
+    other_seeds: number of seeds of cells that are not the simple GA's. same_record: seeds up to this one
+    share the article's truth and one record; every later one has its own. records: number of records on
+    which the model itself is looked at. truth: the article's; none: `logs` are fitted. range_deg: where
+    simulated data keep the compared joint. checks: settings by further log. quick: settings that the short
+    form replaces in every cell.
+    """
 
     logs: tuple[str, ...] = ()
     about: str
-    items: tuple[str, ...]
-    checks: dict[str, CheckLog] = Field(default_factory=dict[str, CheckLog])
-    """further logs, by name; their measure is the mean absolute error"""
+    other_seeds: int | None = None
+    same_record: int = 0
+    records: int = 0
     truth: dict[str, float] = Field(default_factory=dict[str, float])
-    simulated: Simulated | None = None
+    range_deg: tuple[float, float] | None = None
+    checks: dict[str, Changes] = Field(default_factory=dict[str, Any])
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
     claims: tuple[Claim, ...] = ()
     quick: Changes = Field(default_factory=dict[str, Any])
-    """settings that the short form replaces in every cell"""
 
 
 def load_studies() -> dict[str, ArticleStudy]:
-    """Return the studies by the name of their file, in the order of the article's tables and figures."""
-    studies = {file.stem: load(file, ArticleStudy) for file in FOLDER.glob("*.yaml")}
-    return dict(sorted(studies.items(), key=lambda each: order(each[1].items[0])))
+    """Return the studies by the name of their file, in the page's order."""
+    names = ("mechanical", "wide", "elbow", "hydraulic", "surface", "rig")
+    return {name: load(FOLDER / f"{name}.yaml", ArticleStudy) for name in names}
 
 
-def order(item: str) -> tuple[bool, int]:
-    """Return what sorts tables before figures, each by number."""
-    return item.startswith("figure"), int(item.split()[1])
-
-
-@dataclass(frozen=True, eq=False)
 class Plan:
     """A study that is ready to run; `quick` is its short form."""
 
-    name: str
-    study: ArticleStudy
-    quick: bool
+    def __init__(self, name: str, study: ArticleStudy, *, quick: bool = False) -> None:
+        self.name, self.study, self.quick = name, study, quick
+        self.longest = QUICK_SECONDS if quick else SECONDS
+        self._record, self._directions = cache(self._make_record), cache(self._make_directions)
+
+    def settings(self, changes: Changes) -> dict[str, FitSettings]:
+        """Return the settings of a fit by cell, with some replaced."""
+        quick = self.study.quick if self.quick else {}
+        return cell_settings(self.study, FOLDER / self.name, quick | changes)
 
     @cached_property
     def cells(self) -> dict[str, FitSettings]:
         """Settings of a fit, by cell."""
-        return cell_settings(self.study, FOLDER / self.name, self.study.quick if self.quick else {})
+        return self.settings({})
 
-    @cached_property
-    def logs(self) -> list[Log]:
-        """What the runs are fitted to."""
-        first, longest = next(iter(self.cells.values())), QUICK_S if self.quick else np.inf
-        if self.study.simulated is not None:
-            return [simulated_log(first, self.study.simulated, self.study.truth, longest)]
-        return [log.first(longest) for log in read_logs([FOLDER / n for n in self.study.logs], first)]
+    def seeds(self, cell: str) -> range:
+        """Return the seeds that a cell should have; for a cell without a search, the most."""
+        all_seeds, others = self.study.seeds, self.study.other_seeds or self.study.seeds
+        fewer = cell in self.cells and self.cells[cell].search.algorithm != "ga"
+        return range(1, 1 + min(others if fewer else all_seeds, 1 if self.quick else all_seeds))
 
-    @cached_property
-    def tasks(self) -> list[Task]:
-        """All runs."""
-        seeds = min(self.study.seeds, QUICK_SEEDS) if self.quick else self.study.seeds
-        return make_tasks(self.cells, seeds, self.logs)
+    def truth(self, seed: int) -> dict[str, float]:
+        """Return the true parameters of a seed."""
+        own = seed > self.study.same_record
+        exponents = np.random.default_rng(seed).uniform(-1, 1, len(self.study.truth)) * own
+        return {n: v * TRUTHS_FROM**e for (n, v), e in zip(self.study.truth.items(), exponents, strict=True)}
 
-    def run(self, folder: Path, executor: Executor) -> "Runs":
-        """Perform the runs that `folder` does not have yet; return what all of them gave."""
-        problem, truth = Problem(next(iter(self.cells.values())), self.logs), self.study.truth
-        directions = true_directions(problem, truth) if truth else None
-        results = tuple(run_all(self.tasks, folder, executor, no_progress))
-        pairs = list(zip(self.tasks, results, strict=True))
-        rows = [with_truth(measured(task, one), one, directions) for task, one in pairs]
-        for name, check in self.study.checks.items():
-            errors = self.check_errors(check, pairs)
-            rows = [
-                replace(row, values={**row.values, f"check {name}": error})
-                for row, error in zip(rows, errors, strict=True)
-            ]
-        if rows and directions:
-            rows += directions.without_data(BLIND_DRAWS)
-        return Runs(self, problem, directions, results, tuple(rows))
+    def log(self, seed: int) -> Log:
+        """Return what the runs of a seed are fitted to."""
+        return self._record(seed if self.study.truth and seed > self.study.same_record else 0)
 
-    def check_errors(self, check: CheckLog, runs: Sequence[tuple[Task, Result]]) -> Iterator[float]:
-        """Yield the mean absolute error [deg] of each run on another log; NaN where it diverged."""
-        changes = (self.study.quick if self.quick else {}) | check.set
-        cells = cell_settings(self.study, FOLDER / self.name, changes)
-        (log,) = read_logs([FOLDER / check.log], next(iter(cells.values())))
-        log = log.first(QUICK_S if self.quick else np.inf)
-        for task, result in runs:
-            settings = cells[task.cell]
+    def directions(self, seed: int) -> Directions:
+        """Return what a seed's record determines at its truth."""
+        return self._directions(seed if seed > self.study.same_record else 0)
+
+    def problem(self, seed: int, cell: str = "") -> Problem:
+        """Return the problem of a seed's record, for the first cell where there is no such cell."""
+        return Problem(self.cells.get(cell, next(iter(self.cells.values()))), [self.log(seed)])
+
+    def task(self, cell: str, seed: int) -> Task:
+        """Return one run."""
+        changes = {"search.seed": seed, "simulation.threads": 1}  # the runs are what is shared out
+        return Task(cell, seed, self.cells[cell].changed(changes), (self.log(seed),))
+
+    def row(self, cell: str, seed: int, result: Result) -> dict[str, Any]:
+        """Return a run with all its measures, as it is kept."""
+        row: dict[str, Any] = {"cell": cell, "seed": seed}
+        if "failed" in result:
+            return row | {"failed": result["failed"]}
+        row |= {name: float(value) for name, value in result["measures"].items()} | course(result["history"])
+        row |= {f"value {name}": float(value) for name, value in result["theta"].items()}
+        row["segment bests"] = ";".join(
+            " ".join(f"{value:.6g}" for value in best.values()) for best in result["segment_bests"]
+        )
+        return self.judged(row)
+
+    def judged(self, row: dict[str, Any]) -> dict[str, Any]:
+        """Return a run with the measures of its estimate that it lacks."""
+        problem = self.problem(row["seed"], row["cell"])
+        values = {name: float(row[f"value {name}"]) for name in problem.parameters.names}
+        theta = np.array([*values.values()])
+        found = output_errors(problem, theta)
+        if self.study.truth:
+            found |= self.directions(row["seed"]).measures(values)
+        for number, (file, changes) in enumerate(self.study.checks.items(), 2):
+            if (name := f"check set {number}") not in row:
+                cells = self.settings(changes)
+                settings = cells.get(row["cell"], next(iter(cells.values())))
+                log = read_logs([FOLDER / file], settings)[0].first(self.longest)
+                found[name] = output_errors(Problem(settings, [log]), theta)["mean absolute error"]
+        return found | row
+
+    def _make_directions(self, seed: int) -> Directions:
+        return true_directions(self.problem(seed), self.truth(seed))
+
+    def _make_record(self, seed: int) -> Log:
+        """Read the log, or simulate the truth under pseudo-random commands, as in the article's figure 17."""
+        settings, truth = next(iter(self.cells.values())), self.truth(seed)
+        if not truth:
+            return read_logs([FOLDER / name for name in self.study.logs], settings)[0].first(self.longest)
+        low, high = self.study.range_deg or (-np.inf, np.inf)
+
+        def inside(log: Log) -> bool:
             try:
-                theta = settings.parameter_set().vector(result["theta"], "a run")
-                angle = predict(IdentifiedModel(settings, theta, "a run"), log, settings.outputs)
-            except (RunError, KeyError):
-                yield np.nan
-                continue
-            measured = log.angle[:, [j - 1 for j in settings.outputs]]
-            yield float(np.degrees(np.abs(angle - measured)).mean())
+                angle = np.degrees(simulate_log(settings, log, truth, "truth").angle[:, joints[0] - 1])
+            except RunError:
+                return False
+            return bool(low < angle.min() and angle.max() < high)
+
+        pose, joints = settings.arm.pose("study"), [*settings.outputs]
+        allowed = inside if self.study.range_deg else lambda log: True
+        commands = pseudo_random_log(pose, joints, self.longest, seed=seed, allowed=allowed)
+        return simulate_log(settings, commands, truth, "truth")
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """What a study gave: the problem of its first cell, a result and a row of measures for every run."""
-
-    plan: Plan
-    problem: Problem
-    directions: Directions | None
-    results: tuple[Result, ...]
-    rows: tuple[Row, ...]
-
-    @property
-    def theta(self) -> Array:
-        """The true parameters, shape (P,)."""
-        return self.problem.parameters.vector(self.plan.study.truth, "truth")
-
-    @property
-    def record(self) -> tuple[Array, Array]:
-        """Time [s] and angle [deg] of the first compared joint in the first log, shapes (T,)."""
-        log = self.problem.logs[0]
-        return log.time, np.degrees(log.angle[:, self.problem.outputs[0]])
-
-    def of(self, cell: str) -> list[tuple[Row, Result]]:
-        """Return the runs of a cell that did not fail."""
-        pairs = zip(self.rows, self.results, strict=False)  # blind draws have no result
-        return [(row, result) for row, result in pairs if row.cell == cell and not row.failed]
-
-    def median_run(self, cell: str) -> Result | None:
-        """Return the run of a cell whose error is the median: of the parameters, or of the output."""
-        by = "rms error" if self.directions is None else "parameter error"
-        runs = sorted(self.of(cell), key=lambda pair: pair[0].values[by])
-        return runs[(len(runs) - 1) // 2][1] if runs else None
+def read_runs(file: Path) -> Runs:
+    """Read the runs of a study; none where there is no file."""
+    lines = csv.DictReader(file.read_text(encoding="utf-8").splitlines() if file.is_file() else [])
+    return [
+        {name: text if name in TEXTS else float(text) for name, text in line.items() if text}
+        | {"seed": int(line["seed"])}
+        for line in lines
+    ]
 
 
-def simulated_log(
-    settings: FitSettings, data: Simulated, truth: Mapping[str, float], longest: float = np.inf
-) -> Log:
-    """Return a log simulated at the true parameters, at most `longest` seconds long."""
-    columns, (low, high) = [j - 1 for j in settings.outputs], data.range_deg or (-np.inf, np.inf)
-
-    def inside(log: Log) -> bool:
-        try:
-            angle = np.degrees(simulate_log(settings, log, truth, "truth").angle[:, columns])
-        except RunError:
-            return False
-        return bool(low < angle.min() and angle.max() < high)
-
-    pose, seconds = settings.arm.pose(data.pose), min(data.duration_s, longest)
-    allowed = inside if data.range_deg else lambda log: True
-    commands = pseudo_random_log(pose, list(data.joints), seconds, seed=data.seed, allowed=allowed)
-    return simulate_log(settings, commands, truth, "truth")
+def of_cell(runs: Runs, cell: str, column: str) -> dict[int, float]:
+    """Return a measure of the runs of a cell that have it, by seed."""
+    found = {run["seed"]: run.get(column, np.nan) for run in runs if run["cell"] == cell}
+    return {seed: value for seed, value in found.items() if np.isfinite(value)}

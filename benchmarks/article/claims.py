@@ -1,8 +1,9 @@
 """Verdicts on claims that a ratio of two measures over the same seeds lies below a limit, or near 1.
 
 The ratio is the geometric mean over seeds that both cells have, its interval Student's t of the logarithms.
-The intervals of one item are Holm's: that of the smallest of m p-values has the level 0.05 / m, the next
-0.05 / (m - 1), and so on up to the first that does not reject; all others have its level.
+The intervals of one item are Holm's, for the article's claims, those of equality and ours apart: that of the
+smallest of m p-values has the level 0.05 / m, the next 0.05 / (m - 1), and so on up to the first that does
+not reject; all others have its level.
 """
 
 from collections.abc import Sequence
@@ -53,9 +54,10 @@ class Verdict:
 def verdicts(claims: Sequence[Claim], runs: Runs, tables: Sequence[Table]) -> list[Verdict]:
     """Return the verdict on every claim of a study, in their order."""
     made: dict[str, Verdict] = {}
-    for item, equal in dict.fromkeys((claim.item, claim.equal) for claim in claims):
-        together = [(claim, log_ratios(claim, runs)) for claim in claims]
-        together = [each for each in together if (each[0].item, each[0].equal) == (item, equal)]
+    families = {(claim.item, claim.equal, claim.ours) for claim in claims}
+    for family in families:
+        mine = [claim for claim in claims if (claim.item, claim.equal, claim.ours) == family]
+        together = [(claim, log_ratios(claim, runs)) for claim in mine]
         together.sort(key=lambda each: chance(each[1] - np.log(each[0].below)))
         level, stopped = 0.05, False
         for rank, (claim, logs) in enumerate(together):
@@ -74,17 +76,10 @@ def verdict(claim: Claim, logs: Array, level: float, printed: float | None) -> V
         low, high = student.interval(1 - level, n - 1, middle, deviation / np.sqrt(n))
     expected = None if claim.equal else printed or ASSUMED * claim.below
     effect = np.log(expected / claim.below) if expected else 0.0
-    enough = (k for k in range(3, MOST + 1) if power(effect, deviation, k, level) >= POWER)
-    return Verdict(
-        claim,
-        n,
-        float(np.exp(middle)),
-        (float(np.exp(low)), float(np.exp(high))),
-        printed,
-        power(effect, deviation, n, level),
-        next(enough, MOST + 1),
-        judge(claim, float(np.exp(low)), float(np.exp(high)), expected),
-    )
+    enough = next((k for k in range(3, MOST + 1) if power(effect, deviation, k, level) >= POWER), MOST + 1)
+    ratio, low, high = (float(value) for value in np.exp([middle, low, high]))
+    now, outcome = power(effect, deviation, n, level), judge(claim, low, high, expected)
+    return Verdict(claim, n, ratio, (low, high), printed, now, enough, outcome)
 
 
 def judge(claim: Claim, low: float, high: float, expected: float | None) -> Outcome:

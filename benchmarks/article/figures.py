@@ -6,6 +6,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Drawing
+from pandas import DataFrame
 from scipy.ndimage import minimum_filter
 from studies import Figure, Plan, Runs
 
@@ -26,16 +27,17 @@ def draw(plan: Plan, runs: Runs, figure: Figure, file: Path) -> None:
         drawing.savefig(file, metadata={"Date": None})
 
 
-def _line(axes: Any, time: Array, values: Array, **how: Any) -> None:
-    """Draw a curve over time, 500 samples at most; without more, the data."""
+def _lines(axes: Any, problem: Problem, curves: Array, window: slice = slice(None), **how: Any) -> None:
+    """Draw angles over time, (n, T), 500 samples at most."""
+    time = problem.logs[0].time[window]
     step = max(1, len(time) // 500)
-    axes.plot(time[::step], values[::step], **(how or {"color": "black", "linestyle": "--", "label": "data"}))
+    axes.plot(time[::step], curves[:, window].T[::step], **how)
 
 
-def _data(problem: Problem) -> tuple[Array, Array]:
-    """Time [s] and angle [deg] of the compared joint."""
-    log = problem.logs[0]
-    return log.time, np.degrees(log.angle[:, problem.outputs[0]])
+def _data(axes: Any, problem: Problem, window: slice = slice(None)) -> None:
+    """Draw the data."""
+    angle = np.degrees(problem.logs[0].angle[:, problem.outputs])
+    _lines(axes, problem, angle.T, window, color="black", linestyle="--", label="data")
 
 
 def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
@@ -43,21 +45,17 @@ def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> No
     axes = drawing.subplots()
     axes.set(xlabel="generation", ylabel="best objective" + ", 0 to 1" * figure.normalized)
     for cell, color in zip(figure.cells, COLORS, strict=False):
-        histories = [
-            np.array(run["history"].split(), float)
-            for run in runs
-            if run["cell"] == cell and "history" in run
-        ]
-        if not histories:
+        texts = [run["history"] for run in runs if run["cell"] == cell and "history" in run]
+        if not texts:
             continue
-        length = max(map(len, histories))
-        curves = np.array([np.pad(h, (0, length - len(h)), mode="edge") for h in histories])
+        curves = DataFrame([[float(v) for v in text.split()] for text in texts]).ffill(axis=1).to_numpy()
         if figure.normalized:
             low, high = curves[:, -1:], np.nanmax(curves, axis=1, keepdims=True)
             curves = (curves - low) / np.where(high > low, high - low, 1.0)
         lower, middle, upper = np.nanquantile(curves, (0.25, 0.5, 0.75), axis=0)
-        axes.plot(np.arange(1, length + 1), middle, color=color, label=f"{cell} ({len(histories)} seeds)")
-        axes.fill_between(np.arange(1, length + 1), lower, upper, color=color, alpha=0.12, linewidth=0)
+        generation = np.arange(1, len(middle) + 1)
+        axes.plot(generation, middle, color=color, label=f"{cell} ({len(texts)} seeds)")
+        axes.fill_between(generation, lower, upper, color=color, alpha=0.12, linewidth=0)
         axes.legend(fontsize=8)
     axes.set_yscale("linear" if figure.normalized else "log")
 
@@ -77,31 +75,30 @@ def _responses(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None
         run = sorted(of_one, key=lambda r: r["rms error"])[(len(of_one) - 1) // 2]
         problem = plan.problem(seed, cell)
         if not number:
-            _line(axes, *_data(problem))
+            _data(axes, problem)
         theta = [float(run[f"value {name}"]) for name in problem.parameters.names]
         bests = [best.split() for best in run["segment bests"].split(";")] if with_bests else []
-        *thin, thick = np.degrees(problem.responses(np.array([*bests, theta], float))[0].angle[:, :, 0])
-        for response in thin:
-            _line(axes, problem.logs[0].time, response, color=COLORS[number], lw=0.6, alpha=0.5)
-        _line(axes, problem.logs[0].time, thick, color=COLORS[number], lw=1 + with_bests, label=cell)
+        curves = np.degrees(problem.responses(np.array([*bests, theta], float))[0].angle[:, :, 0])
+        _lines(axes, problem, curves[:-1], color=COLORS[number], lw=0.6, alpha=0.5)
+        _lines(axes, problem, curves[-1:], color=COLORS[number], lw=1 + with_bests, label=cell)
     axes.legend(fontsize=8)
 
 
 def _sensitivity(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> None:
     """The output for 20 values of each of some parameters over their bounds, dark to light."""
     problem, truth = plan.problem(1), plan.directions(1).truth
-    time, angle = _data(problem)
-    shown = slice(*np.searchsorted(time, figure.window_s)) if figure.window_s else slice(None)
+    window = (
+        slice(*np.searchsorted(problem.logs[0].time, figure.window_s)) if figure.window_s else slice(None)
+    )
     panels = drawing.subplots(-(-len(figure.parameters) // 2), 2, sharex=True, squeeze=False)
     for axes, name in zip(panels.ravel(), figure.parameters, strict=False):
         column = problem.parameters.names.index(name)
-        parameter = problem.parameters.parameters[column]
-        candidates = np.tile(truth, (20, 1))
+        parameter, candidates = problem.parameters.parameters[column], np.tile(truth, (20, 1))
         candidates[:, column] = parameter.at(np.linspace(0, 1, 20))
         curves = np.degrees(problem.responses(candidates)[0].angle[:, :, 0])
-        for shade, curve in zip(np.linspace(0, 0.95, 20), curves, strict=True):
-            _line(axes, time[shown], curve[shown], color=mpl.colormaps["viridis"](shade), lw=0.8)
-        _line(axes, time[shown], angle[shown])
+        axes.set_prop_cycle(color=mpl.colormaps["viridis"](np.linspace(0, 0.95, 20)))
+        _lines(axes, problem, curves, window, lw=0.8)
+        _data(axes, problem, window)
         axes.set_title(f"{name}: {parameter.lower:g} to {parameter.upper:g} {parameter.unit}", fontsize=9)
         axes.set(xlabel="time [s]", ylabel="angle [deg]")
 

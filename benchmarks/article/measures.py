@@ -6,14 +6,13 @@ projecting them on the directions that the data determine (page.md).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import Array
 from hydroid.posterior.linear import linearised
 from hydroid.posterior.uncertainty import WEAK_ABOVE
 from hydroid.problem.problem import Problem
@@ -26,18 +25,18 @@ PEAK_DEG = 3.0
 """how far a maximum of the angle stands out to count as a peak [deg]"""
 
 
-@dataclass(frozen=True, eq=False)
 class Directions:
     """What the data determine at the true parameters.
 
-    parameters: all P. truth: their values, (P,). slopes: derivatives of the output by relative changes of the
-    p free ones [rad], (p, R). axes: the identifiable directions, of unit length, (rank, p).
+    slopes: derivatives of the output by relative changes of the p free parameters [rad], (p, R). axes: the
+    identifiable directions, of unit length, (rank, p).
     """
 
-    parameters: ParameterSet
-    truth: Array
-    slopes: Array
-    axes: Array
+    def __init__(self, problem: Problem, truth: Mapping[str, float]) -> None:
+        self.parameters = problem.parameters
+        self.truth = self.parameters.vector(truth, "truth")
+        self.slopes = linearised(problem, self.truth).slopes
+        self.axes = determined(self.slopes)
 
     def measures(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return the errors of an estimate."""
@@ -57,11 +56,11 @@ class Directions:
         names = [n for n, free in zip(self.parameters.names, self.parameters.free, strict=True) if free]
         rms = np.degrees(0.01 * np.sqrt(np.mean(self.slopes**2, axis=1)))
         parts = [self.slopes[:, first:end] for first, end in segments]
-        damping, stiffness = names.index("D"), names.index("S")
-        ratios = [float(np.linalg.norm(p[damping]) / np.linalg.norm(p[stiffness])) for p in parts]
+        norms = np.array([np.linalg.norm(part, axis=1) for part in parts])
+        ratios = norms[:, names.index("D")] / norms[:, names.index("S")]
         return {f"slope {n}": float(s) for n, s in zip(names, rms, strict=True)} | {
-            "D over S, lowest segment": min(ratios),
-            "D over S, highest segment": max(ratios),
+            "D over S, lowest segment": float(min(ratios)),
+            "D over S, highest segment": float(max(ratios)),
             "directions of the record": len(self.axes),
             "directions of one segment": max(len(determined(part)) for part in parts),
         }
@@ -75,31 +74,22 @@ def determined(slopes: Array) -> Array:
     return axes.T[:rank]
 
 
-def true_directions(problem: Problem, truth: Mapping[str, float]) -> Directions:
-    """Return what the data determine at the truth."""
-    theta = problem.parameters.vector(truth, "truth")
-    slopes = linearised(problem, theta).slopes
-    return Directions(problem.parameters, theta, slopes, determined(slopes))
-
-
 def output_errors(problem: Problem, theta: Array) -> dict[str, float]:
     """Return the errors of the first log's compared angle [deg] for parameters (P,), and those at its peaks.
 
     `peak height` is the rise over the start at the measured angle's maxima, simulated over measured.
     """
-    log = problem.logs[0]
-    measured = np.degrees(log.angle[:, problem.outputs[0]])
+    measured = np.degrees(problem.logs[0].angle[:, problem.outputs[0]])
     response = np.degrees(problem.responses(theta[None])[0].angle[0, :, 0])
     error, peaks = response - measured, find_peaks(measured, prominence=PEAK_DEG)[0]
+    masses = [i for i, p in enumerate(problem.parameters.parameters) if p.unit == "kg"]
     found = {
         "largest error": float(np.abs(error).max()),
         "mean absolute error": float(np.abs(error).mean()),
         "mean squared error": float(np.mean(error**2)),
         "rms error": float(np.sqrt(np.mean(error**2))),
         "error over motion": float(np.abs(error).max() / np.ptp(measured)),
-        "total mass": float(
-            sum(theta[i] for i, p in enumerate(problem.parameters.parameters) if p.unit == "kg")
-        ),
+        "total mass": float(sum(theta[masses])),
     }
     if peaks.size:
         rise = float(np.mean(measured[peaks]) - measured[0])

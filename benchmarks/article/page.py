@@ -5,13 +5,13 @@
 docs/reproduction/ has one CSV of all runs for each study, and the figures; page.md here has the words.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 from claims import ASSUMED, MOST, POWER, Outcome, Verdict, verdicts
-from studies import BLIND, CENTRE, FOLDER, RECORDS, Plan, Runs, Table, load_studies, of_cell, read_runs
+from studies import BLIND, CENTRE, FOLDER, RECORDS, Runs, Table, load_studies, of_cell, read_runs
 
 DOCS = FOLDER.parents[1] / "docs"
 QUICK = "> **The short form: one seed, short data, few generations. It shows that the studies run.**\n\n"
@@ -34,7 +34,9 @@ def page(results: Path, *, quick: bool = False) -> str:
     for name, study in studies.items():
         link = f"[{study.title}](../benchmarks/article/{name}.yaml)"
         parts.append(f"\n## {link}\n\n{study.about.strip()}\n")
-        parts += results_of(Plan(name, study), runs[name])
+        cells = [*study.changes()]
+        parts += [study_table(shown, runs[name], cells) for shown in study.tables]
+        parts += [f"\n![{figure.title}](reproduction/{figure.file})\n" for figure in study.figures]
     text = (
         (FOLDER / "page.md")
         .read_text(encoding="utf-8")
@@ -98,14 +100,6 @@ def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note
     above = f"\n**{title}**\n\n" if title else "\n"
     text = "".join(f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows))
     return above + text + (f"\n{note}\n" if note else "")
-
-
-def results_of(plan: Plan, runs: Runs) -> Iterator[str]:
-    """Yield the tables and the figures of a study."""
-    for shown in plan.study.tables:
-        yield study_table(shown, runs, [*plan.cells])
-    for figure in plan.study.figures:
-        yield f"\n![{figure.title}](reproduction/{figure.file})\n"
 
 
 def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:

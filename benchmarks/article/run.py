@@ -121,7 +121,7 @@ def with_what_needs_no_search(plan: Plan, runs: Runs) -> Runs:
         if (cell, seed) not in known:
             rows.append({"cell": cell, "seed": seed} | {f"value {n}": float(v) for n, v in theta.items()})
     for i, row in enumerate(rows):
-        if "value " + parameters.names[0] in row and "peak error" not in row:
+        if "value " + parameters.names[0] in row and "error over motion" not in row:
             rows[i] = plan.judged(row)
     first = plan.study.same_record + 1  # every one has a truth of its own
     for seed in range(first, first + min(plan.study.records, len(seeds))):

@@ -11,7 +11,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from common import pseudo_random_log
-from measures import Directions, course, output_errors, true_directions
+from measures import Directions, course, output_errors
 from pydantic import Field
 
 from hydroid import read_logs
@@ -186,7 +186,7 @@ class Plan:
         return found | row
 
     def _make_directions(self, seed: int) -> Directions:
-        return true_directions(self.problem(seed), self.truth(seed))
+        return Directions(self.problem(seed), self.truth(seed))
 
     def _make_record(self, seed: int) -> Log:
         """Read the log, or simulate the truth under pseudo-random commands, as in the article's figure 17."""

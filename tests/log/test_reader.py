@@ -51,6 +51,11 @@ FAULTS = {
     "a jump": (cell(40, 4, "1000"), "line 41, column q2_deg", "jumps by"),
     "no time of day": (clock, "line 9, column time_s", "12:30:05.25"),
     "no time column": (lambda rows: [r.pop(0) for r in rows], "line 1, column time_s", "lacks 'time_s'"),
+    "two lacking": (
+        lambda rows: [r.__delitem__(slice(2, 4)) for r in rows],
+        "line 1, column u2_pct",
+        "lacks 'u2_pct' (command of joint 2) and 'q1_deg' (angle of joint 1)",
+    ),
     "a name twice": (lambda rows: [r.append(r[3]) for r in rows], "line 1, column q1_deg", "2 columns of"),
     "backwards": (values(lambda t: t[::-1]), "line 3, column time_s", "does not increase"),
     "short": (values(lambda t: t[:20]), "column time_s", "at least 0.5 s is needed"),

@@ -44,8 +44,7 @@ def open_csv(path: Path, data: bytes) -> Table:
         where = f"{path}, line {header + 1}"
         raise LogError("has no header: this line holds numbers", where=where, hint=hint)
     if width == 1:
-        where = f"{path}, line {header + 1}"
-        raise LogError("has one column only", where=where, hint="part cells by , ; | tabs or spaces")
+        raise LogError("has one column only", where=str(path), hint="part cells by , ; | tabs or spaces")
     units = dict[str, str]()
     remarks = [f"line {k + 1} is text and left out" for k in left_out]
     if content[0] < header:

@@ -141,7 +141,6 @@ _HYDRAULIC = (
         (1.0, 5000.0),
         FROM_ZERO,
     ),
-    Quantity("plunger_back", "", ONE, "damping of the plunger on its way back, relative to its way out"),
     Quantity("plunger_stiffness", "N/mm", 2.0, "spring of the plunger", "K of equation (5)"),
     # the valve
     Quantity("slot_width", "mm", (2.0, 2.0), "spool travel to full opening", "w of equation (7)"),

@@ -10,7 +10,7 @@ from hydroid.hydraulics.cylinder import (
     stop_damping,
     triangle,
 )
-from hydroid.hydraulics.records import has_force_curve, linkages, nominal_joints
+from hydroid.hydraulics.records import coefficients, has_force_curve, nominal_joints
 from hydroid.hydraulics.solenoid import (
     coil_force,
     curve_exists,
@@ -109,13 +109,12 @@ def test_triangle_is_a_derivative_chain():
 
 
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
-    joints = nominal_joints(arm, HydraulicSettings())[None].view(np.recarray)
-    moved = linkages(arm, range(7), range(7), joints)[0]
-    for joint, p, c in zip(arm.joints, joints[0], moved, strict=True):
+    moved = coefficients(nominal_joints(arm, HydraulicSettings())[None].view(np.recarray))[0]
+    for joint, c in zip(arm.joints, moved, strict=True):
         if joint.actuator.kind != "linear":
             continue
         q = np.radians(np.linspace(*joint.range, 9))
-        x, r, _ = triangle(q, p.pivot_distance_1, p.pivot_distance_2, c.theta0, c.shortest)
+        x, r, _ = triangle(q, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
         np.testing.assert_allclose(x, joint.actuator.length(q) - joint.actuator.length(q[0]), atol=1e-12)
         np.testing.assert_allclose(r, joint.actuator.moment_arm(q), rtol=1e-12)
 

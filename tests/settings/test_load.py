@@ -38,7 +38,7 @@ LOG_FAULTS = [
     ("command: {column: u}", "{joint}"),
     ("angle: {column: q}", "{joint}"),
     ("command: {column: [a, b, c]}", "1 or 2 column names"),
-    ("command: {column: 3}", "a column's name"),
+    ("command: {column: 3}", "must be a list in brackets"),
     ("command: {scale: 0}", "must not be 0"),
     ("angle: {unit: bar}", "bar is no unit of a log's angles"),
     ("angle: {unit: grad}", "'deg', 'rad'"),

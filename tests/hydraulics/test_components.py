@@ -96,18 +96,6 @@ def test_notches_bend_the_opening_between_its_ends():
     np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
 
 
-def test_triangle_is_a_derivative_chain():
-    q, h = np.linspace(-0.5, 1.5, 50), 1e-5
-    x, r, slope = triangle(q, 0.3, 0.08, np.radians(70), 0.2442)
-    ahead, behind = (
-        triangle(q + h, 0.3, 0.08, np.radians(70), 0.2442),
-        triangle(q - h, 0.3, 0.08, np.radians(70), 0.2442),
-    )
-    np.testing.assert_allclose(r, (ahead[0] - behind[0]) / (2 * h), rtol=1e-7)
-    np.testing.assert_allclose(slope, (ahead[1] - behind[1]) / (2 * h), atol=1e-7)
-    assert x.shape == q.shape
-
-
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
     moved = coefficients(nominal_joints(arm, HydraulicSettings())[None].view(np.recarray))[0]
     for joint, c in zip(arm.joints, moved, strict=True):

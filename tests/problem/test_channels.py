@@ -55,9 +55,7 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
 
 def test_pressures_do_not_change_the_angles(hydraulic):
     settings, log = hydraulic
-    without = settings.model_copy(
-        update={"objective": settings.objective.model_copy(update={"pressure_weight": 0})}
-    )
+    without = settings.changed({"objective.pressure_weight": 0})
     sets = Problem(settings, [log]).parameters.from_unit(np.random.default_rng(0).random((5, 10)))
     with_, bare = (Problem(s, [log]).responses(sets)[0] for s in (settings, without))
     assert np.array_equal(with_.angle, bare.angle, equal_nan=True)

@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from scipy.sparse.csgraph import connected_components
 
 from hydroid.commands.app import COMMANDS
-from hydroid.settings.arm import ArmFile
 from hydroid.settings.fit import FitSettings
 
 ROOT = Path(__file__).parents[1]
@@ -97,7 +96,7 @@ def measures() -> dict[str, float]:
         "tokens": sum(map(tokens, trees)),
         "statements": sum(isinstance(node, ast.stmt) for _, node in nodes) - strings,
         "constants": sum(map(constants, trees.values())),
-        "settings": settings(FitSettings | ArmFile, set()),
+        "settings": settings(FitSettings, set()),
         "commands": len(COMMANDS),
         "make targets": len(set(targets)),
         "classes": sum(isinstance(node, ast.ClassDef) for _, node in nodes),

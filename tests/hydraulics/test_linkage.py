@@ -23,7 +23,7 @@ def with_cylinder(arm: Arm, **changes) -> Arm:
     changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
     settings = cylinder.settings.model_copy(update=changes)
     moved = replace(joint, range=limits, actuator=make_cylinder(settings, np.radians(limits)))
-    other = replace(arm)
+    other = arm.model_copy()
     vars(other)["joints"] = (*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :])
     return other
 

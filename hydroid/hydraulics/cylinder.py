@@ -88,10 +88,8 @@ def rod_motion(angle: Array, c: Any) -> list[Array]:
         turned, rocked = bent(angle, c), four_bar(angle, c)
         psi, first, second = (np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True))
         travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
-    cylinder, kinds = (
-        (travel, arm * first, slope * first**2 + arm * second),
-        (c.kind == LINEAR, c.kind == ROTARY),
-    )
+        cylinder = travel, arm * first, slope * first**2 + arm * second
+    kinds = c.kind == LINEAR, c.kind == ROTARY
     return [np.select(kinds, [x, y], z) for x, y, z in zip(cylinder, turned, still, strict=True)]
 
 

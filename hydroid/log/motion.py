@@ -96,7 +96,7 @@ class JointMotion:
         in the dead band.
         """
         command, angle, speed = self._quick
-        if not speed.any():
+        if not np.ptp(angle):
             return 0.0
         push, fast = command * np.sign(command @ speed), np.abs(speed) / np.abs(speed).max()
         at = (angle - angle.min()) / np.ptp(angle)
@@ -123,12 +123,16 @@ class JointMotion:
 
     def _smoothed(self, seconds: float) -> tuple[Floats, Floats, Floats]:
         """Return command [%], angle [rad] and speed [rad/s] behind a Gaussian."""
-        width, logged = seconds / self.log.period, (self._logged, self.log.angle[:, self.joint - 1])
-        reach = np.arange(-np.ceil(4 * width), np.ceil(4 * width) + 1)
-        bell = np.exp(-0.5 * (reach / width) ** 2)
-        padded = (np.pad(each, len(reach) // 2, "edge") for each in logged)
-        command, angle = (np.convolve(each, bell / bell.sum(), "valid") for each in padded)
-        return command, angle, np.gradient(angle, self.log.period)
+        width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
+        reach = int(4 * width + 0.5)
+        at = np.arange(-reach, reach + 1)
+        bell = np.exp(-0.5 * (at / width) ** 2)
+        bell /= bell.sum()
+        slope = -at / width**2 * bell / self.log.period
+        command, angle = (np.pad(each, reach, "symmetric") for each in (self._logged, angle))
+        pairs = (command, bell), (angle, bell), (angle, slope)
+        command, angle, speed = (np.convolve(*pair, "valid").astype(np.float64) for pair in pairs)
+        return command, angle, speed
 
 
 def _correlations(leading: Floats, following: Floats, most: int) -> Floats:

@@ -54,7 +54,7 @@ def _convergence(drawing: Drawing, plan: Plan, runs: Runs, figure: Figure) -> No
             curves = (curves - low) / np.where(high > low, high - low, 1.0)
         lower, middle, upper = np.nanquantile(curves, (0.25, 0.5, 0.75), axis=0)
         generation = np.arange(1, len(middle) + 1)
-        axes.plot(generation, middle, color=color, label=f"{cell} ({len(texts)} seeds)")
+        axes.plot(generation, middle, color=color, label=f"{cell}, seeds: {len(texts)}")
         axes.fill_between(generation, lower, upper, color=color, alpha=0.12, linewidth=0)
         axes.legend(fontsize=8)
     axes.set_yscale("linear" if figure.normalized else "log")

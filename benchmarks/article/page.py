@@ -20,7 +20,7 @@ TALLY = {
     Outcome.HOLDS: "**{} hold**: {}",
     Outcome.OPPOSITE: "**in {} the opposite holds**: {}",
     Outcome.EXCLUDED: "**in {} an effect of the article's size is excluded** (without one, a halving): {}",
-    Outcome.UNDECIDED: "**{} are undecided**",
+    Outcome.UNDECIDED: "**{} are undecided**: the seeds are too few so far",
 }
 
 
@@ -32,11 +32,13 @@ def page(results: Path, *, quick: bool = False) -> str:
     every = [verdict for each in made.values() for verdict in each]
     parts = [""]
     for name, study in studies.items():
-        link = f"[Settings](../benchmarks/article/{name}.yaml)"
-        parts.append(f"\n## {study.title}\n\n{study.about.strip()} {link}.\n")
+        link = f"[{study.title}](../benchmarks/article/{name}.yaml)"
+        parts.append(f"\n## {link}\n\n{study.about.strip()}\n")
         cells = [*study.changes()]
         parts += [study_table(shown, runs[name], cells) for shown in study.tables]
-        parts += [f"\n![{figure.title}](reproduction/{figure.file})\n" for figure in study.figures]
+        parts += [
+            f"\n![{figure.title.partition(':')[0]}](reproduction/{figure.file})\n" for figure in study.figures
+        ]
     text = (
         (FOLDER / "page.md")
         .read_text(encoding="utf-8")
@@ -95,11 +97,11 @@ def claims_table(made: Iterable[Verdict]) -> str:
     return table("", ("item", "claim", "ratio", "article's", "power", "verdict", "seeds"), lines)
 
 
-def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
+def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table in Markdown."""
     above = f"\n**{title}**\n\n" if title else "\n"
     text = "".join(f"| {' | '.join(row)} |\n" for row in (header, ["---"] * len(header), *rows))
-    return above + text + (f"\n{note}\n" if note else "")
+    return above + text
 
 
 def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
@@ -113,7 +115,7 @@ def study_table(shown: Table, runs: Runs, cells: Sequence[str]) -> str:
         texts = [t if v is None else f"{t} ({v:g})".strip() for t, v in zip(texts, printed, strict=True)]
         if any(texts):
             lines.append([cell, str(max(map(len, columns)) or ""), *texts])
-    return table(shown.title, ("", "runs", *shown.columns), lines, shown.note)
+    return table(shown.title, ("", "runs", *shown.columns), lines)
 
 
 def number(value: float) -> str:

@@ -43,7 +43,6 @@ class Table(Settings):
     columns: tuple[str, ...]
     article: dict[str, tuple[float | None, ...]] = Field(default_factory=dict[str, Any])
     cells: tuple[str, ...] = ()
-    note: str = ""
 
 
 class Figure(Settings):
@@ -83,16 +82,15 @@ class Claim(Settings):
 class ArticleStudy(StudySettings):
     """A study with what the article prints and says of it.
 
-    other_seeds: number of seeds of cells that are not the simple GA's. same_record: seeds up to this one
-    share the article's truth and one record; every later one has its own. records: number of records on
-    which the model itself is looked at. truth: the article's; none: `logs` are fitted. range_deg: where
+    seeds: of the simple GA's cells; others have half as many. same_record: seeds up to this one share the
+    article's truth and one record; every later one has its own. records: number of records on which the
+    model itself is looked at. truth: the article's; none: `logs` are fitted. range_deg: where
     simulated data keep the compared joint. checks: settings by further log. quick: settings that the short
     form replaces in every cell.
     """
 
     logs: tuple[str, ...] = ()
     about: str
-    other_seeds: int | None = None
     same_record: int = 0
     records: int = 0
     truth: dict[str, float] = Field(default_factory=dict[str, float])
@@ -129,10 +127,9 @@ class Plan:
         return self.settings({})
 
     def seeds(self, cell: str) -> range:
-        """Return the seeds that a cell should have; for a cell without a search, the most."""
-        all_seeds, others = self.study.seeds, self.study.other_seeds or self.study.seeds
-        fewer = cell in self.cells and self.cells[cell].search.algorithm != "ga"
-        return range(1, 1 + min(others if fewer else all_seeds, 1 if self.quick else all_seeds))
+        """Return the seeds that a cell should have; half as many where the search is not the simple GA."""
+        half = cell in self.cells and self.cells[cell].search.algorithm != "ga"
+        return range(1, 1 + min(self.study.seeds // (1 + half), 1 if self.quick else self.study.seeds))
 
     def truth(self, seed: int) -> dict[str, float]:
         """Return the true parameters of a seed."""

@@ -5,6 +5,7 @@ import os
 import resource
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -191,7 +192,8 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
     arm = SETTINGS.arm
 
     def other(**changes):
-        return SETTINGS.changed({"arm": arm.changed(changes)}), read_logs([path], SETTINGS)
+        changed = replace(arm, file=arm.file.model_copy(update=changes))
+        return SETTINGS.changed({"arm": changed}), read_logs([path], SETTINGS)
 
     with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
         folder.begin(*other(actuators={}))

@@ -198,7 +198,7 @@ def write_log(world: World, path: Path, seconds: float = 30.0, number: int = 0) 
     )
     for k in range(steps):
         command[k] = command[k - 1]
-        for j in np.flatnonzero(until <= k * step):
+        for j in np.flatnonzero(until <= k * step) if k % every == 0 else ():  # a sample shows each change
             until[j] += drive.uniform(0.5, 3)
             part = (now[j] - low[j]) / (high[j] - low[j])
             way = -1 if part > 0.7 else 1 if part < 0.3 else drive.choice([-1, 1])

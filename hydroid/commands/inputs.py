@@ -23,7 +23,6 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load, parse_override
 
 if TYPE_CHECKING:
-    from hydroid.commands.fit import FitResult
     from hydroid.log import Log
 
 P = ParamSpec("P")
@@ -33,7 +32,8 @@ Source = str | Path
 ConfigSource = str | Path | FitSettings
 LogSource: TypeAlias = "str | Path | Log"
 LogSources: TypeAlias = "LogSource | Sequence[LogSource] | None"
-ModelSource: TypeAlias = "str | Path | IdentifiedModel | FitResult"
+ModelSource: TypeAlias = "str | Path | IdentifiedModel | Any"
+"""a run or a file, a model, or what a fit returned (`commands.fit.FitResult`, which builds on this file)"""
 SettingChanges = Mapping[str, Any] | Sequence[str] | None
 """settings to replace: values by dotted key, or texts `KEY=VALUE`"""
 

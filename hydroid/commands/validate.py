@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydroid.commands.console import Result, written
-from hydroid.commands.fit import FitResult
 from hydroid.commands.inputs import (
     LogSources,
     ModelSource,
@@ -82,7 +82,7 @@ def validate(
             fitted, baselines, predictions = _left_out(model, own)
         else:
             fitted, baselines, hashes = fitted_by(model)
-            if isinstance(one, FitResult):
+            if not isinstance(one, str | Path | IdentifiedModel):
                 fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
             new = [None if hashes is None else log_hash(log) not in hashes for log in own]
             predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]

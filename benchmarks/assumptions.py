@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 import yaml
-from common import noisy, options, pseudo_random_log, row, table
+from common import noisy, options, row, table, true_log
 
 import hydroid
 from hydroid.advice.assumptions import doubts
 from hydroid.log import Log
-from hydroid.prediction import simulate_log
 from hydroid.settings.fit import FitSettings
 
 PERIOD, SECONDS, LOGS = 0.05, 60.0, 3
@@ -30,6 +29,9 @@ MODEL = (
 )
 SIDES = {"open": ("opening", {"within": 4}), "dead": ("dead_band", {"sd": 12, "bounds": [5, 65]}),
          "power": ("opening_exponent", {"within": 3})}  # fmt: skip
+SIDED = {"dead_band": (15, 45), "opening_exponent": (1, 2), "notch_2": (0.8, 1.25), "notch_3": (0.8, 1.25),
+         "plunger_damping": (50, 300), "pilot_lag": (0, 0.1)}  # fmt: skip
+"""ends between which the truth of a side is drawn"""
 FREE: dict[str, Any] = {
     **{f"{n}_{s}": {"quantity": f"{q}_{s}", "each": True} | p for n, (q, p) in SIDES.items() for s in "ab"},
     "delay": {"quantity": "delay", "each": True, "bounds": [0, 1], "start": 0.1},
@@ -38,6 +40,7 @@ FREE: dict[str, Any] = {
     "bend": {"quantity": "lever_bend", "each": True, "nominal": 0, "sd": 0.2},
     "M": {"quantity": "mass", "each": True, "within": 2},
 }
+SEARCH = {"starts": 1, "horizons": [], "iterations": 15}
 PUMP = {"flow": {"quantity": "pump_flow", "within": 2}, "droop": {"quantity": "pump_droop", "within": 3}}
 
 
@@ -54,15 +57,11 @@ class RandomArm:
         self.axis, self.tilt = rng.choice([-1, 1], self.joints), rng.uniform(-40, 10)
         self.bow = rng.uniform(-0.2, 0.2, self.joints)
         reach = np.cumsum(self.length)
-        weight = [
-            9.81
-            * sum(
-                self.mass[k] * (reach[k] - reach[j] + self.length[j] - self.length[k] / 2)
-                for k in range(j, self.joints)
-            )
-            for j in range(self.joints)
-        ]
-        self.size = np.array(weight) / (rng.uniform(0.25, 0.6, self.joints) * 2e7)  # m³/rad
+        # of the links from each joint on, each in its middle [N·m]
+        middle = reach - self.length / 2
+        beyond = np.triu(middle - (reach - self.length)[:, None])
+        weight = 9.81 * (self.mass * beyond).sum(axis=1)
+        self.size = weight / (rng.uniform(0.25, 0.6, self.joints) * 2e7)  # m³/rad
         self.opening = self.size * rng.uniform(0.25, 0.7, self.joints) / (0.7 * np.sqrt(2 / 860 * 1e7))  # m²
 
     def settings(self, folder: Path, parameters: dict[str, Any], wrong: int | None = None) -> FitSettings:
@@ -73,13 +72,10 @@ class RandomArm:
             sizes = {"length": self.length[j], "bow": self.bow[j], "mass": self.mass[j]}
             bodies += BODY.format(joint=j + 1, place=place, axis=axis, **sizes)
         (folder / "arm.xml").write_text(MODEL.format(bodies=bodies + "</body>" * self.joints, tilt=self.tilt))
+        pairs = zip((1e6 * self.size).tolist(), (1e6 * self.opening).tolist(), strict=True)
         sizes = {
-            f"j{j + 1}": {
-                "kind": "rotary",
-                "displacement": float(1e6 * self.size[j]),
-                "max_opening": float(1e6 * self.opening[j]),
-            }
-            for j in range(self.joints)
+            f"j{j}": {"kind": "rotary", "displacement": size, "max_opening": opening}
+            for j, (size, opening) in enumerate(pairs, 1)
         }
         (folder / "arm.yaml").write_text(yaml.safe_dump({"model": "arm.xml", "actuators": sizes}))
         flow = 2.8 * self.opening.sum() * 0.7 * np.sqrt(2 / 860 * 1e7) * 6e4
@@ -95,10 +91,7 @@ class RandomArm:
             "hydraulics": known | ({"pump_flow": float(flow), "pump_droop": 60} if self.droops else {}),
             "parameters": parameters | (PUMP if self.droops else {}),
             "objective": {"norm": 2, "segments": 4},
-            "search": {
-                "algorithm": "multistart",
-                "multistart": {"starts": 1, "horizons": [], "iterations": 15},
-            },
+            "search": {"algorithm": "multistart", "multistart": SEARCH},
             "refinement": {"iterations": 25, "gain_tolerance": 0.001},
         }
         (folder / "fit.yaml").write_text(yaml.safe_dump(document))
@@ -109,46 +102,24 @@ class RandomArm:
         rng, truth = np.random.default_rng([seed, 5]), dict[str, float]()
         for j in range(1, self.joints + 1):
             for side in "ab":
-                truth |= {
-                    f"dead_band_{side}_{j}": rng.uniform(15, 45),
-                    f"opening_exponent_{side}_{j}": rng.uniform(1, 2),
-                }
-                truth |= {f"notch_{n}_{side}_{j}": rng.uniform(0.8, 1.25) for n in (2, 3)}
-                truth |= {
-                    f"plunger_damping_{side}_{j}": rng.uniform(50, 300),
-                    f"pilot_lag_{side}_{j}": rng.uniform(0, 0.1),
-                }
-            truth |= {
-                f"delay_{j}": rng.uniform(0.02, 0.2),
-                f"lever_slope_{j}": rng.normal(0, 0.15),
-                f"lever_bend_{j}": rng.normal(0, 0.15),
-            }
+                truth |= {f"{name}_{side}_{j}": rng.uniform(*ends) for name, ends in SIDED.items()}
+            truth[f"delay_{j}"] = rng.uniform(0.02, 0.2)
+            truth |= {f"lever_{shape}_{j}": rng.normal(0, 0.15) for shape in ("slope", "bend")}
         fixed = {n: {"quantity": n[:-2], "joints": [int(n[-1])], "fixed": float(v)} for n, v in truth.items()}
         for j, nominal in enumerate(self.mass):
             mass = float(nominal * np.exp(rng.normal(0, 0.25)))
             fixed[f"M_j{j + 1}"] = {"quantity": "mass", "link": f"j{j + 1}", "fixed": mass}
         settings = self.settings(folder, fixed)
-        settings = settings.model_copy(
-            update={"parameters": {n: p for n, p in settings.parameters.items() if p.fixed is not None}}
+        settings = settings.changed(
+            {"parameters": {n: p for n, p in settings.parameters.items() if p.fixed is not None}}
         )
-        low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
-
-        def off_the_stops(log: Log) -> bool:
-            angle = simulate_log(settings, log, {}, "truth").angle
-            return bool(np.all((angle > low) & (angle < high)))
-
-        drives = (
-            pseudo_random_log(
-                rng.uniform(-0.4, 0.4, self.joints),
-                list(range(1, self.joints + 1)),
-                SECONDS,
-                PERIOD,
-                100 * seed + i,
-                off_the_stops,
-            )
-            for i in range(LOGS)
-        )
-        return [noisy(simulate_log(settings, drive, {}, "truth"), rng, 0.05) for drive in drives]
+        joints = list(range(1, self.joints + 1))
+        logs = list[Log]()
+        for i in range(LOGS):
+            pose = rng.uniform(-0.4, 0.4, self.joints)
+            log = true_log(settings, {}, joints, SECONDS, 100 * seed + i, pose)
+            logs.append(noisy(log, rng, 0.05))
+        return logs
 
 
 def doubted(settings: FitSettings, logs: list[Log]) -> tuple[list[int], str]:

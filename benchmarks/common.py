@@ -96,17 +96,25 @@ def pseudo_random_log(
 
 
 def true_log(
-    settings: FitSettings, truth: Mapping[str, float], joints: Iterable[int], seconds: float, seed: int = 3
+    settings: FitSettings,
+    truth: Mapping[str, float],
+    joints: Sequence[int],
+    seconds: float,
+    seed: int = 3,
+    pose: np.ndarray | None = None,
 ) -> Log:
-    """Return the response to pseudo-random commands of some joints that keeps off the stops."""
+    """Return the response to pseudo-random commands of some joints that keeps off the stops.
+
+    It starts in a pose [rad], shape (J,), by default the one named study.
+    """
     low, high = settings.arm.lower + 0.05, settings.arm.upper - 0.05
 
     def off_the_stops(log: Log) -> bool:
         angle = simulate_log(settings, log, truth, "truth").angle
         return bool(np.all((angle > low) & (angle < high)))
 
-    pose = settings.arm.pose("study")
-    drive = pseudo_random_log(pose, list(joints), duration=seconds, seed=seed, allowed=off_the_stops)
+    pose, period = settings.arm.pose("study") if pose is None else pose, settings.log.period_s
+    drive = pseudo_random_log(pose, list(joints), seconds, period, seed, off_the_stops)
     return simulate_log(settings, drive, truth, "truth")
 
 

@@ -102,9 +102,8 @@ def parameters(known: Iterator[tuple[Problem, Uncertainty]], chosen: np.ndarray)
 
 def intervals(given: Any, *, start: bool = False) -> None:
     """Do intervals hold where the noise is white, and where it is slow?"""
-    settings = mech(
-        [2, 3], "K", "D", "S", "M2", "M6", free_start=start, **{"refinement.gain_tolerance": 1e-6}
-    )
+    how = {"free_start": start, "refinement.gain_tolerance": 1e-6}
+    settings = mech([2, 3], "K", "D", "S", "M2", "M6", **how)
     clean, free = true_log(settings, MECH, [2, 3], given.seconds), settings.parameter_set().free
     names, truth = named([*MECH], free), np.array([*MECH.values()])[free]
     for time in given.correlation_times:
@@ -171,12 +170,8 @@ def own_arm(given: Any) -> None:
 
         known = fits(settings, truth, lambda rng: [new_log(next(seeds)), new_log(next(seeds))], given.fits)
         true = settings.parameter_set().vector(truth, "truth")
-        report(
-            "own arm",
-            named(settings.parameter_set().names, true > 0),
-            true[true > 0],
-            parameters(known, true > 0),
-        )
+        names = named(settings.parameter_set().names, true > 0)
+        report("own arm", names, true[true > 0], parameters(known, true > 0))
 
 
 def bands(given: Any) -> None:
@@ -190,35 +185,25 @@ def bands(given: Any) -> None:
         return noisy(simulate_log(settings, drive, values, "truth"), rng, start=True)
 
     table("the other log | inside the band, median (range) | the model is blamed")
-    for name, factor in {
-        "same values": 1.0,
-        "S 5 % wrong": 1.05,
-        "S 20 % wrong": 1.2,
-        "S 50 % wrong": 1.5,
-    }.items():
-        found = []
+    for percent in (0, 5, 20, 50):
+        found, wrong = [], MECH | {"S": (1 + percent / 100) * MECH["S"]}
         for seed in range(given.fits):
             rng = np.random.default_rng(seed)
             problem = Problem(settings, [steps(MECH, rng)])
             theta, _ = refined(problem, problem.parameters.vector(MECH, "truth"))
             model = IdentifiedModel(settings, theta, "fit", account(problem, uncertainty(problem, theta)))
-            log = steps(MECH | {"S": factor * MECH["S"]}, rng)
+            log = steps(wrong, rng)
             found.append(prediction_bands(model, log, predict(model, log, settings.outputs))[2])
         low, middle, high = np.quantile([100 * band.inside for band in found], [0.0, 0.5, 1.0])
         blamed = sum(band.model_limits for band in found)
-        row(name, f"{middle:.0f} % ({low:.0f} to {high:.0f})", f"{blamed} of {given.fits}")
+        row(f"S {percent} % wrong", f"{middle:.0f} % ({low:.0f} to {high:.0f})", f"{blamed} of {given.fits}")
 
 
 def left_out(given: Any) -> None:
     """Does a fit know how well it predicts a log that it has not seen?"""
     # logs, and the samples at which they rest where a piece begins
-    pieces = [
-        ("shoulder_1", 0),
-        ("shoulder_1", 2200),
-        ("shoulder_2", 0),
-        ("shoulder_2", 3300),
-        ("all_joints_1", 0),
-    ]
+    pieces = [("shoulder_1", 0), ("shoulder_1", 2200), ("shoulder_2", 0), ("shoulder_2", 3300)]
+    pieces.append(("all_joints_1", 0))
     masses = load_settings("fit-hyd").arm.masses
     changes: dict[str, object] = {"simulation.other_joints": "measured", "search.nsga2.generations": 3}
     changes |= {f"log.joints.{joint}.command": None for joint in (1, 3, 4, 5, 6, 7)}
@@ -228,12 +213,9 @@ def left_out(given: Any) -> None:
         for name, first in pieces:
             (log,) = hydroid.read_logs([EXAMPLES / "logs" / f"rig_{name}.csv"], settings)
             part = slice(first, first + round(given.seconds / log.period))
-            cut = {
-                "time": log.time[: part.stop - first],
-                "command": log.command[part],
-                "angle": log.angle[part],
-            }
-            logs.append(replace(log, source=f"{name} from {first}.csv", **cut))
+            cut = {"command": log.command[part], "angle": log.angle[part]}
+            time = log.time[: part.stop - first]
+            logs.append(replace(log, source=f"{name} from {first}.csv", time=time, **cut))
         model = hydroid.fit(settings, logs).model
         print(f"\nstage {stage}")
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")

@@ -102,12 +102,9 @@ def study(given: Any) -> None:
 
     designed, drawn = best.best.experiment, weakest([predicted(e) for e in randoms])
     middle = np.argsort(drawn[:, -1])[(len(drawn) - 1) // 2]  # the better of the two in the middle
-    refits = (weakest(refitted(settings, response(e), given.fits)) for e in (randoms[middle], designed))
-    typical, (at_random, as_designed), best_sd = (
-        np.median(drawn, axis=0),
-        refits,
-        weakest(predicted(designed)),
-    )
+    pair = randoms[middle], designed
+    at_random, as_designed = (weakest(refitted(settings, response(e), given.fits)) for e in pair)
+    typical, best_sd = np.median(drawn, axis=0), weakest(predicted(designed))
     columns = (typical, drawn[middle], at_random, best_sd, as_designed)
     print(f"standard deviations [%], {given.duration:g} s, {NOISE_DEG} deg of noise")
     print(f"weakest parameter of the best random one: {100 * drawn[:, -1].min():.3g}")
@@ -115,12 +112,8 @@ def study(given: Any) -> None:
         "parameter | random, median of predicted | median random one, predicted | refitted "
         "| designed, predicted | refitted | ratio predicted | ratio refitted",
         "{} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f}",
-        *(
-            [*ARTICLE_TRUTH, "weakest"],
-            *(100 * sd for sd in columns),
-            typical / best_sd,
-            at_random / as_designed,
-        ),
+        *([*ARTICLE_TRUTH, "weakest"], *(100 * sd for sd in columns)),
+        *(typical / best_sd, at_random / as_designed),
     )
 
 

@@ -44,14 +44,8 @@ def study(seed: int) -> None:
     for kind, those in logs.items():
         error = [np.abs(log.angle[:, [j - 1 for j in joints]] - predict(model, log, joints)) for log in those]
         mean = dict(zip(joints, np.degrees(np.concatenate(error).mean(axis=0)), strict=True))
-        row(
-            seed,
-            f"{kind}_*",
-            *(f"{mean[joint]:.2f}" for joint in JOINTS),
-            simulations,
-            result.ending.value,
-            clock,
-        )
+        errors = (f"{mean[joint]:.2f}" for joint in JOINTS)
+        row(seed, f"{kind}_*", *errors, simulations, result.ending.value, clock)
 
 
 if __name__ == "__main__":

@@ -14,14 +14,12 @@ travel. A joint that is not good must be named by the verdict.
 
 import shutil
 import sys
-import time
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import options, row, table
+from common import Clock, options, row, table
 from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -38,88 +36,61 @@ GRAVITY = 9.81
 NAMES = ("swing", "boom", "arm", "bucket", "wrist", "tool")
 
 
-@dataclass(frozen=True)
 class Machine:
-    """A random machine of J joints; joint 0 may turn about the vertical, the others lift for positive angles.
+    """A random machine of J joints; a `vertical` axis only swings, the others lift for positive angles.
 
-    length [m], mass [kg]: of the links, (J,). lower, upper [rad]. full: speed at full command without load in
-    both directions [rad/s], (J, 2). dead [%], exponent: (J, 2). delay, lag [s], (J,). early: whether the lag
-    is before the dead band. load: torque of gravity at which a joint stands still [N·m], (J,); friction: the
-    same as a part of it. lever: change of the moment arm over the range, 0 of a rotary actuator, (J,). droop:
-    fall of the supply at the pump's full flow, 0 without a shared pump. draw: flow of each direction at full
-    speed, as a part of the pump's, (J, 2). frequency [Hz], ratio: of oil and inertia, (J,); inf: unseen.
+    length [m], mass [kg]: of the links, (J,). ends: of the joints' ranges [rad], (J, 2). full: speed at full
+    command without load in both directions [rad/s], (J, 2). dead [%], exponent: (J, 2). delay, lag [s], (J,).
+    early: whether the lag is before the dead band. load: torque of gravity at which a joint stands still
+    [N·m], (J,); friction: the same as a part of it. lever: change of the moment arm over the range, 0 of a
+    rotary actuator, (J,). droop: fall of the supply at the pump's full flow, 0 without a shared pump. draw:
+    flow of each direction at full speed, as a part of the pump's, (J, 2). stiff: square of the frequency of
+    oil and inertia [rad²/s²], (J,), 0: unseen; ratio: its damping ratio. noise [rad], rate [Hz]: of the logs.
     """
 
-    names: tuple[str, ...]
-    vertical: NDArray[np.bool_]
-    length: Array
-    mass: Array
-    lower: Array
-    upper: Array
-    full: Array
-    dead: Array
-    exponent: Array
-    delay: Array
-    lag: Array
-    early: NDArray[np.bool_]
-    load: Array
-    friction: Array
-    lever: Array
-    droop: float
-    draw: Array
-    frequency: Array
-    ratio: Array
-    noise: float
-    rate: float
+    def __init__(self, rng: Generator, number: int) -> None:
+        joints = int(rng.integers(3, 7))
+        swings = joints > 3 or rng.random() < 0.5
+        chain = slice(0 if swings else 1, joints + (not swings))
+        self.names, self.joints = NAMES[chain], joints
+        size = 10 ** rng.uniform(np.log10(0.2), np.log10(20))  # t
+        self.length = 2.2 * size ** (1 / 3) * np.array([0.3, 1.0, 0.7, 0.35, 0.3, 0.25, 0.25])[chain]
+        self.mass = 1000 * size * np.array([0.45, 0.12, 0.07, 0.04, 0.02, 0.015, 0.015])[chain]
+        ranges = {"swing": (-120, 120), "boom": (-30, 60), "arm": (-140, -25), "bucket": (-120, 30)}
+        self.ends = np.radians([ranges.get(name, (-60, 60)) for name in self.names])
+        self.vertical = np.array([name == "swing" for name in self.names])
+        self.full = np.radians(rng.uniform(8, 40, (joints, 1))) * rng.uniform(0.7, 1.4, (joints, 2))
+        self.dead = np.clip(rng.choice([5.0, 20.0, 40.0]) + rng.normal(0, 4, (joints, 2)), 0, 60)
+        exponent = rng.uniform(0.7, 3.0, (joints, 1)) * rng.uniform(0.9, 1.1, (joints, 2))
+        self.exponent = np.clip(exponent, 0.7, 3.0)
+        self.draw = np.tile(rng.uniform(0.2, 0.6, (joints, 1)), (1, 2))
+        if rng.random() < 1 / 3:
+            self.draw *= rng.uniform(0.3, 1.0, (joints, 2))
+        own = np.zeros(joints)
+        gravity_torque(self.ends.mean(axis=1), self.vertical, self.length, self.mass, own)
+        reach = np.maximum(np.abs(own), 0.3 * GRAVITY * self.mass * self.length)
+        self.delay = np.full(joints, rng.uniform(0, 0.4)) * rng.uniform(0.8, 1.0, joints)
+        self.lag = rng.uniform(0.02, 0.25, joints)
+        self.early = rng.random(joints) < 0.3
+        self.load = reach * rng.uniform(2, 5, joints)
+        self.friction = rng.uniform(0, 0.1, joints)
+        straight = self.vertical | (rng.random(joints) < 0.4)
+        self.lever = np.where(straight, 0.0, rng.uniform(0.1, 0.4, joints))
+        self.droop = float(rng.uniform(0.2, 0.6)) if number % 2 == 0 else 0.0
+        visible = number % 4 < 2
+        self.stiff = (2 * np.pi * rng.uniform(0.8, 4.0, joints)) ** 2 if visible else np.zeros(joints)
+        self.ratio = rng.uniform(0.1, 0.6, joints)
+        self.noise = np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2)))
+        self.rate = float(rng.choice([10, 20, 50, 100]))
 
-
-def random_machine(rng: Generator, number: int) -> Machine:
-    """Draw a machine."""
-    joints = int(rng.integers(3, 7))
-    swings = joints > 3 or rng.random() < 0.5
-    names = NAMES[:joints] if swings else NAMES[1 : joints + 1]
-    size = 10 ** rng.uniform(np.log10(0.2), np.log10(20))  # t
-    length = 2.2 * size ** (1 / 3) * np.array([0.3, 1.0, 0.7, 0.35, 0.3, 0.25])[: joints + (not swings)]
-    mass = 1000 * size * np.array([0.45, 0.12, 0.07, 0.04, 0.02, 0.015])[: joints + (not swings)]
-    if not swings:
-        length, mass = length[1:], mass[1:]
-    ranges = {"swing": (-120, 120), "boom": (-30, 60), "arm": (-140, -25), "bucket": (-120, 30)}
-    ends = np.radians([ranges.get(name, (-60, 60)) for name in names])
-    vertical = np.array([name == "swing" for name in names])
-    full = np.radians(rng.uniform(8, 40, (joints, 1))) * rng.uniform(0.7, 1.4, (joints, 2))
-    dead = np.clip(rng.choice([5.0, 20.0, 40.0]) + rng.normal(0, 4, (joints, 2)), 0, 60)
-    exponent = np.clip(rng.uniform(0.7, 3.0, (joints, 1)) * rng.uniform(0.9, 1.1, (joints, 2)), 0.7, 3.0)
-    shared = number % 2 == 0
-    draw = np.tile(rng.uniform(0.2, 0.6, (joints, 1)), (1, 2))
-    if rng.random() < 1 / 3:
-        draw *= rng.uniform(0.3, 1.0, (joints, 2))
-    visible = number % 4 < 2
-    own = np.zeros(joints)
-    gravity_torque(ends.mean(axis=1), vertical, length, mass, own)
-    reach = np.maximum(np.abs(own), 0.3 * GRAVITY * mass * length)
-    return Machine(
-        tuple(names),
-        vertical,
-        length,
-        mass,
-        ends[:, 0],
-        ends[:, 1],
-        full,
-        dead,
-        exponent,
-        delay=np.full(joints, rng.uniform(0, 0.4)) * rng.uniform(0.8, 1.0, joints),
-        lag=rng.uniform(0.02, 0.25, joints),
-        early=rng.random(joints) < 0.3,
-        load=reach * rng.uniform(2, 5, joints),
-        friction=rng.uniform(0, 0.1, joints),
-        lever=np.where(vertical | (rng.random(joints) < 0.4), 0.0, rng.uniform(0.1, 0.4, joints)),
-        droop=float(rng.uniform(0.2, 0.6)) if shared else 0.0,
-        draw=draw,
-        frequency=rng.uniform(0.8, 4.0, joints) if visible else np.full(joints, np.inf),
-        ratio=rng.uniform(0.1, 0.6, joints),
-        noise=np.radians(10 ** rng.uniform(np.log10(0.02), np.log10(0.2))),
-        rate=float(rng.choice([10, 20, 50, 100])),
-    )
+    def simulate(self, command: Array, start: Array) -> Array:
+        """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
+        sided = (*self.ends.T, *self.full.T, *self.dead.T, *self.exponent.T, *self.draw.T)
+        single = (self.length, self.mass, self.lag, self.early, self.load, self.friction, self.lever)
+        numbers = np.array([*single, self.stiff, self.ratio, *sided], float)
+        late = np.round(self.delay / STEP).astype(np.int64)
+        command = np.ascontiguousarray(command)
+        return integrate(command, start, late, self.vertical, numbers, self.droop)
 
 
 @njit(cache=True)
@@ -153,9 +124,9 @@ def speeds(supply: float, part: Array, lift: Array, friction: Array, turn: Array
 
 @njit(cache=True)
 def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: Array, droop: float) -> Array:
-    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as `Machine.numbers`."""
+    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J); `numbers` as in `Machine.simulate`."""
     steps, joints = command.shape
-    length, mass, lower, upper, lag, early, load, friction, lever, stiff, ratio = numbers[:11]
+    length, mass, lag, early, load, friction, lever, stiff, ratio, lower, upper = numbers[:11]
     full, dead, exponent, draw = numbers[11:13], numbers[13:15], numbers[15:17], numbers[17:19]
     angle, found = start.copy(), np.empty((steps, joints))
     held, speed, force = np.zeros(joints), np.zeros(joints), np.zeros(joints)
@@ -196,124 +167,99 @@ def integrate(command: Array, start: Array, late: Any, vertical: Any, numbers: A
     return found
 
 
-def simulate(m: Machine, command: Array, start: Array) -> Array:
-    """Angles [rad], (T, J), under commands of STEP [s] and %, (T, J)."""
-    stiff = np.where(np.isfinite(m.frequency), (2 * np.pi * np.minimum(m.frequency, 50)) ** 2, 0.0)
-    ends = (m.length, m.mass, m.lower, m.upper, m.lag, m.early, m.load, m.friction, m.lever, stiff, m.ratio)
-    numbers = np.array([*ends, *m.full.T, *m.dead.T, *m.exponent.T, *m.draw.T], float)
-    late = np.round(m.delay / STEP).astype(np.int64)
-    return integrate(np.ascontiguousarray(command), start, late, m.vertical, numbers, m.droop)
-
-
-def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array, Array]:
-    """Commands as a person gives them, kept off the stops, with the angles that follow and the start."""
-    steps, joints = round(seconds / STEP), len(m.names)
-    start = m.lower + (m.upper - m.lower) * rng.uniform(0.35, 0.65, joints)
-    command = trial = np.zeros((steps, joints))
-    angle = moved = np.tile(start, (steps, 1))
-    block = round(10.0 / STEP)
+def stick(rng: Generator, m: Machine, seconds: float) -> tuple[Array, Array]:
+    """Commands as a person gives them, kept off the stops, with the angles that follow."""
+    steps, (lower, upper) = round(seconds / STEP), m.ends.T
+    start, margin = lower + (upper - lower) * rng.uniform(0.35, 0.65, m.joints), 0.04 * (upper - lower)
+    command, angle, block = np.zeros((steps, m.joints)), np.tile(start, (steps, 1)), round(10.0 / STEP)
     for first in range(0, steps, block):
         last = min(first + block, steps)
+        trial, moved = command, angle
         for _ in range(12):
             trial = command.copy()
-            for j in range(joints):
+            for j in range(m.joints):
                 k = first + (round(1.0 / STEP) if first == 0 else 0)
                 while k < last:
                     hold = round(rng.uniform(0.5, 3.0) / STEP)
                     level = rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) * 100 if rng.random() < 0.6 else 0.0
                     ramp = min(round(rng.uniform(0.05, 0.5) / STEP), hold)
                     end = min(k + hold, last)
-                    before = trial[k - 1, j]
-                    trial[k:end, j] = level
-                    n = min(ramp, end - k)
-                    trial[k : k + n, j] = before + (level - before) * np.arange(1, n + 1) / max(ramp, 1)
+                    part = np.minimum(np.arange(1, end - k + 1) / max(ramp, 1), 1.0)
+                    trial[k:end, j] = trial[k - 1, j] + (level - trial[k - 1, j]) * part
                     k = end
-            moved = simulate(m, trial[:last], start)
-            margin = 0.04 * (m.upper - m.lower)
-            bad = np.any((moved < m.lower + margin) | (moved > m.upper - margin), axis=0)
+            moved = m.simulate(trial[:last], start)
+            bad = np.any((moved < lower + margin) | (moved > upper - margin), axis=0)
             if not bad.any():
                 break
             trial[first:last, bad] *= rng.uniform(-1.0, 0.6)
-            moved = simulate(m, trial[:last], start)
-            if not np.any((moved < m.lower + margin) | (moved > m.upper - margin)):
+            moved = m.simulate(trial[:last], start)
+            if not np.any((moved < lower + margin) | (moved > upper - margin)):
                 break
         command, angle[:last] = trial, moved
-    return command, angle, start
+    return command, angle
 
 
 def write_machine(folder: Path, m: Machine, rng: Generator) -> list[Path]:
     """Write the URDF and three logs; the last is the unseen one."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "robot.urdf").write_text(urdf(m))
-    logs = list[Path]()
-    for number in (1, 2, 3):
-        command, angle, _ = stick(rng, m, float(rng.uniform(40, 120)) if number < 3 else 60.0)
+    logs = [folder / f"log_{number}.csv" for number in (1, 2, 3)]
+    header = ["time_s", *(f"u_{n}_pct" for n in m.names), *(f"q_{n}_deg" for n in m.names)]
+    for path in logs:
+        command, angle = stick(rng, m, 60.0 if path is logs[-1] else float(rng.uniform(40, 120)))
         times = np.arange(0, len(command) * STEP - STEP, 1 / m.rate)
         times[1:] += rng.uniform(-0.1, 0.1, len(times) - 1) / m.rate
         at = np.minimum(np.round(times / STEP).astype(int), len(command) - 1)
-        noisy = np.degrees(angle[at] + rng.normal(0, m.noise, (len(at), len(m.names))))
-        header = ["time_s", *(f"u_{n}_pct" for n in m.names), *(f"q_{n}_deg" for n in m.names)]
-        path = folder / f"log_{number}.csv"
+        noisy = np.degrees(angle[at] + rng.normal(0, m.noise, (len(at), m.joints)))
         table = np.column_stack([at * STEP, command[at], noisy])
         np.savetxt(path, table, delimiter=",", header=",".join(header), comments="", fmt="%.4f")
-        logs.append(path)
     return logs
+
+
+LINK = """<link name="{name}_link">
+<inertial><origin xyz="{middle:.4f} 0 0"/><mass value="{mass:.3f}"/>
+<inertia ixx="{ixx:.5g}" iyy="{iyy:.5g}" izz="{iyy:.5g}" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><origin xyz="{middle:.4f} 0 0"/><geometry><box size="{long:.4f} {wide:.4f} {wide:.4f}"/></geometry>
+</visual></link>
+<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>
+<origin xyz="{x:.4f} 0 {z:.4f}"/><axis xyz="{axis}"/>
+<limit lower="{lower:.5f}" upper="{upper:.5f}" effort="1e6" velocity="2"/></joint>
+"""
 
 
 def urdf(m: Machine) -> str:
     """The machine as its maker's CAD exports it: boxes of the right masses."""
-    parts = ['<robot name="stranger">', '<link name="base"/>']
-    parent, x, z = "base", 0.0, 0.0
+    text, parent, x = '<robot name="stranger"><link name="base"/>', "base", 0.0
     for j, name in enumerate(m.names):
-        long = 0.0 if m.vertical[j] else m.length[j]
-        wide = 0.15 * m.length[j]
-        size = (wide if m.vertical[j] else long, wide, wide)
-        inertia = m.mass[j] / 12 * np.array([2 * wide**2, size[0] ** 2 + wide**2, size[0] ** 2 + wide**2])
-        parts.append(
-            f'<link name="{name}_link"><inertial><origin xyz="{long / 2:.4f} 0 0"/>'
-            f'<mass value="{m.mass[j]:.3f}"/>'
-            f'<inertia ixx="{inertia[0]:.5g}" iyy="{inertia[1]:.5g}" izz="{inertia[2]:.5g}" ixy="0" ixz="0" '
-            f'iyz="0"/></inertial><visual><origin xyz="{long / 2:.4f} 0 0"/><geometry><box size="'
-            f'{size[0]:.4f} {size[1]:.4f} {size[2]:.4f}"/></geometry></visual></link>'
-        )
-        axis = "0 0 1" if m.vertical[j] else "0 -1 0"
-        parts.append(
-            f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>'
-            f'<origin xyz="{x:.4f} 0 {z:.4f}"/><axis xyz="{axis}"/>'
-            f'<limit lower="{m.lower[j]:.5f}" upper="{m.upper[j]:.5f}" effort="1e6" velocity="2"/></joint>'
-        )
-        parent, x, z = f"{name}_link", long, 0.0
-    return "\n".join([*parts, "</robot>\n"])
+        wide, vertical, mass = 0.15 * m.length[j], m.vertical[j], m.mass[j]
+        long, reach = (wide, 0.0) if vertical else (m.length[j], m.length[j])
+        place = {"parent": parent, "x": x, "z": 0.0, "axis": "0 0 1" if vertical else "0 -1 0"}
+        shape = {"middle": reach / 2, "mass": mass, "long": long, "wide": wide}
+        inertia = {"ixx": mass / 12 * 2 * wide**2, "iyy": mass / 12 * (long**2 + wide**2)}
+        ends = dict(zip(("lower", "upper"), m.ends[j], strict=True))
+        text += LINK.format(name=name, **place, **shape, **inertia, **ends)
+        parent, x = f"{name}_link", reach
+    return f"{text}</robot>\n"
 
 
-def run_commands(folder: Path, robot: Path, logs: list[Path]) -> tuple[list[float], list[int], float]:
-    """Run what `hydroid init` prints.
-
-    Returns:
-        Rms error of each joint on the unseen log [deg], the joints that are not predicted by the verdict,
-        numbered from 1, and the seconds to the end of the fit.
-    """
-    mine, began = folder / "mine", time.perf_counter()
+def run_commands(folder: Path, robot: Path, logs: list[Path]) -> tuple[list[float], list[int], Clock]:
+    """Run what `hydroid init` prints; return rms errors on the unseen log [deg] and the joints that the
+    verdict names as not predicted, from 1, and the time that it took."""
+    mine, clock = folder / "mine", Clock()
     hydroid.init(mine, arm=robot, log=[*logs])
     hydroid.fit_hyd(logs[:-1], config=mine / "fit.yaml", out=mine / "runs" / "fit")
-    seconds = time.perf_counter() - began
     judged = hydroid.validate(logs[-1:], fit=mine / "runs" / "fit", out=mine / "runs" / "validation").plain()
     errors = [row["rms_deg"] for row in judged["results"]]
-    return errors, [one["joint"] for one in judged["verdict"] if one["verdict"] != "predicts"], seconds
+    return errors, [one["joint"] for one in judged["verdict"] if one["verdict"] != "predicts"], clock
 
 
 def stranger(seed: int, number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
     """Make a random machine: its name, its URDF and logs, and the errors that are good [deg], (J,)."""
     rng = np.random.default_rng([seed, number])
-    machine = random_machine(rng, number)
+    machine = Machine(rng, number)
     logs = write_machine(folder, machine, rng)
-    angles = np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -len(machine.names) :]
-    return (
-        str(number),
-        folder / "robot.urdf",
-        logs,
-        2 * np.degrees(machine.noise) + 0.02 * np.ptp(angles, axis=0),
-    )
+    travel = np.ptp(np.loadtxt(logs[-1], delimiter=",", skiprows=1)[:, -machine.joints :], axis=0)
+    return str(number), folder / "robot.urdf", logs, 2 * np.degrees(machine.noise) + 0.02 * travel
 
 
 def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
@@ -325,28 +271,22 @@ def world(number: int, folder: Path) -> tuple[str, Path, list[Path], Array]:
     return name, one.write(one, folder), logs, 2 * np.array(noise)
 
 
-def main() -> None:
-    """Make the machines, run the commands, and print the table."""
+if __name__ == "__main__":
     given = options(__doc__, machines=40, first=0, seed=1, worlds=False, folder="build/strangers")
-    home = Path(given.folder)
-    shutil.rmtree(home, ignore_errors=True)
+    shutil.rmtree(given.folder, ignore_errors=True)
     good, silent = 0, 0
-    table("machine | joints | unseen rms [deg] | good at most | named joints | s")
+    make = world if given.worlds else partial(stranger, given.seed)
+    table("machine | joints | unseen rms [deg] | good at most | named joints | time")
     for number in range(given.first, given.first + given.machines):
-        folder = home / f"{number:02d}"
-        make = world if given.worlds else partial(stranger, given.seed)
+        folder = Path(given.folder) / f"{number:02d}"
         name, robot, logs, most = make(number, folder)
         try:
-            errors, blamed, seconds = run_commands(folder, robot, logs)
+            errors, blamed, clock = run_commands(folder, robot, logs)
         except hydroid.HydroidError as error:
-            row(f"{name} | {len(most)} | refused: {error} | | |")
+            row(name, len(most), f"refused: {error}", "", "", "")
             continue
         missed = {j for j, (error, limit) in enumerate(zip(errors, most, strict=True), 1) if error > limit}
         good, silent = good + (not missed), silent + bool(missed - set(blamed))
         figures = (" ".join(f"{x:.2f}" for x in values) for values in (errors, most))
-        row(f"{name} | {len(most)} | {' | '.join(figures)} | {blamed or ''} | {seconds:.0f}")
+        row(name, len(most), *figures, blamed or "", clock)
     print(f"\n{good} of {given.machines} good; {silent} with a missed joint that the verdict does not name")
-
-
-if __name__ == "__main__":
-    main()

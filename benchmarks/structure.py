@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from scipy.sparse.csgraph import connected_components
 
 from hydroid.commands.app import COMMANDS
-from hydroid.settings.arm import ArmFile
 from hydroid.settings.fit import FitSettings
 
 ROOT = Path(__file__).parents[1]
@@ -67,22 +66,15 @@ def cycles(trees: dict[Path, ast.Module]) -> int:
     return int(np.sum(np.bincount(connected_components(graph, connection="strong")[1]) > 1))
 
 
-def settings() -> int:
-    """Return the settings of a fit and of an arm, as their classes declare them."""
-    seen, waiting = set[type[BaseModel]](), [FitSettings, ArmFile]
-
-    def models(annotation: object) -> Iterator[type[BaseModel]]:
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            yield annotation
-        for part in getattr(annotation, "__args__", ()):
-            yield from models(part)
-
-    while waiting:
-        model = waiting.pop()
-        if model not in seen:
-            seen.add(model)
-            waiting += [inner for field in model.model_fields.values() for inner in models(field.annotation)]
-    return sum(name in model.model_fields for model in seen for name in model.__annotations__)
+def settings(kind: object, seen: set[object]) -> int:
+    """Return the settings that a class declares, and the classes of its fields; each counts once."""
+    if kind in seen:
+        return 0
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        return sum(settings(part, seen) for part in getattr(kind, "__args__", ()))
+    seen.add(kind)
+    own = sum(name in kind.model_fields for name in kind.__annotations__)
+    return own + sum(settings(field.annotation, seen) for field in kind.model_fields.values())
 
 
 def lines(folder: str) -> int:
@@ -104,7 +96,7 @@ def measures() -> dict[str, float]:
         "tokens": sum(map(tokens, trees)),
         "statements": sum(isinstance(node, ast.stmt) for _, node in nodes) - strings,
         "constants": sum(map(constants, trees.values())),
-        "settings": settings(),
+        "settings": settings(FitSettings, set()),
         "commands": len(COMMANDS),
         "make targets": len(set(targets)),
         "classes": sum(isinstance(node, ast.ClassDef) for _, node in nodes),

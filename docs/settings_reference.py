@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hydroid.settings.arm import Arm, ArmFile
+from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import JointColumns
 from hydroid.settings.study import StudySettings
@@ -59,7 +59,7 @@ def reference() -> str:
         own = [row for key, row in rows.items() if re.split(r"[.<]", key)[0] in names]
         parts.append(f"## {title}\n\n{_table(own)}\n")
     parts.append("## The arm's file\n\nWhat `arm:` names, by default `configs/hydrolek.yaml`.\n\n")
-    parts.append(_table(row for _, row in _rows(ArmFile)))
+    parts.append(_table(row for _, row in _rows(Arm)))
     parts.append("\n## A study's file\n\nWhat `hydroid study` reads ([studies.md](studies.md)).\n\n")
     parts.append(_table(row for _, row in _rows(StudySettings)))
     return "".join(parts)
@@ -143,9 +143,7 @@ def _type(annotation: Any) -> str:
     if annotation is Any:
         return "value"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return "mapping"
-    if annotation is Arm:
-        return "text or mapping"
+        return "text or mapping" if annotation is Arm else "mapping"
     plain = {float: "number", int: "whole number", str: "text", bool: "true or false", Path: "path"}
     return plain.get(annotation, "null")
 
@@ -200,7 +198,7 @@ def undescribed() -> list[str]:
     """Return the settings that have no description."""
     return [
         key
-        for kind in (FitSettings, ArmFile, StudySettings)
+        for kind in (FitSettings, Arm, StudySettings)
         for key, _, meaning, _ in _settings(kind, "")
         if not meaning
     ]

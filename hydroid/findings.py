@@ -144,8 +144,8 @@ WORDS: dict[str, tuple[str, str]] = {
     "absent joints": ("holds nothing of joint{s} {names}", ""),
     # its rows and cells
     "torn row": (
-        "the row should have {cells} cells, as the header has{rows}",
-        "correct or delete the line, or use --repair",
+        "the row should have {cells} cells, as the header has, and numbers in them{rows}",
+        "correct or delete the line, or use --repair; numbers with decimal commas need ; between the cells",
     ),
     "hole": (
         "{what}{rows}",
@@ -185,8 +185,22 @@ WORDS: dict[str, tuple[str, str]] = {
         "{gap:.6g} s without a sample, the usual step is {period:.6g} s{rows}",
         "--repair fills gaps up to {longest:g} s (log.repair_s); cut the log into two files at longer ones",
     ),
+    "resampled": (
+        "has a sample every {step} s and is resampled to {period:g} s (log.period_s)",
+        "angles interpolated, commands held, or averaged where the log is faster",
+    ),
+    # its units
+    "unit": (
+        "the file says that {names} {is} in {unit}, but log.{quantity} says otherwise",
+        "set log.{quantity}.{remedy}",
+    ),
     "range": ("the command of joint{s} {names} looks like {range}", "if so, set log.command.scale: {scale}"),
     # its motion
+    "undriven": ("no joint is driven: all commands are 0", "check log.command"),
+    "late": (
+        "angle of joint{s} {names} moves {lag:.2f} s before the command, as no machine does",
+        "the log's clocks differ: mend the log, or set log.delay_s: {delay:.2f}",
+    ),
     "angle is constant": ("angle of joint{s} {names} never changes", "check the sensor and log.angle"),
     "command is constant": (
         "command of joint{s} {names}, whose angle is compared, is constant",

@@ -121,11 +121,11 @@ def write_settings(folder: Path, settings: FitSettings) -> None:
     """
     from hydroid.mjcf import copy_models  # imports MuJoCo
 
-    file = settings.arm.file
-    models = {MODEL: file.model} | ({PAIR: file.pair} if file.pair else {})
+    arm = settings.arm
+    models = {MODEL: arm.model} | ({PAIR: arm.pair} if arm.pair else {})
     copy_models({Path(name).name: path for name, path in models.items()}, folder / Path(MODEL).parent)
-    arm = file.model_dump(mode="json") | {"model": MODEL, "pair": PAIR if file.pair else None}
-    for name, content in ((ARM, arm), (CONFIG, portable(settings))):
+    paths = {"model": MODEL, "pair": PAIR if arm.pair else None}
+    for name, content in ((ARM, arm.model_dump(mode="json") | paths), (CONFIG, portable(settings))):
         write_atomic(folder / name, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 
 

@@ -71,7 +71,7 @@ def _respond(
     settings, bindings = model.settings, Bindings(model.settings)
     spec, outputs = load_model(settings.arm), [j - 1 for j in joints]
     simulation = make_simulation(spec, log, outputs, settings, pressures)
-    response = simulation.simulate(bindings.candidates(model.theta[None], bindings.effects(log.source)))
+    response = simulation.simulate(bindings.candidates(model.theta[None], log.source))
     if not response.feasible[0]:
         raise RunError("the simulation diverged with these parameters", where=model.source)
     return response

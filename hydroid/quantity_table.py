@@ -6,14 +6,13 @@ sheet. Onsets, currents, forces and strokes have the article's true values. All 
 sizes, not measurements of a HydroLek.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from annotated_types import BaseMetadata, Ge, Gt, Le, Lt
-
 from hydroid.units import UNITS
 
-FROM_ZERO = (Ge(0),)
+FROM_ZERO = (0.0, math.inf)
 OFF, ONE = (0.0, 0.0), (1.0, 1.0)
 """defaults of quantities with two sides"""
 
@@ -29,7 +28,7 @@ class Quantity:
         plain: what it is, for readers who do not know its symbol.
         note: what those who set it must know besides.
         span: values of real machines, between which `hydroid suggest` searches a quantity that is not free.
-        limits: of its values; None: from 0 where 0 is the default, or else above 0.
+        limits: least and largest value; None: from 0 where 0 is the default, or else above 0.
         optional: whether null is allowed beside a number; where it is the default, it is.
     """
 
@@ -39,15 +38,8 @@ class Quantity:
     plain: str
     note: str = ""
     span: tuple[float, float] | None = None
-    limits: tuple[BaseMetadata, ...] | None = None
+    limits: tuple[float, float] | None = None
     optional: bool = False
-
-    @property
-    def allowed(self) -> tuple[BaseMetadata, ...]:
-        """Limits of its values."""
-        if self.limits is not None:
-            return self.limits
-        return FROM_ZERO if self.default in (0.0, OFF) else (Gt(0),)
 
     @property
     def meaning(self) -> str:
@@ -62,12 +54,12 @@ class Quantity:
     @property
     def positive(self) -> bool:
         """Whether its values must be above 0."""
-        return self.allowed == (Gt(0),)
+        return self.limits is None and self.default not in (0.0, OFF)
 
     @property
     def lowest(self) -> float:
         """The least value that a fit may try; 0 but for changes of a lever."""
-        return min([float(one.ge) for one in self.allowed if isinstance(one, Ge)], default=0.0)  # pyright: ignore[reportArgumentType]
+        return self.limits[0] if self.limits else 0.0
 
     @property
     def of_the_pump(self) -> bool:
@@ -113,16 +105,21 @@ _HYDRAULIC = (
             f"{what} of a rotary actuator's moment arm over its range",
             f"its change from mid-range {where}, as a part of it: for stand-ins of unknown linkages",
             (-0.5, 0.5),
-            (Ge(-0.9), Le(0.9)),
+            (-0.9, 0.9),
         )
         for shape, what, where in (("slope", "rise", "to the upper end"), ("bend", "bend", "to both ends"))
     ),
     # from the command to the current
     Quantity("pilot_lag", "s", OFF, "time constant of the pilot stage", "before the dead band", (0.0, 1.0)),
     Quantity(
-        "onset", "V", (1.4, 1.2), "voltage at the smallest command", "A of equation (2), C of (3)", limits=()
+        "onset",
+        "V",
+        (1.4, 1.2),
+        "voltage at the smallest command",
+        "A of equation (2), C of (3)",
+        limits=FROM_ZERO,
     ),
-    Quantity("dead_band", "%", OFF, "command below which nothing moves", "", (0.0, 90.0), (Ge(0), Lt(100))),
+    Quantity("dead_band", "%", OFF, "command below which nothing moves", "", (0.0, 90.0), (0.0, 99.0)),
     Quantity("current_max", "A", 0.9, "largest coil current", "I_max of equation (4)"),
     Quantity("current_min", "A", 0.3, "smallest coil current", "I_min of equation (4)"),
     # the solenoid
@@ -141,7 +138,6 @@ _HYDRAULIC = (
         (1.0, 5000.0),
         FROM_ZERO,
     ),
-    Quantity("plunger_back", "", ONE, "damping of the plunger on its way back, relative to its way out"),
     Quantity("plunger_stiffness", "N/mm", 2.0, "spring of the plunger", "K of equation (5)"),
     # the valve
     Quantity("slot_width", "mm", (2.0, 2.0), "spool travel to full opening", "w of equation (7)"),
@@ -187,9 +183,7 @@ _HYDRAULIC = (
     Quantity(
         "pump_droop", "bar", 0.0, "fall of the supply pressure from no flow to full flow", "", (0.0, 200.0)
     ),
-    Quantity(
-        "pump_idle", "", 1.0, "share of the flow before the pump comes up", "", (0.05, 1.0), (Ge(0), Le(1))
-    ),
+    Quantity("pump_idle", "", 1.0, "share of the flow before the pump comes up", "", (0.05, 1.0), (0.0, 1.0)),
     Quantity("pump_delay", "s", 0.0, "time from the first command until the pump comes up", "", (0.0, 5.0)),
     Quantity(
         "pump_rise", "s", 0.0, "time constant with which the pump comes up and goes down", "", (0.0, 5.0)
@@ -230,7 +224,7 @@ _HYDRAULIC = (
         limits=FROM_ZERO,
     ),
     # delay and sensor
-    Quantity("delay", "s", OFF, "transport delay of the command", "", (0.0, 2.0), (Ge(0), Le(5))),
+    Quantity("delay", "s", OFF, "transport delay of the command", "", (0.0, 2.0), (0.0, 5.0)),
     Quantity(
         "sensor_scale", "", 1.0, "turn that the angle's sensor reads, over the true one", "", (0.8, 1.25)
     ),

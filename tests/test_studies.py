@@ -63,7 +63,7 @@ def test_a_run_is_the_same_wherever_the_arm_s_files_lie(tmp_path: Path):
     cells = cell_settings(load(file, StudySettings), file)
     (task, *_) = make_tasks(cells, 1, read_logs([tmp_path / "short.csv"], cells["mean"]))
     arm = task.settings.arm
-    moved = replace(arm, file=arm.file.model_copy(update={"pair": tmp_path / "other.xml"}))
+    moved = arm.changed({"pair": tmp_path / "other.xml"})
     other = replace(task, settings=task.settings.model_copy(update={"arm": moved}))
     assert other.key() == task.key()
 

@@ -32,8 +32,8 @@ def page(results: Path, *, quick: bool = False) -> str:
     every = [verdict for each in made.values() for verdict in each]
     parts = [""]
     for name, study in studies.items():
-        link = f"[{study.title}](../benchmarks/article/{name}.yaml)"
-        parts.append(f"\n## {link}\n\n{study.about.strip()}\n")
+        link = f"[Settings](../benchmarks/article/{name}.yaml)"
+        parts.append(f"\n## {study.title}\n\n{study.about.strip()} {link}.\n")
         cells = [*study.changes()]
         parts += [study_table(shown, runs[name], cells) for shown in study.tables]
         parts += [

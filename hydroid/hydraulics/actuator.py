@@ -41,21 +41,18 @@ class Observation:
     line: Array
 
 
-def make_plugin(
-    joints: Records, linkages: Records, entries: NDArray[np.intp], period: float, substeps: int
-) -> Plugin:
+def make_plugin(joints: Records, entries: NDArray[np.intp], period: float, substeps: int) -> Plugin:
     """Return the actuators of n candidates.
 
     Args:
         joints: of JOINT, shape (n, J); the coil of an infeasible candidate has no force.
-        linkages: from `records.linkages`, shape (J,), (1, J) or (n, J).
         entries: where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (J, J).
         period: MuJoCo's step [s].
         substeps: in one of them.
     """
-    driven = np.atleast_2d(linkages.kind)[0] != NONE
+    driven = joints.kind[0] != NONE
     order = np.argsort(driven, stable=True)
-    table = coefficients(joints, linkages, period, substeps).view(np.ndarray)
+    table = coefficients(joints, period, substeps).view(np.ndarray)
     idle = int(np.sum(~driven))
     return Plugin(table, order, entries[np.ix_(order, order)], idle, period, substeps)
 

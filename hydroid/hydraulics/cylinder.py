@@ -39,6 +39,22 @@ def volume(travel: Any, area: Any, dead: Any) -> Any:
 
 
 @compilable
+def filling(travel: Any, area: Any, dead: Any) -> Any:
+    """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
+    return np.log(volume(travel, area, dead) / dead)
+
+
+@compilable
+def rod(angle: float, c: Any) -> Any:
+    """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint angle [rad]."""
+    psi, first, second = angle, 1.0, 0.0
+    if c.rocker > 0.0:
+        psi, first, second = four_bar(angle, c)
+    travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
+    return travel, arm * first, slope * first * first + arm * second
+
+
+@compilable
 def bent(angle: Any, c: Any) -> Any:
     """Way of a rotary actuator at an angle [rad], its moment arm, relative to that in the middle, and slope.
 
@@ -56,41 +72,25 @@ def bent(angle: Any, c: Any) -> Any:
 
 def fills(angle: Array, c: Any) -> tuple[Array, Array]:
     """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
-    travel, linear = rod_motion(angle, c)[0], c.kind == LINEAR
-    sides = (c.a, travel, travel), (c.b, c.stroke - travel, -travel)
-    a, b = (
-        np.where(
-            linear,
-            np.log(volume(np.where(linear, out, 0.0), side.area, c.dead_volume) / c.dead_volume),
-            turn * side.area / c.dead_volume,
-        )
-        for side, out, turn in sides
-    )
+    travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
+    sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
+    a, b = (np.where(linear, filling(out, area, dead), turn * area / dead) for area, out, turn in sides)
     return a, b
 
 
-def rod_motion(angle: Array, c: Any) -> tuple[Array, Array, Array]:
+def rod_motion(angle: Array, c: Any) -> list[Array]:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
 
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
-    linear = c.kind == LINEAR
-    with np.errstate(all="ignore"):  # joints without actuator have no range here
-        rotary = bent(angle, c)
-    # joints without a triangle get a harmless one
-    a, b = np.where(linear, c.pivot_distance_1, 2.0), np.where(linear, c.pivot_distance_2, 1.0)
-    psi, first, second = angle, 1.0, 0.0
-    if (rocks := c.rocker > 0).any():
-        with np.errstate(all="ignore"):  # joints without a rocker
-            bars = four_bar(angle, c)
-        psi, first, second = (np.where(rocks, x, y) for x, y in zip(bars, (angle, 1.0, 0.0), strict=True))
-    travel, arm, slope = triangle(psi, a, b, c.theta0, c.shortest)
-    slope = slope * first**2 + arm * second
-    cylinder, turning = (travel, arm * first, slope), c.kind == ROTARY
-    fixed = angle, 1.0, 0.0
-    return tuple(
-        np.where(linear, x, np.where(turning, y, z)) for x, y, z in zip(cylinder, rotary, fixed, strict=True)
-    )  # pyright: ignore[reportReturnType]
+    still = angle, 1.0, 0.0
+    with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
+        turned, rocked = bent(angle, c), four_bar(angle, c)
+        psi, first, second = (np.where(c.rocker > 0, x, y) for x, y in zip(rocked, still, strict=True))
+        travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
+        cylinder = travel, arm * first, slope * first**2 + arm * second
+    kinds = c.kind == LINEAR, c.kind == ROTARY
+    return [np.select(kinds, [x, y], z) for x, y, z in zip(cylinder, turned, still, strict=True)]
 
 
 @compilable

@@ -13,16 +13,16 @@ import numpy as np
 from hydroid.hydraulics.cylinder import (
     bent,
     contact_torque,
-    four_bar,
+    filling,
     friction_damping,
+    rod,
     stop_damping,
-    triangle,
     volume,
 )
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, NONE, ROTARY
-from hydroid.hydraulics.solenoid import drag_of, drive, plunger_step
-from hydroid.hydraulics.valve import notched, port_flow, slot_share, spool
+from hydroid.hydraulics.solenoid import drive, plunger_step
+from hydroid.hydraulics.valve import notched, port_flow, slot_share
 
 
 @compilable
@@ -33,13 +33,9 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
     w.a.flow, w.b.flow = 0.0, 0.0
     bulk, dead = c.bulk_modulus, c.dead_volume
     if c.kind == LINEAR:
-        psi, first, second = angle, 1.0, 0.0
-        if c.rocker > 0.0:
-            psi, first, second = four_bar(angle, c)
-        w.travel, arm, slope = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
-        w.arm, w.slope = arm * first, slope * first * first + arm * second
-        w.a.pressure = z.a.oil - bulk * np.log(volume(w.travel, c.a.area, dead) / dead)
-        w.b.pressure = z.b.oil - bulk * np.log(volume(c.stroke - w.travel, c.b.area, dead) / dead)
+        w.travel, w.arm, w.slope = rod(angle, c)
+        w.a.pressure = z.a.oil - bulk * filling(w.travel, c.a.area, dead)
+        w.b.pressure = z.b.oil - bulk * filling(c.stroke - w.travel, c.b.area, dead)
     elif c.kind == ROTARY:
         turned, w.arm, w.slope = bent(angle, c)
         w.travel = 0.0
@@ -50,8 +46,6 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
 @compilable
 def _follow(side: Any, z: Any, delayed: float) -> float:
     """Mean of what the pilot stage has of the command during a step, first-order behind it."""
-    if side.pilot_lag == 0.0:
-        return delayed
     left = (z.pilot - delayed) * (1.0 - side.pilot_keep)
     z.pilot -= left
     return delayed + left * side.pilot_steps
@@ -70,17 +64,17 @@ def command(c: Any, z: Any, w: Any, delayed_a: float, delayed_b: float) -> None:
 def _move_plunger(c: Any, side: Any, z: Any, w: Any, substep: int, step: float) -> None:
     part = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)
     pull = w.before + part * (w.after - w.before)
-    drag = drag_of(side.plunger_damping, side.plunger_back, pull, z.stroke, c)
-    z.stroke, z.speed = plunger_step((z.stroke, z.speed), pull, drag, step, side.plunger_weight, c)
+    motion, weight = (z.stroke, z.speed), side.plunger_weight
+    z.stroke, z.speed = plunger_step(motion, pull, side.plunger_damping, step, weight, c)
 
 
 @compilable
 def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
-    """Advance both plungers; the mean spool displacement of the sub-step [m]."""
-    before = spool(z.a.stroke, z.b.stroke)
+    """Advance both plungers; the mean spool displacement of the sub-step [m], equation (6)."""
+    before = z.a.stroke - z.b.stroke
     _move_plunger(c, c.a, z.a, w.a, substep, step)
     _move_plunger(c, c.b, z.b, w.b, substep, step)
-    return 0.5 * (before + spool(z.a.stroke, z.b.stroke))
+    return 0.5 * (before + (z.a.stroke - z.b.stroke))
 
 
 @compilable
@@ -96,8 +90,6 @@ def opened(side: Any, travel: float) -> float:
 def net_opening(c: Any, z: Any, displacement: float) -> float:
     """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
     net = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
-    if c.opening_lag == 0.0:
-        return net
     left = (z.opening - net) * (1.0 - c.opening_keep)
     z.opening -= left
     return net + left * c.opening_steps

@@ -9,7 +9,6 @@ reads and writes has a record for each side, A and B, so that each law of a side
 
 import keyword
 import math
-from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -36,15 +35,18 @@ def _fields(names: str) -> Fields:
     return [(name, np.float64) for name in names.split()]
 
 
-JOINT = np.dtype([(name, np.float64) for name in QUANTITIES if name != "mass"])
-"""all quantities of a joint and its actuator, in SI"""
-
 BARS = ("ground", "rocker", "coupler", "child", "phase", "branch")
-LINKAGE = np.dtype([("kind", np.int64), *_fields(" ".join(("middle half theta0 shortest stroke", *BARS)))])
-"""how a joint is moved: kind (NONE, LINEAR or ROTARY); middle of its range and half of it [rad]; the pivots'
-angle theta0 at joint angle 0 [rad], below 0 if the rod runs out towards negative angles; cylinder length with
-the rod fully in [m], as at the end of the joint's range; stroke [m]; ground to branch are those of
-`linkage.four_bar`, and rocker is 0 without one"""
+JOINT = np.dtype(
+    [
+        *((name, np.float64) for name in QUANTITIES if name != "mass"),
+        ("kind", np.int64),
+        *_fields(" ".join(("middle half sense retracted stroke", *BARS))),
+    ]
+)
+"""all quantities of a joint and its actuator, in SI, and how it is moved: kind (NONE, LINEAR or ROTARY);
+middle of its range and half of it [rad]; of a cylinder 1 if the rod runs out towards positive angles, else
+-1, the angle at its triangle with the rod fully in [rad], as at the end of the joint's range, and the stroke
+[m]; ground to branch are those of `linkage.four_bar`, and rocker is 0 without one"""
 
 _SIDED = [row.name for row in ROWS if isinstance(row.default, tuple)]
 _PLAIN = [name for name in JOINT.names or () if name[:-2] not in _SIDED]
@@ -65,16 +67,17 @@ SIDE = np.dtype(
 
 COEFFICIENTS = np.dtype(
     [
-        *((name, np.float64) for name in _PLAIN),
-        *LINKAGE.descr,
+        *((name, JOINT[name]) for name in _PLAIN),
         ("a", SIDE),
         ("b", SIDE),
-        *_fields("coil gap conductance opening_keep opening_steps backflow relief"),
+        *_fields("theta0 shortest coil gap conductance opening_keep opening_steps backflow relief"),
     ]
 )
-"""what the kernel reads of a joint: its quantities, its linkage, and constants that follow from them;
-opening_keep is the part of the opening's error that a sub-step leaves, opening_steps its lag in sub-steps,
-backflow the least flow from the pump [m³/s], relief the pressure of the pump's relief valve [Pa]"""
+"""what the kernel reads of a joint: its fields of JOINT, and constants that follow from them; theta0 is the
+pivots' angle at joint angle 0 [rad], below 0 if the rod runs out towards negative angles, shortest the
+cylinder's length with the rod fully in [m], opening_keep the part of the opening's error that a sub-step
+leaves, opening_steps its lag in sub-steps, backflow the least flow from the pump [m³/s], relief the pressure
+of the pump's relief valve [Pa]"""
 
 SIDE_STATE = np.dtype(
     _fields(
@@ -139,47 +142,28 @@ LINE = np.dtype(
 
 def nominal_joints(arm: Arm, settings: HydraulicSettings) -> NDArray[np.void]:
     """Return what the settings and the arm's file say of the arm's joints, of JOINT, shape (J,)."""
-    rows: list[tuple[float, ...]] = []
-    for joint in arm.joints:
-        values = actuator_values(joint.actuator, settings)
-        stated = [(values[name], QUANTITIES[name].factor) for name in JOINT.names or ()]
-        rows.append(tuple(math.inf if value is None else value * factor for value, factor in stated))
-    return np.array(rows, JOINT)
+    table = np.zeros(len(arm.joints), JOINT)
+    for row, joint in zip(table, arm.joints, strict=True):
+        actuator, ends = joint.actuator, np.array(joint.limits)
+        for name, value in actuator_values(actuator, settings).items():
+            if name != "mass":
+                row[name] = math.inf if value is None else value * QUANTITIES[name].factor
+        if actuator is not None:
+            row["kind"], row["middle"], row["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
+        if isinstance(actuator, LinearActuator):
+            row["kind"], row["sense"], row["stroke"] = LINEAR, actuator.sense, 1e-3 * actuator.stroke
+            row["retracted"] = ends[int(np.argmin(actuator.length(ends)))]
+            if (bars := actuator.settings.four_bar) is not None:
+                for name in BARS:
+                    row[name] = getattr(bars, name)
+                row["retracted"] = four_bar(row["retracted"], bars)[0]
+    return table
 
 
 def has_force_curve(joints: Any) -> NDArray[np.bool_]:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
     return np.asarray(exists.all(axis=1), dtype=bool)
-
-
-def linkages(arm: Arm, places: Sequence[int], driven: Sequence[int], joints: Records) -> Records:
-    """Return how n candidates' moving joints are moved, a record array of LINKAGE, shape (n, V).
-
-    `places` of the moving joints among the arm's are 0-based, and `joints` are theirs, shape (n, V). Those
-    that are not `driven` have no hydraulic actuator.
-    """
-    table = np.zeros(joints.shape, LINKAGE)
-    for column, j in enumerate(places):
-        if j not in driven:
-            continue
-        actuator, one, p = arm.joints[j].actuator, table[:, column], joints[:, column]
-        if actuator is None:
-            raise without_actuator(arm, j)
-        ends = np.array(arm.joints[j].limits)
-        one["kind"], one["middle"], one["half"] = ROTARY, ends.mean(), 0.5 * np.ptp(ends)
-        if isinstance(actuator, LinearActuator):
-            one["kind"], one["stroke"] = LINEAR, 1e-3 * actuator.stroke
-            bars = actuator.settings.four_bar
-            one["theta0"] = actuator.sense * p["pivot_angle"]
-            retracted = float(ends[int(np.argmin(actuator.length(ends)))])
-            if bars is not None:
-                for name in BARS:
-                    one[name] = getattr(bars, name)
-                retracted = four_bar(retracted, bars)[0]
-            pivots = p["pivot_distance_1"], p["pivot_distance_2"], one["theta0"]
-            one["shortest"] = triangle(retracted, *pivots)[0]
-    return table.view(np.recarray)
 
 
 def without_actuator(arm: Arm, joint: int) -> SettingsError:
@@ -189,7 +173,7 @@ def without_actuator(arm: Arm, joint: int) -> SettingsError:
     return SettingsError(what, where=f"the arm's file of {arm.name}", hint=hint)
 
 
-def coefficients(joints: Records, linkages: Records, period: float = 0.01, substeps: int = 1) -> Records:
+def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Records:
     """Lay out what the kernel reads of n candidates' V joints, of COEFFICIENTS, shape (n, V).
 
     `period` is that of a step [s].
@@ -197,16 +181,17 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
     table = np.zeros(joints.shape, COEFFICIENTS).view(np.recarray)
     for name in _PLAIN:
         table[name] = joints[name]
-    for name in LINKAGE.names or ():
-        table[name] = linkages[name]
     p = joints
+    table["theta0"] = p.sense * p.pivot_angle
+    with np.errstate(invalid="ignore"):  # joints without a cylinder have no triangle
+        triangles = triangle(p.retracted, p.pivot_distance_1, p.pivot_distance_2, table.theta0)
+    table["shortest"] = triangles[0]
     table["coil"], table["gap"] = force_curve(p.force_1, p.force_2, p.stroke_1, p.stroke_2, p.rated_current)
     table["conductance"] = conductance(p.flow_coefficient)
     table["opening_steps"] = p.opening_lag * substeps / period
     table["opening_keep"] = _left(table["opening_steps"])
     table["backflow"] = np.where(np.isinf(p.pump_flow), -np.inf, 0.0)
-    driven = linkages.kind != NONE
-    table["relief"] = np.max(p.supply_pressure, axis=1, where=driven, initial=0.0)[:, None]
+    table["relief"] = np.max(p.supply_pressure, axis=1, where=p.kind != NONE, initial=0.0)[:, None]
     for end, side in (("a", table.a), ("b", table.b)):
         for name, field in _SIDE_FIELDS.items():
             side[field] = joints[f"{name}_{end}"]
@@ -214,8 +199,7 @@ def coefficients(joints: Records, linkages: Records, period: float = 0.01, subst
         side["fresh"] = (side.delay / period - side.late) * substeps
         side["pilot_steps"] = side.pilot_lag / period
         side["pilot_keep"] = _left(side["pilot_steps"])
-        damping = side.plunger_damping * np.maximum(side.plunger_back, 1.0)
-        side["plunger_weight"] = plunger_weight(damping, period / substeps, table)
+        side["plunger_weight"] = plunger_weight(side.plunger_damping, period / substeps, table)
         side["has_notches"] = np.any([side[f"notch_{k}"] != 1.0 for k in (1, 2, 3, 4)], axis=0)
     return table
 

@@ -91,14 +91,6 @@ def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
 
 
 @compilable
-def drag_of(damping: Any, back: Any, drive: Any, stroke: Any, c: Any) -> Any:
-    """λ [N·s/m] of a plunger at a stroke [m]: `back` times that where its spring wins."""
-    reach = stroke + c.gap
-    returning = drive < c.plunger_stiffness * stroke * reach * reach
-    return select(returning, damping * back, damping)
-
-
-@compilable
 def plunger_weight(damping: Any, step: Any, c: Any) -> Any:
     """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff.
 

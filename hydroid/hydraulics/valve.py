@@ -33,12 +33,6 @@ NOTCHES = (0.04, 0.1, 0.25, 0.5)
 
 
 @compilable
-def spool(stroke_a: Any, stroke_b: Any) -> Any:
-    """Spool displacement x [m], equation (6), from the plungers' strokes [m]."""
-    return stroke_a - stroke_b
-
-
-@compilable
 def slot_share(travel: Any, side: Any) -> Any:
     """Part of a side's slot that spool travel towards it [m] has passed, 0 to 1."""
     return np.minimum(np.maximum(travel - side.overlap, 0.0) / side.slot_width, 1.0)
@@ -56,18 +50,6 @@ def notched(share: Any, side: Any) -> Any:
         more = more + (factor - 1.0) * np.minimum(np.maximum(share - low, 0.0), high - low)
         whole, low = whole + (factor - 1.0) * (high - low), high
     return (share + more) / (1.0 + whole)
-
-
-def opening(spool: Any, c: Any) -> Any:
-    """Opening A(x) of the pump's edge [m²], without leakage, at x [m]; x > 0 opens P→A, x < 0 P→B.
-
-    The compiled loop computes the same in `joint.meter`, without the terms that are off.
-    """
-    a, b = (
-        side.opening * notched(slot_share(travel, side) ** side.opening_exponent, side)
-        for side, travel in ((c.a, spool), (c.b, -spool))
-    )
-    return np.where(spool > 0.0, a, b)
 
 
 def conductance(flow_coefficient: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hydroid.log.clues import likely_range
+from hydroid.log.clues import KINDS, column_unit, likely_range
 from hydroid.log.log import Floats, Log, LogFinding, log_finding
 from hydroid.log.motion import driven_joints
 from hydroid.log.repair import GAP, sample_period
@@ -22,7 +22,7 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
     `repaired`: gaps up to `settings.repair_s` are no faults.
     """
     table, longest = recording.table, settings.repair_s
-    torn = np.isin(recording.rows, table.torn)
+    torn = np.isnan(recording.values).all(axis=1)
     if torn.any():
         yield recording.finding("error", "torn row", np.flatnonzero(torn), cells=str(len(table.names)))
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
@@ -34,11 +34,14 @@ def check_recording(recording: Recording, settings: LogSettings, *, repaired: bo
             yield recording.finding("error", kind, rows, signal, what=what, longest=longest)
     yield from _time(recording, settings, longest if repaired else 0.0)
     yield from _values(recording)
+    yield from _units(recording)
 
 
 def _time(recording: Recording, settings: LogSettings, repaired: float) -> Iterator[LogFinding]:
-    """A time that falls, is too short or slow, or has gaps longer than `repaired` [s]."""
+    """A time that falls, is too short or slow, or has gaps longer than `repaired` [s]; else its period."""
     signal, known = recording.signals[0], recording.time[~np.isnan(recording.time)]
+    if len(recording.time) > len(known) == 0:
+        return  # a finding about its cells says why
     steps, period = np.diff(recording.time), sample_period(recording.time)  # NaN beside a row without time
     falls = 1 + np.flatnonzero(steps <= 0)
     gaps = 1 + np.flatnonzero((steps > GAP * period) & (steps > repaired * (1 + 1e-9) + period))
@@ -48,9 +51,13 @@ def _time(recording: Recording, settings: LogSettings, repaired: float) -> Itera
     if not len(falls) and (duration < 0.5 or period > slowest):
         kind, rows = "too short" if duration < 0.5 else "too slow", gaps[:0]
     elif not len(rows):
+        uneven = np.nanmax(np.abs(steps - period)) > 0.25 * period
+        if uneven or abs(period - settings.period_s) > 0.01 * settings.period_s:
+            step = f"{np.nanmin(steps):.4g} to {np.nanmax(steps):.4g}" if uneven else f"{period:.4g}"
+            yield recording.finding("note", "resampled", (), signal, step=step, period=settings.period_s)
         return
     unit = likely_time_unit(period / signal.gain)
-    remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "set log.time.unit"
+    remedy = f"if its unit is {unit}, set log.time.unit: {unit}" if unit else "check log.time.unit"
     numbers = {"duration": duration, "samples": float(len(known)), "period": period, "slowest": slowest}
     if len(rows):
         before, after = recording.time[rows[0] - 1 : rows[0] + 1]
@@ -88,10 +95,32 @@ def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
     return "outside", {}
 
 
+def _units(recording: Recording) -> Iterator[LogFinding]:
+    """Units that the file states and the settings contradict; a time's only where they are plausible."""
+    for signal in recording.signals:
+        unit, gain = column_unit(signal.name, recording.table.units.get(signal.name, "")), abs(signal.gain)
+        if unit is None or KINDS.get(unit.quantity) != signal.kind:
+            continue
+        wrong, remedy = unit.factor != gain, f"unit: {unit.name}"
+        if signal.kind == "time":
+            wrong &= unit.name == likely_time_unit(sample_period(recording.time) / gain)
+        elif signal.kind == "angle":
+            wrong &= gain in (1, DEGREE)  # other scales may hold the unit
+        else:
+            wrong, remedy = unit.name != "%" and gain == 1, "scale (command [%] = scale · cell + offset)"
+        if wrong:
+            names = {"quantity": signal.kind, "unit": unit.name, "remedy": remedy}
+            yield recording.finding("warning", "unit", (), signal, signal.name, **names)
+
+
 def check_motion(
-    log: Log, signals: Sequence[Signal], outputs: Collection[int], backward: Collection[int]
+    log: Log,
+    signals: Sequence[Signal],
+    outputs: Collection[int],
+    backward: Collection[int],
+    delay: float,
 ) -> Iterator[LogFinding]:
-    """Yield what the motion says against the settings.
+    """Yield what the motion says against the settings, in which commands are delayed [s].
 
     A positive command turns the joints `backward` to negative angles.
     """
@@ -101,11 +130,14 @@ def check_motion(
     def warning(kind: str, signal: Signal, **numbers: Any) -> LogFinding:
         return log_finding("warning", kind, log.source, signal.joint, column=signal.name, **numbers)
 
+    undriven = not log.driven.any() and any(kind == "command" for kind, _ in of)
+    if undriven:
+        yield log_finding("warning", "undriven", log.source)
     for (kind, joint), signal in of.items():
         command, angle = np.ptp(log.command[:, joint - 1]), np.ptp(log.angle[:, joint - 1])
         if kind == "angle" and angle == 0 and (joint in outputs or log.driven[joint - 1]):
             yield warning("angle is constant", signal)
-        if kind == "command" and command == 0 and joint in outputs:
+        if kind == "command" and command == 0 and joint in outputs and not undriven:
             yield warning("command is constant", signal)
     # of commands within 10 %, although joints move well; else they may be small commands in %
     small = common and common.name in ("±1", "±10 V") and any(m.travel > 3 for m in motions.values())
@@ -120,6 +152,8 @@ def check_motion(
             yield warning("turned", command, path=way, against=against)
         if motion.push > 300 and 0 < motion.travel < 2:
             yield warning("no motion", angle, most=motion.travel)
+        if ahead := motion.ahead:
+            yield warning("late", command, lag=ahead, delay=delay - ahead)
 
 
 def motion_findings(log: Log) -> Iterator[LogFinding]:

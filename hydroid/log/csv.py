@@ -43,6 +43,8 @@ def open_csv(path: Path, data: bytes) -> Table:
         hint = "write the columns' names above it (a line that starts with # is a comment)"
         where = f"{path}, line {header + 1}"
         raise LogError("has no header: this line holds numbers", where=where, hint=hint)
+    if width == 1:
+        raise LogError("has one column only", where=str(path), hint="part cells by , ; | tabs or spaces")
     units = dict[str, str]()
     remarks = [f"line {k + 1} is text and left out" for k in left_out]
     if content[0] < header:
@@ -55,10 +57,9 @@ def open_csv(path: Path, data: bytes) -> Table:
     if commas:
         remarks.append("commas are read as decimal points")
     cells = [split(lines[k].replace(",", ".") if commas else lines[k], separator) for k in below]
-    torn = [k for k, row in enumerate(cells) if len(row) < width or any(row[width:])]
-    for k in torn:
-        cells[k] = [""] * width
-    table = np.array([row[:width] for row in cells], dtype=object).reshape(-1, width)
+    # rows of fewer or more cells count as empty
+    whole = (row[:width] if len(row) >= width and not any(row[width:]) else [""] * width for row in cells)
+    table = np.array([*whole], dtype=object).reshape(-1, width)
     return Table(
         source=str(path),
         names=tuple(names),
@@ -67,7 +68,6 @@ def open_csv(path: Path, data: bytes) -> Table:
         units=units,
         remarks=tuple(remarks),
         lines=np.array(below, np.int64) + 1,
-        torn=torn,
     )
 
 

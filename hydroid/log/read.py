@@ -95,7 +95,7 @@ def check_log(
         findings += check_recording(recording, settings, repaired=repair)
         if all(finding.level != "error" for finding in findings):
             log = resample(recording, settings, len(ranges))
-            findings += check_motion(log, signals, compared, backward)
+            findings += check_motion(log, signals, compared, backward, settings.delay_s)
     except LogError as error:
         fault = log_finding("error", "unreadable", source, what=error.what, hint=error.hint)
         findings.append(replace(fault, where=error.where))
@@ -154,10 +154,12 @@ def _match(
         if count > 1:
             what, hint = f"has {count} columns of this name", "rename all but one"
         elif count == 0:
-            guess = f", did you mean {close[signal.name]!r}?" if signal.name in close else ""
-            what = f"the file lacks {signal.name!r} ({signal}{guess})"
+            lacking = [one for one in wanted if one in missing]
+            guess = {name: f", did you mean {other!r}?" for name, other in close.items()}
+            what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking])
+            what, places = f"the file lacks {what}", dict.fromkeys(f"log.{one.kind}" for one in lacking)
             hint = (
-                f"it has {listed([*filter(None, table.names)], 6)}: name its columns in log.{signal.kind} "
+                f"it has {listed([*filter(None, table.names)], 6)}: name its columns in {listed([*places])} "
                 "(`hydroid convert` guesses them); a joint that it lacks is null there"
             )
         line = f", line {table.header}" if table.header else ""

@@ -58,7 +58,6 @@ class Table:
         units: that the file gives to columns, by name.
         remarks: what the reader skipped and what it took parts of the file for.
         lines: of the rows [1-based], shape (R,); None: 1, 2, ...
-        torn: rows that have more or fewer cells than there are columns [0-based].
     """
 
     source: str
@@ -68,7 +67,6 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     remarks: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
-    torn: Sequence[int] | NDArray[np.int64] = ()
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none.

@@ -8,7 +8,7 @@ import numpy as np
 
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.hydraulics.cylinder import rod_motion, volume
-from hydroid.hydraulics.records import LINEAR, Records, coefficients, linkages
+from hydroid.hydraulics.records import LINEAR, Records, coefficients
 from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.uncertainty import Uncertainty
@@ -148,7 +148,7 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
     """
     j = bench.joint - 1
     joints: Records = candidates.joints[:, [j]]  # pyright: ignore[reportAssignmentType]
-    c: Records = coefficients(joints, linkages(bench.settings.arm, [j], [j], joints))[:, 0]  # pyright: ignore[reportAssignmentType]
+    c: Records = coefficients(joints)[:, 0]  # pyright: ignore[reportAssignmentType]
     return c, rod_motion(np.full(len(c), bench.angle), c)[1]
 
 

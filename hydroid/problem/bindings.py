@@ -1,6 +1,6 @@
 """Where each parameter of a fit enters the model (article section 3, equations (15) and (16))."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import Records, nominal_joints, without_actuator
+from hydroid.hydraulics.records import Records, nominal_joints
 from hydroid.parameters import Array
 from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.arm import Arm
@@ -53,13 +53,8 @@ class Bindings:
         self._refuse_overlap(list(settings.parameters))
         self.parameters = settings.parameter_set()
 
-    def effects(self, source: str) -> tuple[str, ...]:
-        """Return the patterns of effects that match a log's file name."""
-        patterns = dict.fromkeys(row.logs for row in self._rows if row.logs is not None)
-        return tuple(pattern for pattern in patterns if fnmatch(Path(source).name, pattern))
-
-    def candidates(self, theta: Array, effects: Collection[str] = ()) -> Candidates:
-        """Spread theta, shape (n, P), over joints and links, in SI, with the effects of a log."""
+    def candidates(self, theta: Array, log: str = "") -> Candidates:
+        """Spread theta, shape (n, P), over joints and links, in SI, as they are in a log of this name."""
         joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for row in self._rows:
@@ -67,25 +62,17 @@ class Bindings:
             value, factor = theta[:, row.column, None], QUANTITIES[row.quantity].factor
             if row.logs is None:
                 target[:, row.places] = value * factor
-            elif row.logs in effects:
+            elif fnmatch(Path(log).name, row.logs):
                 least = QUANTITIES[row.quantity].lowest
                 target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
         return Candidates(joints, mass)
 
     def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
-        """Refuse driven, (J,), or compared joints, 0-based, that the model cannot move.
-
-        Those are joints for which stage 1 has no gain or no damping, or stage 2 no actuator.
-        """
-        moved = sorted({*np.flatnonzero(driven).tolist(), *outputs})
-        if self._stage == "hyd":
-            for joint in moved:
-                if joint < len(self._arm.joints) and self._arm.joints[joint].actuator is None:
-                    raise without_actuator(self._arm, joint)
-            return
-        for quantity in ("gain", "damping"):
+        """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
+        moved = {*np.flatnonzero(driven).tolist(), *outputs}
+        for quantity in ("gain", "damping") if self._stage == "mech" else ():
             served = {place for row in self._rows if row.quantity == quantity for place in row.places}
-            for joint in sorted({*moved} - served)[:1]:
+            for joint in sorted(moved - served)[:1]:
                 raise SettingsError(
                     f"joint {joint + 1} is driven or compared, but no parameter is its {quantity}",
                     where="parameters",

@@ -59,7 +59,7 @@ def start_slopes(problem: Problem, theta: Array) -> list[StartSlopes]:
     for i, log in enumerate(problem.logs):
         joints, pressures = problem.started(log), compared_pressures(log, problem.settings)
         channels = [channel for channel in problem.channels if channel.log == i]
-        candidates = problem.bindings.candidates(theta[None], problem.bindings.effects(log.source))
+        candidates = problem.bindings.candidates(theta[None], log.source)
         rows = slice(channels[0].rows.start, channels[-1].rows.stop)
         moved: list[Array] = []
         for joint in joints:

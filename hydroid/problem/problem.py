@@ -186,10 +186,8 @@ class Problem:
 
     def responses(self, theta: Array) -> list[Response]:
         """Simulate theta, shape (n, P); return one response of n candidates per log."""
-        effects = [self.bindings.effects(log.source) for log in self.logs]
-        candidates = {own: self.bindings.candidates(theta, own) for own in {*effects}}
-        pairs = zip(self._simulations, effects, strict=True)
-        return [simulation.simulate(candidates[own]) for simulation, own in pairs]
+        pairs = zip(self._simulations, self.logs, strict=True)
+        return [one.simulate(self.bindings.candidates(theta, log.source)) for one, log in pairs]
 
     def rms(self, residuals: Array) -> Array:
         """Rms error of the angles, unweighted [rad], shape (n,), from rows of residuals, shape (n, R)."""

@@ -40,7 +40,7 @@ def deciding(settings: FitSettings) -> dict[str, Any]:
     values, search = portable(settings), settings.search.algorithm
     del values["simulation"]["threads"]
     values["search"] = {n: v for n, v in values["search"].items() if n == search or not isinstance(v, dict)}
-    return values | {"arm": settings.arm.file.model_dump(mode="json", exclude={"model", "pair"})}
+    return values | {"arm": settings.arm.model_dump(mode="json", exclude={"model", "pair"})}
 
 
 def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> str:

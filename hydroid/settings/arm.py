@@ -5,7 +5,7 @@ actuators, in units of a drawing (mm, mm², cm³/rad).
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -39,22 +39,6 @@ Beside = Annotated[Path, Strict(False), AfterValidator(_from_folder)]
 """a path relative to the file that names it"""
 
 
-class ArmFile(Settings):
-    """The YAML file of an arm."""
-
-    model: Beside
-    """the arm's MJCF, relative to this file; its keyframes are the named poses"""
-    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = Field(
-        default_factory=dict[str, Cylinder | RotaryActuator]
-    )
-    """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
-    payload: str | None = None
-    """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
-    pair: Beside | None = None
-    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT; null: the
-    arm stands alone"""
-
-
 @dataclass(frozen=True)
 class Joint:
     """A joint that turns, or slides; what is said of angles then holds for its position [m].
@@ -80,28 +64,48 @@ class Joint:
         return self.range if self.slides else (math.radians(low), math.radians(high))
 
 
-@dataclass(frozen=True)
-class Arm:
+class Arm(Settings):
     """An arm as its YAML file and its MJCF describe it; the MJCF is read when something of it is asked for.
-
-    Attributes:
-        file: the YAML's settings.
-        where: begins messages about them.
 
     Raises:
         SettingsError: where the MJCF is read, a setting that does not fit it.
         ModelError: then, no MJCF, or one that hydroid cannot simulate.
     """
 
-    file: ArmFile
-    where: str = field(compare=False)
+    model: Beside
+    """the arm's MJCF, relative to this file; its keyframes are the named poses"""
+    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = Field(
+        default_factory=dict[str, Cylinder | RotaryActuator]
+    )
+    """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
+    payload: str | None = None
+    """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
+    pair: Beside | None = None
+    """MJCF of a machine with two of these arms, whose joints are named right_JOINT and left_JOINT; null: the
+    arm stands alone"""
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep where the settings came from beside what is read of the model: it decides nothing."""
+        vars(self)["where"] = (context or {}).get("source", self.where)
+
+    def __copy__(self) -> "Arm":
+        """Copy the settings alone: a copy with another model must not keep what was read of this one."""
+        copy = super().__copy__()
+        for name in vars(copy).keys() - Arm.model_fields.keys():
+            del vars(copy)[name]
+        return copy
+
+    @cached_property
+    def where(self) -> str:
+        """Begins messages about the settings."""
+        return "the arm's file"
 
     @cached_property
     def joints(self) -> tuple["Joint", ...]:
         """In the order of the model, (J,)."""
         model = self._model
         names = [model.joint(j).name for j in range(model.njnt)]
-        for name in self.file.actuators:
+        for name in self.actuators:
             if name not in names:
                 hint = f"the model's joints: {', '.join(names)}"
                 raise SettingsError(f"actuators.{name}: no such joint", where=self.where, hint=hint)
@@ -134,10 +138,10 @@ class Arm:
 
     @property
     def _model(self) -> Any:
-        return _at_zero(self.file.model).model
+        return _at_zero(self.model).model
 
     def _joint(self, name: str) -> "Joint":
-        joint, actuator = self._model.joint(name), self.file.actuators.get(name)
+        joint, actuator = self._model.joint(name), self.actuators.get(name)
         limited, slides = bool(joint.limited[0]), int(joint.type[0]) == SLIDE
         # sliders and tests take a joint without limits once round
         low, high = (-1.0, 1.0) if slides else (-180.0, 180.0)
@@ -148,26 +152,11 @@ class Arm:
             try:
                 if not limited:
                     raise ValueError("a joint without limits needs a rotary actuator")
-                zero = _at_zero(self.file.model)
+                zero = _at_zero(self.model)
                 actuator = make_cylinder(actuator, bare.limits, zero, name, slides=slides)
             except ValueError as error:
                 raise SettingsError(f"actuators.{name}: {error}", where=self.where) from None
         return replace(bare, actuator=actuator)
-
-    @property
-    def model(self) -> Path:
-        """The MJCF."""
-        return self.file.model
-
-    @property
-    def payload(self) -> str | None:
-        """Site of the model that holds a payload."""
-        return self.file.payload
-
-    @property
-    def pair(self) -> Path | None:
-        """The MJCF of two of these arms."""
-        return self.file.pair
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -228,8 +217,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     Raises:
         SettingsError: no such file, or a setting that is not allowed.
     """
-    path = find_config(name, beside, kind="arm")
-    return Arm(load(path, ArmFile), str(path))
+    return load(find_config(name, beside, kind="arm"), Arm)
 
 
 def _at_zero(path: Path) -> "mujoco.MjData":

@@ -4,19 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    InstanceOf,
-    PlainSerializer,
-    ValidationInfo,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import MECHANICAL
-from hydroid.settings.arm import Arm, ArmFile, load_arm
+from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, validate
@@ -31,16 +23,7 @@ def _read_arm(value: Any, info: ValidationInfo) -> Any:
     folder = (info.context or {}).get("folder")
     if isinstance(value, str):
         return load_arm(value, folder)
-    return Arm(validate(value, ArmFile, "arm", folder=folder), "arm") if isinstance(value, dict) else value
-
-
-ArmSetting = Annotated[
-    InstanceOf[Arm],
-    BeforeValidator(_read_arm),
-    PlainSerializer(lambda arm: arm.file.model_dump(mode="json")),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object"}]}),
-]
-"""an arm; in a file the name of one, or an arm file's settings"""
+    return validate(value, Arm, "arm", folder=folder) if isinstance(value, dict) else value
 
 
 class FitSettings(Settings):
@@ -48,7 +31,7 @@ class FitSettings(Settings):
 
     stage: Literal["mech", "hyd"] = "mech"
     """mech: the hydraulics are a gain; hyd: the whole chain from command to torque is simulated"""
-    arm: ArmSetting = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
+    arm: Annotated[Arm, BeforeValidator(_read_arm)] = Field("hydrolek", validate_default=True)  # pyright: ignore[reportAssignmentType]
     """name of a shipped arm, or path of an arm's YAML file, relative to this file or to the working folder"""
     outputs: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (2,)
     """joints whose measured angle is compared"""

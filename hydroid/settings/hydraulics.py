@@ -4,6 +4,7 @@ Each setting holds for every actuator of the arm; a parameter of a fit sets or f
 openings and pivots differ by joint: they stand in the arm's file.
 """
 
+import math
 from typing import Annotated, Any
 
 from pydantic import Field, create_model, model_validator
@@ -15,10 +16,12 @@ from hydroid.settings.load import Positive, Settings
 
 
 def _field(quantity: Quantity) -> Any:
-    number: Any = Annotated[float, *quantity.allowed] if quantity.allowed else float
     optional = quantity.optional or quantity.default is None
     meaning = f"{quantity.meaning} [{quantity.unit}]" if quantity.unit else quantity.meaning
-    return number | None if optional else number, Field(quantity.default, description=meaning)
+    low, high = quantity.limits or (0.0, math.inf)
+    above, least = (low, None) if quantity.positive else (None, low)
+    field = Field(quantity.default, description=meaning, gt=above, ge=least, le=high)
+    return float | None if optional else float, field
 
 
 _Quantities: type[Any] = create_model(

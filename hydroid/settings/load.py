@@ -105,7 +105,7 @@ def validate(
     Files that the settings name are first looked up in `folder`.
     """
     try:
-        return kind.model_validate(values, context={"folder": folder})
+        return kind.model_validate(values, context={"folder": folder, "source": source})
     except ValidationError as error:
         # a setting that does not exist may be why another is missing
         first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")

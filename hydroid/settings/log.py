@@ -14,17 +14,13 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
 from hydroid.settings.load import JointNumber, Settings
-from hydroid.units import UNITS
 
 JOINT = "{joint}"
 Kind = Literal["command", "angle", "pressure"]
 
 
 def _as_names(value: Any) -> Any:
-    names = (value,) if isinstance(value, str) else value
-    if names is not None and not (isinstance(names, tuple) and all(isinstance(name, str) for name in names)):
-        raise ValueError("must be a column's name, or a list of two")
-    return names
+    return (value,) if isinstance(value, str) else value
 
 
 def _nonzero(value: float | None) -> float | None:
@@ -77,18 +73,22 @@ DEFAULTS: dict[Kind, ColumnMap] = {
     "angle": ColumnMap((f"q{JOINT}_deg",), "deg"),
     "pressure": ColumnMap((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), "bar"),
 }
-COLUMNS = {"command": (1, 2), "angle": (1,), "pressure": (2,)}
-"""how many columns may hold a quantity"""
+ALLOWED = {
+    "command": ((1, 2), ("%",)),
+    "angle": ((1,), ("deg", "rad", "m", "cm", "mm")),
+    "pressure": ((2,), ("bar", "Pa", "MPa")),
+}
+"""how many columns may hold a quantity, and their units"""
 
 
 def _checked(columns: Columns | None, info: ValidationInfo) -> Columns | None:
     """Refuse a unit or a number of columns that the quantity does not have."""
     kind = str(info.field_name)
-    measured = UNITS[columns.unit.lower()].quantity if columns and columns.unit else kind
-    if columns and {"length": "angle"}.get(measured, measured) != kind:
+    counts, units = ALLOWED[kind]
+    if columns and columns.unit not in (None, *units):
         raise ValueError(f"{columns.unit} is no unit of a log's {kind}s")
-    if columns and columns.column and len(columns.column) not in COLUMNS[kind]:
-        raise ValueError(f"{kind} needs {' or '.join(map(str, COLUMNS[kind]))} column names")
+    if columns and columns.column and len(columns.column) not in counts:
+        raise ValueError(f"{kind} needs {' or '.join(map(str, counts))} column names")
     return columns
 
 

@@ -56,33 +56,37 @@ class ParameterSettings(Settings):
         if self.quantity not in CHOICES:
             near = difflib.get_close_matches(self.quantity, CHOICES, n=3, cutoff=0.4) or MECHANICAL
             raise ValueError(f"no quantity {self.quantity!r}; did you mean {' or '.join(map(repr, near))}?")
-        if (self.quantity == "mass") != (self.link is not None):
-            raise ValueError("a mass names its link, and only a mass does")
-        if CHOICES[self.quantity].of_the_pump and (self.joints is not None or self.each):
-            raise ValueError(f"all joints share the pump: a {self.quantity} has no joints")
-        if self.link is not None and (self.joints is not None or self.each):
-            raise ValueError("a mass belongs to a link, not to joints")
-        if self.logs is not None and (self.sd is None or self.quantity == "mass"):
-            raise ValueError("an effect in some logs needs sd: standard deviation, around 0, and is no mass")
-        if self.within is not None and self.sd is not None:
-            raise ValueError("give within: factor or sd: standard deviation, not both")
-        if not self.can_be_free and self.fixed is None:
-            raise ValueError("needs bounds: [lower, upper], a prior (within: factor), or fixed: value")
-        if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
-            raise ValueError("bounds must be [lower, upper] with lower < upper")
-        values = [v for v in (*(self.bounds or ()), self.nominal, self.start, self.fixed) if v is not None]
-        least = CHOICES[self.quantity].lowest if self.logs is None else -math.inf
-        lowest = min(values, default=1.0)
-        if self.quantity == "mass" and lowest <= 0:
-            raise ValueError("a mass must be above 0 kg")
-        if lowest < least:
-            what = f"be below {least:g}" if least else "be negative"
-            raise ValueError(f"a {self.quantity} cannot {what}")
+        row, mass = CHOICES[self.quantity], self.quantity == "mass"
+        placed = self.joints is not None or self.each
+        least = row.lowest if self.logs is None else -math.inf
         low, high = self.bounds or (least, math.inf)
-        for name in ("nominal", "start"):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise ValueError(f"{name} {value:g} lies outside the bounds")
+        starts = [(n, v) for n, v in (("nominal", self.nominal), ("start", self.start)) if v is not None]
+        fixed = () if self.fixed is None else (self.fixed,)
+        lowest = min((*(self.bounds or ()), *(v for _, v in starts), *fixed), default=1.0)
+        refusals = [
+            (mass != (self.link is not None), "a mass names its link, and only a mass does"),
+            (row.of_the_pump and placed, f"all joints share the pump: a {self.quantity} has no joints"),
+            (mass and placed, "a mass belongs to a link, not to joints"),
+            (
+                self.logs is not None and (self.sd is None or mass),
+                "an effect in some logs needs sd: standard deviation, around 0, and is no mass",
+            ),
+            (
+                self.within is not None and self.sd is not None,
+                "give within: factor or sd: standard deviation, not both",
+            ),
+            (
+                not (self.can_be_free or fixed),
+                "needs bounds: [lower, upper], a prior (within: factor), or fixed: value",
+            ),
+            (low >= high, "bounds must be [lower, upper] with lower < upper"),
+            (mass and lowest <= 0, "a mass must be above 0 kg"),
+            (lowest < least, f"a {self.quantity} cannot be {f'below {least:g}' if least else 'negative'}"),
+            *((not low <= v <= high, f"{name} {v:g} lies outside the bounds") for name, v in starts),
+        ]
+        for wrong, message in refusals:
+            if wrong:
+                raise ValueError(message)
         return self
 
     @property

@@ -1,13 +1,15 @@
 """Settings of the searches; the defaults are the article's table 5, and ours where it is silent."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hydroid.settings.load import Settings
 
 Rate = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
+Population = Annotated[int, Field(ge=4, le=100_000)]
+Generations = Annotated[int, Field(ge=0)]
 
 
 class GeneticSettings(Settings):
@@ -17,9 +19,9 @@ class GeneticSettings(Settings):
     fitness to be proportional to, and the article names NSGA-II: parents come from its crowded tournament.
     """
 
-    population: Annotated[int, Field(ge=4, le=100_000)] = 20
+    population: Population = 70
     """number of candidates in a population"""
-    generations: Annotated[int, Field(ge=0)] = 140
+    generations: Generations = 40
     """number of populations after the first one"""
     crossover_rate: Rate = 0.8
     """probability P_c that a pair of parents is crossed; otherwise its children are copies"""
@@ -29,6 +31,15 @@ class GeneticSettings(Settings):
     """binary: 16 Gray-coded bits per parameter, the article's MVBS; integer: one number per parameter"""
     crossover: Literal["pointwise", "uniform"] = "pointwise"
     """pointwise: cut parents at two places; uniform: choose each element from either parent"""
+
+
+class ParetoSettings(GeneticSettings):
+    """The same for several objectives."""
+
+    population: Population = 20
+    generations: Generations = 140
+    crossover_rate: Rate = 0.4
+    mutation_rate: Rate = 0.2
 
 
 class MultistartSettings(Settings):
@@ -71,21 +82,8 @@ class SearchSettings(Settings):
     compromise: Literal["average", "utopia", "best"] = "average"
     """average: mean of the best candidates of all segments, the article's; utopia: candidate nearest to
     the utopia point; best: candidate of the lowest norm"""
-    ga: GeneticSettings = GeneticSettings(population=70, generations=40)
+    ga: GeneticSettings = GeneticSettings()
     """the simple genetic algorithm, article 4.1"""
-    nsga2: GeneticSettings = GeneticSettings(crossover_rate=0.4, mutation_rate=0.2)
+    nsga2: ParetoSettings = ParetoSettings()
     """the multi-objective genetic algorithm NSGA-II, article 4.2"""
     multistart: MultistartSettings = MultistartSettings()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _complete(cls, values: Any) -> Any:
-        """Give an algorithm what its section leaves out: defaults differ, though a class may be shared."""
-        if not isinstance(values, dict):
-            return values
-        sections = ((name, values.get(name)) for name in ("ga", "nsga2"))
-        return values | {
-            name: cls.model_fields[name].default.model_dump() | section
-            for name, section in sections
-            if isinstance(section, dict)
-        }

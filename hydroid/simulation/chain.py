@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from hydroid.arm.locked import LockedArm
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
-from hydroid.hydraulics.records import Array, Records, coefficients, linkages
+from hydroid.hydraulics.records import NONE, Array, Records, coefficients, without_actuator
 from hydroid.settings.arm import Arm
 from hydroid.simulation.scenario import Candidates
 
@@ -19,7 +19,7 @@ class Chain:
     """The actuators of an arm, for any candidates.
 
     Args:
-        arm: the arm's settings, for its linkages.
+        arm: the arm's settings, for its stops and actuators.
         locked: the arm that is stepped.
         active: which of the arm's joints have hydraulics, shape (J,).
         substeps: of valves and oil in one MuJoCo step.
@@ -37,7 +37,10 @@ class Chain:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
         self.joints, self.pushed = locked.columns[self.columns], pushed
         self._pushed = locked.columns[pushed].tolist()
-        self._arm, self._driven = arm, self.joints[active[self.joints]].tolist()
+        self._idle = ~active[self.joints]
+        for joint in self.joints[active[self.joints]].tolist():
+            if arm.joints[joint].actuator is None:
+                raise without_actuator(arm, joint)
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
         self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
         self._period, self._substeps = locked.model.opt.timestep, substeps
@@ -60,8 +63,8 @@ class Chain:
             rests = asked & np.isfinite(joints.trapped_pressure)
             joints["trapped_pressure"] = np.where(rests, trapped, joints.trapped_pressure)
             joints["start_pressure"] = np.where(asked, level, joints.start_pressure)
-        moved = linkages(self._arm, self.joints.tolist(), self._driven, joints)
-        plugin = make_plugin(joints, moved, self._entries, self._period, self._substeps)
+        joints.kind[:, self._idle] = NONE
+        plugin = make_plugin(joints, self._entries, self._period, self._substeps)
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
@@ -73,9 +76,7 @@ class Chain:
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
-        driven = [j for j in self._pushed if self._arm.joints[j].actuator is not None]
-        c = coefficients(joints, linkages(self._arm, self._pushed, driven, joints))
-        each: Records = c[:, None]  # pyright: ignore[reportAssignmentType]
+        each: Records = coefficients(joints)[:, None]  # pyright: ignore[reportAssignmentType]
         return swallowed(each, angle, velocity).sum(axis=2)
 
 

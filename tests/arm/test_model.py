@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -98,6 +97,6 @@ def test_each_arm_of_a_pair_is_the_one_that_stands_alone():
 
 def test_an_arm_that_names_no_pair_or_another_model_says_how():
     with pytest.raises(SettingsError, match=r"stands alone.*pair: MODEL"):
-        load_machine(replace(ARM, file=ARM.file.model_copy(update={"pair": None})), pair=True)
+        load_machine(ARM.changed({"pair": None}), pair=True)
     with pytest.raises(ModelError, match=r"not the model of two of the arm; the joints .* right_azimuth"):
-        load_machine(replace(ARM, file=ARM.file.model_copy(update={"pair": ARM.model})), pair=True)
+        load_machine(ARM.changed({"pair": ARM.model}), pair=True)

@@ -14,7 +14,7 @@ from scipy.integrate import Radau
 
 from hydroid.hydraulics import actuator
 from hydroid.hydraulics.actuator import at_rest, make_plugin
-from hydroid.hydraulics.records import BARS, JOINT, JOINT_STATE, LINEAR, LINKAGE, Records
+from hydroid.hydraulics.records import JOINT, JOINT_STATE, LINEAR, ROTARY, Records
 from hydroid.mjcf import quiet_mujoco
 from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
@@ -24,8 +24,6 @@ INERTIA, DAMPING, STIFFNESS, MASS, CENTRE, TILT = 23.6, 231.8, 53.4, 45.0, 0.6, 
 START, PERIOD, GRAVITY = radians(10.0), 0.01, 9.81
 A, B, THETA0, STROKE = 0.30, 0.08, radians(70.0), 0.135
 SHORTEST = sqrt(A * A + B * B - 2 * A * B * cos(radians(40.0)))
-NO_BARS = (0.0,) * len(BARS)
-CYLINDER = np.array([(LINEAR, 0.0, 1.0, THETA0, SHORTEST, STROKE, *NO_BARS)], LINKAGE).view(np.recarray)
 TRUTH = {"area_a": 1000.0, "area_b": 750.0, "opening_a": 0.4, "opening_b": 0.4}
 PIVOTS = {"pivot_distance_1": A, "pivot_distance_2": B, "pivot_angle": 70.0}
 TEN = {
@@ -48,7 +46,15 @@ def parameters(settings: HydraulicSettings, **values: ArrayLike) -> Records:
     """The shoulder alone, once a candidate; `values` in drawing units, scalars or (n,)."""
     stated = {k: inf if v is None else v for k, v in actuator_values(None, settings).items() if k != "mass"}
     one = changed(np.zeros((1, 1), JOINT).view(np.recarray), **stated | TRUTH | PIVOTS | {"damping": DAMPING})
+    one.kind, one.half, one.sense, one.retracted, one.stroke = LINEAR, 1.0, 1.0, radians(-30.0), STROKE
     return changed(one, **{k: np.reshape(np.asarray(v), (-1, 1)) for k, v in values.items()})
+
+
+def rotary(joints: Records) -> Records:
+    """Joints under rotary actuators whose range is from -1 to 1 rad."""
+    turned = joints.copy()
+    turned.kind, turned.middle, turned.half = ROTARY, 0.0, 1.0
+    return turned
 
 
 def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
@@ -104,7 +110,6 @@ def simulate(
     observe: list | None = None,
     start: float = START,
     model: mujoco.MjModel | None = None,
-    linkage: Records = CYLINDER,
     velocity: float = 0.0,
 ) -> np.ndarray:
     """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo steps a sample.
@@ -114,9 +119,8 @@ def simulate(
     """
     model, n, samples = pendulum() if model is None else model, len(p), len(command)
     model.opt.timestep = PERIOD / steps
-    moved = np.broadcast_to(linkage, p.shape).view(np.recarray)
     entries = np.zeros((1, 1), np.intp)
-    plugin = make_plugin(p, moved, entries, model.opt.timestep, settings.substeps)
+    plugin = make_plugin(p, entries, model.opt.timestep, settings.substeps)
     arm, pose = SteppedArm(model, np.zeros(1, np.intp), steps=steps), np.array([start])
     angle, states = np.full((n, samples + 1, 1), start), np.zeros((n, samples, 1), JOINT_STATE)
     with quiet_mujoco():

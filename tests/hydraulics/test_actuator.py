@@ -6,25 +6,26 @@ import numpy as np
 import pytest
 from hydraulic_reference import (
     CENTRE,
-    CYLINDER,
     DAMPING,
     GRAVITY,
     MASS,
+    SHORTEST,
     START,
     STIFFNESS,
     STROKE,
+    THETA0,
     TILT,
     A,
     B,
     parameters,
     pulses,
+    rotary,
     simulate,
     wheel,
 )
 
 from hydroid.hydraulics.actuator import Observation
 from hydroid.hydraulics.cylinder import triangle
-from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY
 from hydroid.hydraulics.solenoid import force_curve
 from hydroid.settings.hydraulics import HydraulicSettings
 
@@ -35,7 +36,7 @@ Seen = list[tuple[Observation, np.ndarray]]
 
 def cylinder(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Travel and moment arm at angles of any shape."""
-    return triangle(angle, A, B, float(CYLINDER.theta0[0]), float(CYLINDER.shortest[0]))[:2]
+    return triangle(angle, A, B, THETA0, SHORTEST)[:2]
 
 
 def weight(angle: float) -> float:
@@ -172,11 +173,10 @@ def test_delay_shifts_the_response():
 
 
 def test_a_rotary_actuator_turns_by_flow_over_displacement():
-    linkage = np.array([(ROTARY, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
-    p = parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0)
+    p = rotary(parameters(TIGHT, area_a=10.0, area_b=10.0, dead_volume=50.0, damping=5.0))
     seen: Seen = []
     command = np.repeat([60.0, 0.0], 100)
-    angle = simulate(p, command, TIGHT, observe=seen, start=0.0, model=wheel(0.05), linkage=linkage)[0]
+    angle = simulate(p, command, TIGHT, observe=seen, start=0.0, model=wheel(0.05))[0]
     assert angle[-1] > 1.0
     pressed = seen[-1][0].pressure[0, 0, 0] - 50e5
     flowed = 0.01 * sum(o.flow[0, 0, 0] for o, _ in seen)

@@ -10,7 +10,7 @@ from hydroid.hydraulics.cylinder import (
     stop_damping,
     triangle,
 )
-from hydroid.hydraulics.records import has_force_curve, linkages, nominal_joints
+from hydroid.hydraulics.records import coefficients, has_force_curve, nominal_joints
 from hydroid.hydraulics.solenoid import (
     coil_force,
     curve_exists,
@@ -96,26 +96,13 @@ def test_notches_bend_the_opening_between_its_ends():
     np.testing.assert_allclose(slope[middles] / slope[-1], [0.2, 3.0, 0.5, 2.0])
 
 
-def test_triangle_is_a_derivative_chain():
-    q, h = np.linspace(-0.5, 1.5, 50), 1e-5
-    x, r, slope = triangle(q, 0.3, 0.08, np.radians(70), 0.2442)
-    ahead, behind = (
-        triangle(q + h, 0.3, 0.08, np.radians(70), 0.2442),
-        triangle(q - h, 0.3, 0.08, np.radians(70), 0.2442),
-    )
-    np.testing.assert_allclose(r, (ahead[0] - behind[0]) / (2 * h), rtol=1e-7)
-    np.testing.assert_allclose(slope, (ahead[1] - behind[1]) / (2 * h), atol=1e-7)
-    assert x.shape == q.shape
-
-
 def test_linkages_are_those_of_the_arms_cylinders(arm: Arm):
-    joints = nominal_joints(arm, HydraulicSettings())[None].view(np.recarray)
-    moved = linkages(arm, range(7), range(7), joints)[0]
-    for joint, p, c in zip(arm.joints, joints[0], moved, strict=True):
+    moved = coefficients(nominal_joints(arm, HydraulicSettings())[None].view(np.recarray))[0]
+    for joint, c in zip(arm.joints, moved, strict=True):
         if joint.actuator.kind != "linear":
             continue
         q = np.radians(np.linspace(*joint.range, 9))
-        x, r, _ = triangle(q, p.pivot_distance_1, p.pivot_distance_2, c.theta0, c.shortest)
+        x, r, _ = triangle(q, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
         np.testing.assert_allclose(x, joint.actuator.length(q) - joint.actuator.length(q[0]), atol=1e-12)
         np.testing.assert_allclose(r, joint.actuator.moment_arm(q), rtol=1e-12)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hydraulic_reference import changed, simulate, wheel
 
-from hydroid.hydraulics.records import Records, linkages, nominal_joints
+from hydroid.hydraulics.records import Records, coefficients, nominal_joints
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import make_cylinder
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -23,7 +23,7 @@ def with_cylinder(arm: Arm, **changes) -> Arm:
     changes = {"triangle": cylinder.triangle, "stroke": cylinder.stroke} | changes
     settings = cylinder.settings.model_copy(update=changes)
     moved = replace(joint, range=limits, actuator=make_cylinder(settings, np.radians(limits)))
-    other = replace(arm)
+    other = arm.model_copy()
     vars(other)["joints"] = (*arm.joints[:SHOULDER], moved, *arm.joints[SHOULDER + 1 :])
     return other
 
@@ -42,9 +42,7 @@ def shoulder(arm: Arm, **values: float) -> Records:
 
 def motion(arm: Arm, command: np.ndarray, start: float) -> np.ndarray:
     """Angles [rad], (T + 1,), of the shoulder's cylinder on a lone wheel."""
-    p = shoulder(arm, damping=50.0)
-    moved = linkages(arm, [SHOULDER], [SHOULDER], p)
-    return simulate(p, command, SETTINGS, start=start, model=wheel(20.0), linkage=moved)[0]
+    return simulate(shoulder(arm, damping=50.0), command, SETTINGS, start=start, model=wheel(20.0))[0]
 
 
 def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm):
@@ -57,8 +55,8 @@ def test_a_cylinder_that_extends_to_negative_angles_mirrors_the_motion(arm: Arm)
 
 
 def test_pivots_of_parameters_take_the_place_of_the_arms(arm: Arm):
-    moved = linkages(arm, [SHOULDER], [SHOULDER], shoulder(arm, pivot_distance_2=[[0.08], [0.1]]))
-    assert moved[0, 0] == linkages(arm, [SHOULDER], [SHOULDER], shoulder(arm))[0, 0]
+    moved = coefficients(shoulder(arm, pivot_distance_2=[[0.08], [0.1]]))
+    assert moved[0, 0] == coefficients(shoulder(arm))[0, 0]
     assert moved.shortest[1, 0] < moved.shortest[0, 0]
 
 

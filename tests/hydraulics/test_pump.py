@@ -7,7 +7,6 @@ from hydraulic_reference import changed, parameters, pulses, simulate
 
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
-from hydroid.settings.problem import ParameterSettings
 
 SETTINGS = HydraulicSettings(substeps=10)
 LITRES = 6e4
@@ -110,8 +109,3 @@ def test_random_pumps_and_valves_stay_stable(arm: Arm):
         runs.append(DrivenArm(arm, p, command, settings).run())
         assert np.isfinite(runs[-1]).all()
     assert np.median(np.degrees(abs(runs[0] - runs[1])).max(axis=(1, 2))) < 0.5
-
-
-def test_a_pump_belongs_to_all_joints():
-    with pytest.raises(ValueError, match="all joints share the pump"):
-        ParameterSettings(quantity="pump_flow", joints=(2,), bounds=(1.0, 2.0))

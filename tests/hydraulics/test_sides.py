@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from hydraulic_reference import changed, simulate
+from hydraulic_reference import changed, rotary, simulate
 from hydraulic_reference import wheel as lone_wheel
 
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import BARS, LINKAGE, ROTARY, nominal_joints
+from hydroid.hydraulics.records import nominal_joints
 from hydroid.quantity_table import TARGETS
 from hydroid.settings.arm import Arm
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -23,9 +23,8 @@ UNLIKE = {
 
 def wheel(arm: Arm, values: dict[str, float], command: np.ndarray) -> np.ndarray:
     """Angles [rad], (T,), of a lone wheel under a rotary actuator."""
-    linkage = np.array([(ROTARY, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.0] * len(BARS))], LINKAGE).view(np.recarray)
     p = changed(nominal_joints(arm, SETTINGS)[None, [3]].view(np.recarray), damping=5.0, **values)
-    return simulate(p, command, SETTINGS, start=0.0, model=lone_wheel(0.05), linkage=linkage)[0]
+    return simulate(rotary(p), command, SETTINGS, start=0.0, model=lone_wheel(0.05))[0]
 
 
 def test_swapped_sides_mirror_the_motion(arm: Arm):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hydraulic_reference import CYLINDER, START, A, B, parameters, simulate
+from hydraulic_reference import SHORTEST, START, THETA0, A, B, parameters, simulate
 from recovery import duties, settings_of
 
 from hydroid.arm.model import load_model
@@ -32,7 +32,7 @@ def test_the_oil_must_first_be_pressed():
     moved = int(np.argmax(angle - START > np.radians(0.1)))
     pressure = np.array([o.pressure[0, 0, 0] for o, _ in seen])[:moved]
     flow = np.array([o.flow[0, 0, 0] for o, _ in seen])[:moved]
-    ends = triangle(angle[[0, moved]], A, B, float(CYLINDER.theta0[0]), float(CYLINDER.shortest[0]))[0]
+    ends = triangle(angle[[0, moved]], A, B, THETA0, SHORTEST)[0]
     compressed = (30e-6 + 1e-3 * ends[0]) * (pressure[-1] - 5e5) / 8e8
     swept = 1e-3 * (ends[1] - ends[0])
     assert 0.01 * flow.sum() == pytest.approx(compressed + swept, rel=0.05)

@@ -45,6 +45,14 @@ def test_half_a_second_of_slow_motion_makes_no_dead_band():
     assert JointMotion(replace(log, command=command, angle=angle), 1).dead_band <= 5
 
 
+@pytest.mark.parametrize("early", [0.1, 0.3])
+def test_a_motion_before_its_command_is_told(early):
+    log = joint_log(dead=10, lag=0.06)
+    moved = replace(log, command=np.roll(log.command, round((0.06 + early) / PERIOD), axis=0))
+    assert JointMotion(moved, 1).ahead == pytest.approx(early, abs=0.021)
+    assert JointMotion(log, 1).ahead == 0
+
+
 POSE = np.deg2rad([0.0, 25.0, -60.0, 0.0, 0.0, 0.0, 20.0])
 
 

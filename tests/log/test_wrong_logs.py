@@ -94,12 +94,24 @@ def misspelt() -> list[Table]:
     return [{name.replace("u2", "U2"): values for name, values in rig().items()}]
 
 
+def early(seconds: float) -> list[Table]:
+    """A boom whose angles are logged too early."""
+    return of(
+        "q", lambda q: np.r_[q[round(100 * seconds) :], np.full(round(100 * seconds), q[-1])], boom([60, -60])
+    )
+
+
+def in_rad() -> list[Table]:
+    return [{name.replace("q2_deg", "q2 [rad]"): values for name, values in rig().items()}]
+
+
 def pushed() -> list[Table]:
     return [boom([60, -60, 100, -100], seconds=8)]
 
 
 ROWS = np.insert(np.arange(4100), 900, 900)
 HOLE = np.arange(4100) == 700
+JITTER = 0.004 * np.sin(np.arange(4100))
 
 
 WRONG = (
@@ -112,10 +124,19 @@ WRONG = (
     Wrong(
         "angles in deg, read as rad", "error: angle.unit: deg", lambda: [rig()], {"angle": {"unit": "rad"}}
     ),
+    Wrong(
+        "a unit in a name that the settings contradict",
+        "warning: the file says",
+        in_rad,
+        {"joints": {2: {"angle": {"column": "q2 [rad]"}}}},
+    ),
     Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
     Wrong("a clock in days, read as s", "error: unit: day", lambda: of("time", lambda t: t / 86400)),
     Wrong("an angle that counts the other way", "error: angle.scale: -1", lambda: of("q3", np.negative)),
     Wrong("a command wired the other way", "warning: against the command", lambda: of("u2", np.negative)),
+    Wrong("clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)),
+    Wrong("commands that are all 0", "warning: no joint is driven", lambda: of("u", np.zeros_like)),
+    Wrong("a clock that jitters", "note: is resampled", lambda: of("time", lambda t: t + JITTER)),
     Wrong("0.4 s without a sample", "error: cut the log into two", lambda: without(*range(900, 940))),
     Wrong("a dropped sample", "error: --repair fills gaps up to 0.1 s", lambda: without(900)),
     Wrong("a sample that stands twice", "error: does not increase", lambda: of("", lambda v: v[ROWS])),
@@ -165,7 +186,7 @@ def test_a_good_log_has_no_finding(tmp_path: Path) -> None:
 def test_a_stop_is_no_other_sign(duties: list[float], stop: float, tmp_path: Path) -> None:
     kinds = [kind for _, kind in findings(tmp_path, boom(duties, stop=stop, seconds=8))]
     assert "at a stop" in kinds
-    assert "turned" not in kinds
+    assert not {"turned", "late"} & {*kinds}
 
 
 def test_how_far_each_joint_moves(tmp_path: Path) -> None:

@@ -55,9 +55,7 @@ def test_a_pressure_error_counts_its_weight(hydraulic):
 
 def test_pressures_do_not_change_the_angles(hydraulic):
     settings, log = hydraulic
-    without = settings.model_copy(
-        update={"objective": settings.objective.model_copy(update={"pressure_weight": 0})}
-    )
+    without = settings.changed({"objective.pressure_weight": 0})
     sets = Problem(settings, [log]).parameters.from_unit(np.random.default_rng(0).random((5, 10)))
     with_, bare = (Problem(s, [log]).responses(sets)[0] for s in (settings, without))
     assert np.array_equal(with_.angle, bare.angle, equal_nan=True)
@@ -109,9 +107,8 @@ def test_a_payload_slows_the_arm_of_its_log_alone():
     other = replace(log, source="elsewhere/other.csv")
     loaded, empty = (simulate_log(settings, x, truth, "t").angle[50, 1] for x in (log, other))
     assert abs(loaded - log.angle[0, 1]) < abs(empty - log.angle[0, 1])
-    bare = replace(settings.arm, file=settings.arm.file.model_copy(update={"payload": None}))
     with pytest.raises(SettingsError, match="no place for a payload"):
-        simulate_log(settings.model_copy(update={"arm": bare}), log, truth, "t")
+        simulate_log(settings.changed({"arm.payload": None}), log, truth, "t")
 
 
 def test_a_payload_of_no_log_is_refused(tmp_path):

@@ -5,7 +5,6 @@ import os
 import resource
 import shutil
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -192,8 +191,7 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
     arm = SETTINGS.arm
 
     def other(**changes):
-        changed = replace(arm, file=arm.file.model_copy(update=changes))
-        return SETTINGS.changed({"arm": changed}), read_logs([path], SETTINGS)
+        return SETTINGS.changed({"arm": arm.changed(changes)}), read_logs([path], SETTINGS)
 
     with pytest.raises(RunError, match=r"has arm\.actuators.* = "):
         folder.begin(*other(actuators={}))

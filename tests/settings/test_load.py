@@ -38,7 +38,7 @@ LOG_FAULTS = [
     ("command: {column: u}", "{joint}"),
     ("angle: {column: q}", "{joint}"),
     ("command: {column: [a, b, c]}", "1 or 2 column names"),
-    ("command: {column: 3}", "a column's name"),
+    ("command: {column: 3}", "must be a list in brackets"),
     ("command: {scale: 0}", "must not be 0"),
     ("angle: {unit: bar}", "bar is no unit of a log's angles"),
     ("angle: {unit: grad}", "'deg', 'rad'"),
@@ -95,7 +95,12 @@ def test_a_fault_names_file_line_and_setting(tmp_path: Path, text: str, says: li
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("search.ga.population", 1), ("parameters.K.bounds", [2, 1]), ("search", {"ga": {"population": 1}})],
+    [
+        ("search.ga.population", 1),
+        ("parameters.K.bounds", [2, 1]),
+        ("search", {"ga": {"population": 1}}),
+        ("log.angle.column", "foo"),
+    ],
 )
 def test_a_fault_in_an_override_names_the_override(tmp_path: Path, key: str, value: object):
     with pytest.raises(SettingsError) as caught:
@@ -150,11 +155,6 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path, old, new, mes
     path.write_text(NAMED.replace(old, new))
     with pytest.raises(SettingsError, match=message):
         Bindings(hydroid.load_settings(path))
-
-
-def test_a_column_is_named_once(tmp_path: Path):
-    with pytest.raises(SettingsError, match=r"^--set log\.angle\.column: column 'foo' is meant"):
-        load(written(tmp_path, MINIMAL), FitSettings, {"log.angle.column": "foo"})
 
 
 def test_a_joint_inherits_what_it_does_not_say() -> None:

@@ -64,11 +64,12 @@ def test_bounds_follow_from_the_prior():
         ({"nominal": 0.0, "within": 2}, "nominal value above 0"),
         ({"nominal": -1.0, "sd": 2}, "cannot be negative"),
         ({"each": True, "within": 2}, "not both"),
+        ({"quantity": "pump_flow", "bounds": [1, 2]}, "all joints share the pump"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(entry, words):
     with pytest.raises(SettingsError, match=words):
-        parameter(quantity="area_a", joints=[2], **entry)
+        parameter(**{"quantity": "area_a", "joints": [2]} | entry)
 
 
 def test_each_writes_one_parameter_per_joint_with_its_own_nominal_value():

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file, write_atomic
@@ -65,6 +65,12 @@ class Covariance(Settings):
     """G, (p, p): a relative change v is |G v| standard deviations long"""
     quantile: float
     """half a 95 % interval, in standard deviations"""
+
+    @model_validator(mode="after")
+    def _square(self) -> "Covariance":
+        if {len(self.parameters)} != {len(self.scale), len(self.root), *map(len, self.root)}:
+            raise ValueError("root must have a row and a column, and scale a value, for each of parameters")
+        return self
 
 
 class QuantityEstimate(Settings):

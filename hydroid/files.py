@@ -139,6 +139,8 @@ def find_config(
         for candidate in (folder / name, folder / f"{name}.yaml"):
             if is_file(candidate):
                 return candidate
+    if len(Path(name).parts) > 1:
+        raise SettingsError("no such file or folder", where=str(name))
     known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem == "hydrolek") == (kind == "arm"))
     raise SettingsError(
         f"no such {kind}", where=str(name), hint=f"give a YAML file or one of: {', '.join(known)}"

@@ -22,7 +22,7 @@ from hydroid.units import bare, unit_of
 
 SEPARATORS = "\t;,| "
 csv.field_size_limit(2**31 - 1)  # a longer cell is no number, which is said, with its place
-IS_CSV = "a log is a CSV file with a header, one row a sample"
+IS_CSV = "a log is a CSV file with a header, one row a sample, or .mat, Parquet, a ROS bag or MCAP"
 
 
 def open_csv(path: Path, data: bytes) -> Table:

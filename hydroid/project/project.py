@@ -18,12 +18,14 @@ from hydroid.log import open_table
 from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, arm_text
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
-from hydroid.project.sizes import JointSize, joint_sizes
+from hydroid.project.sizes import LIFT, JointSize, joint_sizes
 from hydroid.reporting.arm_chart import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.linkage import RotaryActuator
 from hydroid.settings.load import validate
+from hydroid.words import listed
 
 ARM, MODEL, PICTURE = "arm.yaml", "arm.xml", "arm.png"
 FIT, STEPS = "fit.yaml", "next-steps.md"
@@ -31,8 +33,8 @@ FILES = (ARM, MODEL, PICTURE, FIT, STEPS, MESHES)
 PAGE = """\
 # {name}
 
-Look first: `arm.png` shows the arm, its axes and its cylinders. Compare the directions of positive angles
-with your log.
+Look first: `arm.png` shows the arm, its axes, and the cylinders that are known. Compare the directions of
+positive angles with your log.
 
 Then, from the folder in which you ran `hydroid init`:
 
@@ -103,13 +105,20 @@ def write_project(
         sizes = joint_sizes(arm, {j: m.speed for j, m in layout.motions.items()} if layout else {})
         if imported is not None:
             arm = _write_arm(stage, imported, title, arm, sizes)
-        caption = f"{arm.name}, near to 0: does it look and turn like your arm?"
+        caption = f"{arm.name} with its joints at 0: does it look and turn like your arm?"
         write_atomic(stage / PICTURE, arm_picture(arm, caption)[0])
         write_atomic(stage / FIT, fit_text(arm, layout, sizes, str(folder / FIT), reference))
         # what is written can be read
         validate(read_yaml(stage / FIT)[0] | {"arm": arm}, FitSettings, FIT)
         steps = next_steps(folder, logs)
+        notes: tuple[str, ...]
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
+        guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
+        if imported and guessed:
+            what = (
+                f"{listed(guessed)}: no cylinder is known, a stand-in lifts the arm {LIFT:g} times at 150 bar"
+            )
+            notes = (*notes, f"{what}. It serves to predict angles; pressures and forces mean nothing")
         page = PAGE.format(name=arm.name, commands="\n".join(steps))
         for heading, lines in (("What was assumed of the arm", notes), ("The log's columns", reasons)):
             page += f"\n## {heading}\n\n" + "".join(f"- {line}\n" for line in lines) if lines else ""

@@ -18,7 +18,8 @@ _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
 """of verdicts; all others are a ✗"""
 _NOTE = (
     "rms errors in deg over the logs that drive the joint. The last three columns are simple models, fitted "
-    "to the same logs: no motion; mean speeds by command; dead band, exponent, speed and lag."
+    "to the same logs, here on the {logs} ones: no motion; mean speeds by command; dead band, exponent, "
+    "speed and lag."
 )
 
 Verdicts = Mapping[str, Sequence[JointVerdict]]
@@ -37,7 +38,9 @@ def verdict_table(fits: Verdicts) -> Table:
             rows.append(row | {"fit": short_name(fit), "joint": one.name, "verdict": verdict})
     if len(fits) == 1:
         del columns["fit"]
-    return Table.of("Verdict", columns, rows, _NOTE, NAMES[:2])
+    unseen = any(one.unseen_deg is not None for verdicts in fits.values() for one in verdicts)
+    note = _NOTE.format(logs="unseen" if unseen else "fitted")
+    return Table.of("Verdict", columns, rows, note, NAMES[:2])
 
 
 def _shown(error: float | None, slides: bool) -> Cell:

@@ -114,7 +114,7 @@ def analyse(
     tables = {"parameters": parameter_table(problem.settings, summary, intervals)}
     every = tables | {name: t for s in unknown_sections(summary) for name, t in s.tables.items()}
     content: dict[str, Any] = {"at": model.source, "rank": identified.rank}
-    content |= summary.model_copy(update={"findings": findings}).model_dump(
+    content |= summary.changed({"findings": findings}).model_dump(
         mode="json", include={"findings", "estimate"}
     )
     for name, parameter in content["estimate"].items():

@@ -162,7 +162,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     verdict, summary = judge(settings, predictions, baselines), summarise(problem, fit)
     doubted = assumption_findings(settings, problem.logs, doubts(settings, problem.logs))
     changes = {"verdict": verdict, "findings": (*summary.findings, *doubted)}
-    summary = summary.model_copy(update=changes)
+    summary = summary.changed(changes)
     source = "the fit" if folder is None else str(folder / NAME)
     model = IdentifiedModel(settings, fit.best.theta, source, summary)
     lines: list[Table | str] = [*verdict_lines({fit.final: verdict}), *warnings(summary)]

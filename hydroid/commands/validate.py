@@ -75,6 +75,7 @@ def validate(
     from hydroid.run.identity import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
+    stated = {} if tolerance is None else {"tolerance_deg": tolerance}
     results, verdicts = dict[str, Any](), dict[str, Any]()
     for one, model, own in zip(given, models, read, strict=True):
         name = unique(model.name, results)
@@ -89,8 +90,7 @@ def validate(
             if out is not None and (run := keep_validation(model, predictions)):
                 draw(run)
         unseen = [prediction for prediction in predictions if prediction.unseen is not False]
-        stated = {} if tolerance is None else {"tolerance_deg": tolerance}
-        verdicts[name] = judge(model.settings.model_copy(update=stated), fitted, baselines, unseen)
+        verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, unseen)
         results[name] = [replace(prediction, fit=name) for prediction in predictions]
     fits, arm = ordered(verdicts), models[0].settings.arm
     every = [prediction for name in fits for prediction in results[name]]

@@ -50,7 +50,7 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
         "quantities": fit.quantities.scalars,
         "curves": fit.quantities.curves,
     }
-    return known.model_copy(update=own)
+    return known.changed(own)
 
 
 def account(problem: Problem, known: Uncertainty, directions: Identifiability | None = None) -> FitSummary:

@@ -197,7 +197,7 @@ class Plant:
         folder, settings = Path(folder), self.identified.settings
         write_settings(folder, settings)
         summary = self.identified.summarise()
-        write_estimate(folder, summary.model_copy(update={"joints": self.joints}))
+        write_estimate(folder, summary.changed({"joints": self.joints}))
         self.export(folder / "model")
 
     def export(self, folder: Path) -> None:

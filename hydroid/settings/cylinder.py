@@ -72,7 +72,7 @@ def make_cylinder(
         sides = _along(settings.pivots, data, joint)
     elif sides is None:
         sides, pivots = _pinned(settings.pivots, data, joint)
-    sides = sides.model_copy(update={"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
+    sides = sides.changed({"a": max(sides.a, sides.b), "b": min(sides.a, sides.b)})
     cylinder = LinearActuator(settings, sides, 0.0, pivots)
     angles = np.linspace(*limits, 181)
     with np.errstate(all="ignore"):

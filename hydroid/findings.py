@@ -207,7 +207,7 @@ WORDS: dict[str, tuple[str, str]] = {
         "such a log alone says little: fit it together with others",
     ),
     "turned": (
-        "angle of joint {0} moves against the command (for {against:.0%} of {path} of travel)",
+        "joint {0} moves against its command (in {against:.0%} of the {path} that it moves)",
         "if the command is logged with the opposite sign, set log.joints.{0}.command.scale: -1",
     ),
     "no motion": (

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 import hydroid
-from hydroid.commands.console import log_lines, show, show_error
+from hydroid.commands.console import log_lines, program, show, show_error
 from hydroid.commands.progress import VISIBLE, listen, stopped
 from hydroid.errors import HydroidError
 
@@ -113,7 +113,6 @@ app = typer.Typer(
     help="Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles.",
     epilog="Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
     "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows.",
-    no_args_is_help=True,
     **PLAIN,
 )
 
@@ -139,7 +138,7 @@ def main() -> None:
     code, kept = 0, None
     group: Any = typer.main.get_command(app)
     try:
-        with group.make_context("hydroid", sys.argv[1:]) as context:
+        with group.make_context(program(), sys.argv[1:] or ["--help"]) as context:
             group.invoke(context)
     except typer.Exit as end:
         code = end.exit_code

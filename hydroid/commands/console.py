@@ -2,16 +2,20 @@
 
 import json
 import logging
+import os
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
+from shutil import which
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import typer
 
+from hydroid.errors import HydroidError
 from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
@@ -105,26 +109,34 @@ def show(result: Printed, *, as_json: bool, verbose: bool = False) -> None:
         return
     for line in [*(result.details if verbose else ()), *result.lines]:
         if isinstance(line, str):
-            typer.echo(line)
+            command = line.lstrip().startswith("hydroid ")
+            typer.echo(line.replace("hydroid", program(), 1) if command else line)
         else:
             line.show()
+
+
+def program() -> str:
+    """Return hydroid as the user typed it, where a shell does not find it by its name."""
+    typed = sys.argv[0]
+    found = Path(typed).stem != "hydroid" or which("hydroid") == os.path.abspath(typed)
+    return "hydroid" if found else shlex.quote(typed)
 
 
 def show_error(error: Any) -> None:
     """Print what the user can correct, in one line or as JSON, by the option that set what is wrong.
 
-    The error is a `HydroidError`, or a wrong command line, which typer shows.
+    The error is a `HydroidError`, or typer's of a wrong command line.
     """
-    usage = hasattr(error, "format_message")
-    what, where, hint = (error.format_message(), "", "") if usage else (error.what, error.where, error.hint)
+    if usage := hasattr(error, "format_message"):
+        text = error.format_message().rstrip(".")
+        error = HydroidError(text[:1].lower() + text[1:], hint=f"see {error.ctx.command_path} --help")
+    what, where, hint = error.what, error.where, error.hint
     key = where.removeprefix("--set ")
     if key in OPTIONS and any(word.partition("=")[0] == OPTIONS[key] for word in sys.argv[1:]):
         where, what = OPTIONS[key], what.removeprefix(f"{key}: ")
     if "--json" in sys.argv[1:]:
         kind = "usage" if usage else type(error).__name__.removesuffix("Error").lower()
         _print_json({"error": {"kind": kind, "what": what, "where": where, "hint": hint}})
-    elif usage:
-        error.show()
     else:
         text = str(type(error)(what, where=where, hint=hint))
         typer.echo(f"hydroid: {' '.join(text.split())}", err=True)

@@ -152,9 +152,14 @@ def with_mechanics(
         changes: settings to replace; they have the last word.
 
     Raises:
-        RunError, SettingsError: no values there, or one that stage 2 needs is missing.
+        RunError, SettingsError: no values of stage 1 there, or one that stage 2 needs is missing.
     """
     values, summary = ({}, None) if mech is None else open_values(mech)
+    if summary is not None and summary.stage != "mech":
+        hint = "name a run of fit-mech, or begin at this fit with --start"
+        raise SettingsError(
+            "is a fit of stage 2, but --mech takes one of stage 1", where=str(mech), hint=hint
+        )
     settings = load_stage("hyd", config, changes)
     held, missing = dict[str, Any](), list[str]()
     for name, p in settings.parameters.items():

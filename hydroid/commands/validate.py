@@ -18,6 +18,7 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_logs
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
+from hydroid.words import listed
 
 if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
@@ -106,6 +107,8 @@ def validate(
     few = fits if sum(map(len, fits.values())) <= MOST_ROWS else {best: fits[best]}
     details = [page.tables["verdict"], page.tables["errors"]]
     lines = [*verdict_lines(few), *(line for step in steps for line in next_lines(step))]
+    if seen := [one.log.source for one in results[best] if one.unseen is False]:
+        lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
     return Result([*lines, *written(page, out)], content, every, page, details=details)
 
 

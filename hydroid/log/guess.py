@@ -70,7 +70,7 @@ def guess_columns(
     columns = [*_columns(table)]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)
     if time is None:
-        hint = f"the columns are: {', '.join(name for name in table.names if name)[:500]}"
+        hint = f"it has {listed([*filter(None, table.names)], 6)}"
         raise LogError("has no column that looks like a time", where=table.source, hint=hint)
     step = float(np.nanmedian(np.diff(time.values)))
     unit = time.unit or likely_time_unit(step) or "s"

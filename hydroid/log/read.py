@@ -154,13 +154,13 @@ def _match(
         if count > 1:
             what, hint = f"has {count} columns of this name", "rename all but one"
         elif count == 0:
-            lacking = [one for one in wanted if one in missing]
+            lacking = sorted((one for one in wanted if one in missing), key=lambda one: one.name not in close)
             guess = {name: f", did you mean {other!r}?" for name, other in close.items()}
-            what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking])
+            what = listed([f"{one.name!r} ({one}{guess.get(one.name, '')})" for one in lacking], 2)
             what, places = f"the file lacks {what}", dict.fromkeys(f"log.{one.kind}" for one in lacking)
             hint = (
-                f"it has {listed([*filter(None, table.names)], 6)}: name its columns in {listed([*places])} "
-                "(`hydroid convert` guesses them); a joint that it lacks is null there"
+                f"it has {listed([*filter(None, table.names)], 4)}: name its columns in {listed([*places])} "
+                "(`hydroid convert` guesses them), null for a joint that it lacks"
             )
         line = f", line {table.header}" if table.header else ""
         raise LogError(what, where=f"{table.source}{line}, column {signal.name}", hint=hint)

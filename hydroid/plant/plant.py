@@ -87,6 +87,10 @@ class Plant:
         compile_rollout()
         self.reset()
 
+    def __repr__(self) -> str:
+        names = ", ".join(self.names[joint - 1] for joint in self.joints)
+        return f"<Plant: {names}; steps of {self.period:g} s; {self.identified.source}>"
+
     @property
     def time(self) -> float:
         """Since the reset [s]."""
@@ -160,8 +164,8 @@ class Plant:
         """Hold a command for one period.
 
         Args:
-            command: [%], shape (J,), or by the joints' names, others 0; cut to [-100, 100]. It must be 0 of
-                joints that take none.
+            command: [%], shape (J,), or by the joints' names, others 0. An amplifier saturates: it is cut
+                to [-100, 100]. It must be 0 of joints that take none.
 
         Returns:
             The joint angles [rad], shape (J,).

@@ -15,8 +15,8 @@ from hydroid.settings.load import validate
 from hydroid.settings.log import LogSettings
 
 REVERSED = (
-    "a command is reversed as if its valve were wired the other way round; where it is the angle that counts "
-    "the other way (compare arm.png), set the angle's scale to -1 instead, because gravity follows the angle"
+    "a reversed command suits a valve that is wired the other way. If a sensor counts the other way instead "
+    "(compare arm.png), set scale: -1 at its angle and not at its command: gravity follows the angle"
 )
 
 
@@ -73,9 +73,10 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
         raise LogError("has no column that looks like an angle", where=table.source, hint=hint)
     free = np.tile([-np.inf, np.inf], (len(names), 1))
     settings = validate(section, LogSettings, table.source)
-    log, findings = check_log(Path(table.source), settings, free, repair=True)
+    log, findings = check_log(Path(table.source), settings, free)
     if log is None:
         reasons.append(f"the log cannot be used as it is: {findings[0]}")
+        log, _ = check_log(Path(table.source), settings, free, repair=True)
     motions = {joint: motion_of(log, joint) for joint in measured} if log else {}
     wrong = [j for j, m in motions.items() if (m.straight if j in arm.backward else m.turned)]
     for joint, motion in motions.items():
@@ -100,8 +101,9 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
             "-1, or change the range in arm.xml"
         )
     if wrong:
-        share = f"for {max(against, 1 - against):.0%} of {np.radians(path) * factor:.3g} {unit} of travel"
-        yield f"{joint.name} moves against its command ({share}): the sign of the command is reversed"
+        way = np.radians(path) * factor * np.array([max(against, 1 - against), 1.0])
+        share = f"{way[0]:.3g} of {way[1]:.3g} {unit}"
+        yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
     if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
         yield f"{joint.name} does not move below about {motion.dead_band:g} % of command: a dead band"
 

@@ -78,8 +78,10 @@ def ordered(fits: Verdicts) -> Verdicts:
 
 
 def _error(one: JointVerdict) -> float:
-    error = one.fitted_deg if one.unseen_deg is None else one.unseen_deg
-    return np.inf if error is None else error
+    """Return the error on the unseen logs, or of a joint that they do not test on the fitted ones [deg]."""
+    untested = one.unseen_deg is None and one.verdict in ("not tested", "does not fit")
+    error = one.fitted_deg if untested else one.unseen_deg
+    return np.inf if error is None else error  # it diverged
 
 
 def _size(one: JointVerdict) -> float:
@@ -112,6 +114,8 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     if len(verdicts) < 2:
         return ""
     one = max(verdicts, key=_size)
+    if not np.isfinite(_error(one)):
+        return f"Worst joint: {one.name}, whose simulation diverges."
     unit = "" if one.slides else " deg"
     error, tolerance = (f"{shown(_shown(e, one.slides))}{unit}" for e in (_error(one), one.tolerance_deg))
     return f"Worst joint: {one.name}, with an error of {error}; its tolerance is {tolerance}."

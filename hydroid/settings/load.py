@@ -17,6 +17,7 @@ from pydantic import (
 
 from hydroid.errors import SettingsError
 from hydroid.settings.document import Lines, read_document, read_yaml
+from hydroid.words import listed
 
 _PLAIN = {
     "dict": "must be a mapping of settings",
@@ -100,7 +101,7 @@ def validate(
     overridden: list[str] | None = None,
     folder: Path | None = None,
 ) -> S:
-    """Check a mapping against `kind` and report the first fault with its place.
+    """Check a mapping against `kind` and report its faults with their places, of many the first four.
 
     Files that the settings name are first looked up in `folder`.
     """
@@ -108,17 +109,21 @@ def validate(
         return kind.model_validate(values, context={"folder": folder, "source": source})
     except ValidationError as error:
         # a setting that does not exist may be why another is missing
-        first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-        hint = f"and {len(others)} more fault{'s' if len(others) > 1 else ''} in this file" if others else ""
-    key, problem = _explained(first, kind)
-    # the fault may lie in an override, below it, or in what it is a part of
-    at = next((o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}.")), None)
-    if at is not None:
-        name, where = key[len(at) + 1 :], f"--set {at}"
-    else:
-        named = first["type"] in ("extra_forbidden", "missing")  # the problem names the setting
-        name, where = "" if named else _shown(key)[1:-1], source + _line(key, lines or {})
-    raise SettingsError(f"{name}: {problem}" if name else problem, where=where, hint=hint)
+        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    found = dict[str, str]()  # a value that is none of several types is one fault
+    for fault in faults:
+        key, problem = _explained(fault, kind)
+        # the fault may lie in an override, below it, or in what it is a part of
+        near = (o for o in overridden or () if f"{key}.".startswith(f"{o}.") or o.startswith(f"{key}."))
+        if at := next(near, None):
+            name, where = key[len(at) + 1 :], f"--set {at}"
+        else:
+            named = fault["type"] in ("extra_forbidden", "missing")  # the problem names the setting
+            name, where = "" if named else _shown(key)[1:-1], source + _line(key, lines or {})
+        found.setdefault(where, f"{name}: {problem}" if name else problem)
+    (where, what), *others = found.items()
+    also = listed([f"{place.removeprefix(f'{source}, ')}: {other}" for place, other in others], 3)
+    raise SettingsError(what, where=where, hint=also and f"also {also}")
 
 
 def parse_override(text: str) -> tuple[str, Any]:

@@ -78,7 +78,9 @@ def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(shor
     predicted = fitted.predict(short)
     assert np.array_equal(predicted.response, fitted.predictions[0].response)
     assert predicted.ahead.shape[1:] == (5, 1)
-    (seen,) = fitted.validate(short).content["verdict"]
+    validated = fitted.validate(short)
+    assert validated.lines[1] == f"The fit was made with {short}: that tests nothing."
+    (seen,) = validated.content["verdict"]
     assert (seen["unseen_deg"], seen["fitted_deg"]) == (None, pytest.approx(fitted.summary.rms_deg))
     other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
     (unseen,) = fitted.validate(other).content["verdict"]

@@ -75,5 +75,5 @@ def test_numbers_from_zero_other_words_for_joints_and_derived_signals(tmp_path: 
 
 
 def test_no_time_is_an_error_that_lists_the_columns(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="the columns are: a, b"):
+    with pytest.raises(LogError, match="it has a and b"):
         guess(tmp_path, ["a", "b"], STEPS, SWEEP)

@@ -133,7 +133,9 @@ WRONG = (
     Wrong("time in ms, read as s", "error: set log.time.unit: ms", lambda: of("time", lambda t: 1000 * t)),
     Wrong("a clock in days, read as s", "error: unit: day", lambda: of("time", lambda t: t / 86400)),
     Wrong("an angle that counts the other way", "error: angle.scale: -1", lambda: of("q3", np.negative)),
-    Wrong("a command wired the other way", "warning: against the command", lambda: of("u2", np.negative)),
+    Wrong(
+        "a command wired the other way", "warning: moves against its command", lambda: of("u2", np.negative)
+    ),
     Wrong("clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)),
     Wrong("commands that are all 0", "warning: no joint is driven", lambda: of("u", np.zeros_like)),
     Wrong("a clock that jitters", "note: is resampled", lambda: of("time", lambda t: t + JITTER)),

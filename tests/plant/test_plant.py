@@ -94,6 +94,8 @@ def test_a_slower_control_period_holds_the_command(stage):
     fitted = model(stage)
     by_name, by_number = Plant(fitted, joints=["shoulder"]), Plant(fitted, joints=[2])
     np.testing.assert_array_equal(by_name.step({"shoulder": 50}), by_number.step([0, 50, 0, 0, 0, 0, 0]))
+    np.testing.assert_array_equal(by_name.step({"shoulder": 500}), by_number.step([0, 100, 0, 0, 0, 0, 0]))
+    assert repr(by_name) == "<Plant: shoulder; steps of 0.01 s; test>"
     fast, slow = Plant(fitted), Plant(fitted, period=0.05)
     command = np.zeros(7)
     for k in range(40):

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -193,11 +194,21 @@ def project(place: Path, folder: Path, text: str) -> tuple[Project, FitSettings]
     return made, hydroid.load_settings(folder / "mine" / "fit.yaml")
 
 
+ROWS = count(-99)
+"""0 at the hundredth"""
+
+
 @pytest.mark.parametrize(
     ("column", "change", "note", "scale"),
     [
-        (2, lambda u: -u, r"boom_joint moves against its command .*of the command is reversed", -10),
+        (
+            2,
+            lambda u: -u,
+            r"boom_joint moves against its command \(\S+ of \S+ deg\): the command's sign",
+            -10,
+        ),
         (5, lambda q: q + 2, r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset", 10),
+        (5, lambda q: q if next(ROWS) else np.nan, r".*line 101, column enc.*is not a number", 10),
     ],
 )
 def test_what_the_numbers_of_a_log_tell_is_said(

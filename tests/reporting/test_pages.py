@@ -156,6 +156,9 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     )
     assert worst([swing, boom]) == "Worst joint: boom, with an error of 2 deg; its tolerance is 1 deg."
     assert not worst([boom])
+    diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
+    assert worst([swing, diverged]) == "Worst joint: boom, whose simulation diverges."
+    assert worst([swing, diverged.changed({"verdict": "not tested"})]).startswith("Worst joint: swing")
 
 
 def test_a_fit_that_fails_says_so_in_every_place():

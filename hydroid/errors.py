@@ -19,9 +19,9 @@ class HydroidError(Exception):
         hint: what is allowed, or what to do.
     """
 
-    def __init__(self, what: str, *, where: str = "", hint: str = "") -> None:
-        self.what, self.where, self.hint = what, where, hint
-        text = f"{where}: {what}" if where else what
+    def __init__(self, what: str, *, where: object = "", hint: str = "") -> None:
+        self.what, self.where, self.hint = what, str(where), hint
+        text = f"{where}: {what}" if self.where else what
         super().__init__(_one_line(f"{text}; {hint}" if hint else text))
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -127,11 +127,9 @@ class JointVerdict(Settings):
     """on logs that it was not fitted to; null: there are none"""
     tolerance_deg: float
     """error up to which it predicts"""
-    baselines_deg: dict[str, float] = Field(default_factory=dict[str, float])
+    baselines_deg: dict[str, float] = {}
     """of the baselines on the unseen logs, or on the fitted logs where there are no others"""
-    horizons_deg: dict[str, tuple[float | None, ...]] = Field(
-        default_factory=dict[str, tuple[float | None, ...]]
-    )
+    horizons_deg: dict[str, tuple[float | None, ...]] = {}
     """rms error of the angle's change over 0.5, 1, 2, 5 and 10 s from starts all along the unseen logs, of
     the fit and of the baselines; empty where there are none"""
 
@@ -171,17 +169,17 @@ class FitSummary(Settings):
     """what to know before using the estimate, the most important first (`hydroid.findings`)"""
     verdict: tuple[JointVerdict, ...] = ()
     """of each compared joint on the fitted logs; the page of a run adds the unseen logs"""
-    estimates: dict[str, NamedEstimate] = Field(default_factory=dict[str, NamedEstimate])
+    estimates: dict[str, NamedEstimate] = {}
     """by name; the first is the search's own"""
-    quantities: dict[str, QuantityEstimate] = Field(default_factory=dict[str, QuantityEstimate])
+    quantities: dict[str, QuantityEstimate] = {}
     """what follows from the final estimate, by name"""
-    curves: dict[str, CurveEstimate] = Field(default_factory=dict[str, CurveEstimate])
+    curves: dict[str, CurveEstimate] = {}
     """the same against a command or an angle"""
     covariance: Covariance | None = None
     """of the final estimate"""
-    noise_deg: dict[str, float] = Field(default_factory=dict[str, float])
+    noise_deg: dict[str, float] = {}
     """standard deviation of the noise of each compared angle, `q2` of joint 2, from the residuals [deg]"""
-    left_out_deg: dict[str, tuple[float, ...]] = Field(default_factory=dict[str, tuple[float, ...]])
+    left_out_deg: dict[str, tuple[float, ...]] = {}
     """rms error of each compared angle on each fitted log if it is left out [deg]; none of one log"""
 
     @property
@@ -224,7 +222,7 @@ def read_estimate(source: Path) -> tuple[Path, dict[str, Any], FitSummary | None
     if source.is_dir() and not is_file(file):
         begun = is_file(source / "run.json")
         hint = "resume the fit" if begun else "name a run folder, a folder of Plant.save or a YAML file"
-        raise RunError("holds no estimate" + (" yet" if begun else ""), where=str(source), hint=hint)
+        raise RunError("holds no estimate" + (" yet" if begun else ""), where=source, hint=hint)
     content, _ = read_yaml(file)
     if "estimate" in content:
         summary = load(file, FitSummary)
@@ -232,7 +230,7 @@ def read_estimate(source: Path) -> tuple[Path, dict[str, Any], FitSummary | None
     values = content.get("parameters", content)
     if not isinstance(values, dict) or any(isinstance(value, dict) for value in values.values()):
         hint = "give the run folder, its estimate.yaml, or a YAML file of `K: 0.2` lines"
-        raise SettingsError("is no estimate", where=str(file), hint=hint)
+        raise SettingsError("is no estimate", where=file, hint=hint)
     return file, values, None
 
 

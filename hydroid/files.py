@@ -90,7 +90,7 @@ def _write(path: Path, data: bytes, keep: Path | None) -> None:
             os.replace(path, keep)
         os.replace(temporary, path)
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=str(path)) from None
+        raise RunError(f"cannot be written ({error.strerror})", where=path) from None
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
@@ -140,8 +140,6 @@ def find_config(
             if is_file(candidate):
                 return candidate
     if len(Path(name).parts) > 1:
-        raise SettingsError("no such file or folder", where=str(name))
+        raise SettingsError("no such file or folder", where=name)
     known = sorted(p.stem for p in shipped.glob("*.yaml") if (p.stem == "hydrolek") == (kind == "arm"))
-    raise SettingsError(
-        f"no such {kind}", where=str(name), hint=f"give a YAML file or one of: {', '.join(known)}"
-    )
+    raise SettingsError(f"no such {kind}", where=name, hint=f"give a YAML file or one of: {', '.join(known)}")

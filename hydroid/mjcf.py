@@ -55,7 +55,7 @@ def copy_models(models: Mapping[str, Path], folder: Path) -> None:
             try:
                 content = source.read_bytes()
             except OSError as error:
-                raise RunError(f"mesh cannot be read ({error.strerror})", where=str(source)) from None
+                raise RunError(f"mesh cannot be read ({error.strerror})", where=source) from None
             # meshes of different folders may have one name
             taken = kept.get(source.name, content) != content
             mesh.file = f"{len(kept)}_{source.name}" if taken else source.name

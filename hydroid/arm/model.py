@@ -100,6 +100,6 @@ def load_machine(arm: Arm, *, pair: bool) -> Machine:
     wanted = [f"{side}_{name}" for side in SIDES for name in arm.joint_names]
     if [joint.name for joint in spec.joints] != wanted:
         hint = f"the joints of two arms are {', '.join(wanted)}"
-        raise ModelError("is not the model of two of the arm", where=str(arm.pair), hint=hint)
+        raise ModelError("is not the model of two of the arm", where=arm.pair, hint=hint)
     with mujoco_errors(str(arm.pair)):
         return Machine(arm, spec.compile(), SIDES)

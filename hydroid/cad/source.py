@@ -88,7 +88,7 @@ def _parsed(path: Path) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, OSError, ValueError) as error:
-        raise ModelError(f"cannot be read as XML ({error})", where=str(path)) from None
+        raise ModelError(f"cannot be read as XML ({error})", where=path) from None
 
 
 def _prepare_urdf(root: ElementTree.Element, notes: Notes) -> dict[str, str]:

@@ -136,7 +136,7 @@ def fit(
 
     folder = None if out is None else RunFolder(Path(out))
     if folder is not None and folder.exists and not resume:
-        raise RunError("holds a run already", where=str(out), hint="resume it, or choose another folder")
+        raise RunError("holds a run already", where=out, hint="resume it, or choose another folder")
     problem = Problem(settings, read, workers)
     if folder is None:
         return _result(problem, run_fit(problem, progress), None)

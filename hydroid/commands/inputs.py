@@ -154,7 +154,7 @@ def open_values(fit: ModelSource) -> tuple[dict[str, Any], FitSummary | None]:
 def refuse_overwriting(source: Any, out: Source | None) -> None:
     """Refuse to write a log over the one that is read."""
     if out is not None and isinstance(source, str | Path) and Path(out).resolve() == Path(source).resolve():
-        raise SettingsError("would overwrite the log", where=str(out), hint="name another file")
+        raise SettingsError("would overwrite the log", where=out, hint="name another file")
 
 
 def as_list(sources: Any) -> list[Any]:

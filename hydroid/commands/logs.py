@@ -156,7 +156,7 @@ def run_logs(folder: Path) -> list[Path]:
     logs = [Path(name) for name in RunFolder(folder).identity().get("logs", {})]
     missing = [str(log) for log in logs if not log.is_file()]
     if missing or not logs:
-        raise RunError(f"its log {', '.join(missing)} is not there", where=str(folder), hint="name the log")
+        raise RunError(f"its log {', '.join(missing)} is not there", where=folder, hint="name the log")
     return logs
 
 

@@ -127,13 +127,13 @@ def load_stage(
     if settings.stage != stage:
         what = f"has stage: {settings.stage}, but hydroid fit-{stage} needs stage: {stage}"
         hint = f"use hydroid fit-{settings.stage}, or another --config"
-        raise SettingsError(what, where=str(config), hint=hint)
+        raise SettingsError(what, where=config, hint=hint)
     if start is None:
         return settings
     values, _ = open_values(start)
     free = [name for name, p in settings.parameters.items() if p.fixed is None and name in values]
     if not free:
-        raise SettingsError("has a value of none of the free parameters", where=str(start))
+        raise SettingsError("has a value of none of the free parameters", where=start)
     starts = {f"parameters.{name}.start": values[name] for name in free}
     return load_settings(config, {**changes, **starts, **changes})
 
@@ -187,7 +187,7 @@ def with_mechanics(
     if missing:
         hint = "give the run of stage 1 with --mech RUN, or set fixed, nominal or start for each"
         what = f"stage 2 needs the values of {', '.join(missing)} from stage 1"
-        raise SettingsError(what, where=str(mech or ""), hint=hint)
+        raise SettingsError(what, where=mech or "", hint=hint)
     return {**changes, **held}
 
 

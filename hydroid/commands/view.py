@@ -134,7 +134,7 @@ def view(
     if isinstance(source, str | Path) and is_file(Path(source) / "run.json"):
         if fit is not None:
             hint = f"name a log, or leave out --fit {fit}"
-            raise SettingsError("is a run itself", where=str(source), hint=hint)
+            raise SettingsError("is a run itself", where=source, hint=hint)
         fit, log = source, run_logs(Path(source))[0]
     wanting = {"--collisions": collisions, "--arm": arm, "--out": out}
     if log is None and (where := next((name for name, given in wanting.items() if given), None)):

@@ -34,7 +34,7 @@ def open_mat(path: Path, *, hdf5: bool) -> Table:
             "save commands, angles and time as arrays or structs; of a timeseries ts in MATLAB: "
             "time = ts.Time; data = ts.Data; save('arrays.mat', 'time', 'data')"
         )
-        raise LogError("holds no array of numbers", where=str(path), hint=hint)
+        raise LogError("holds no array of numbers", where=path, hint=hint)
     return Table(source=str(path), names=tuple(columns), columns=columns)
 
 

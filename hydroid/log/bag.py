@@ -70,7 +70,7 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
                 for name, number in _numbers(message, f"{connection.topic}."):
                     channels.setdefault(name, {}).setdefault(at or recorded, number)
     if not channels:
-        raise LogError("holds no channel of numbers", where=str(path))
+        raise LogError("holds no channel of numbers", where=path)
     return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
 
 

@@ -34,7 +34,7 @@ def open_csv(path: Path, data: bytes) -> Table:
     lines = _decode(path, data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     content = [k for k, line in enumerate(lines) if _is_content(line)]
     if not content:
-        raise LogError("is empty", where=str(path), hint=IS_CSV)
+        raise LogError("is empty", where=path, hint=IS_CSV)
     separator = _separator([lines[k] for k in content[:400]])
     rows = {k: split(lines[k], separator) for k in content[:400]}
     header, left_out = _header(rows)
@@ -44,7 +44,7 @@ def open_csv(path: Path, data: bytes) -> Table:
         where = f"{path}, line {header + 1}"
         raise LogError("has no header: this line holds numbers", where=where, hint=hint)
     if width == 1:
-        raise LogError("has one column only", where=str(path), hint="part cells by , ; | tabs or spaces")
+        raise LogError("has one column only", where=path, hint="part cells by , ; | tabs or spaces")
     units = dict[str, str]()
     remarks = [f"line {k + 1} is text and left out" for k in left_out]
     if content[0] < header:
@@ -80,7 +80,7 @@ def _decode(path: Path, data: bytes) -> str:
             if "\0" not in text:
                 return text
     hint = "save the sheet as CSV" if path.suffix.startswith(".xls") else IS_CSV
-    raise LogError("is not a text file", where=str(path), hint=hint)
+    raise LogError("is not a text file", where=path, hint=hint)
 
 
 def split(line: str, separator: str) -> list[str]:

@@ -40,7 +40,7 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
         data = b"#ROSBAG V" if folder else path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise LogError(f"cannot be read ({reason})", where=str(path)) from None
+        raise LogError(f"cannot be read ({reason})", where=path) from None
     if data.startswith((b"#ROSBAG V", b"\x89MCAP0", b"SQLite format 3")):
         return open_bag(path, settings.time.column, settings.period_s)
     if data.startswith(b"PAR1"):

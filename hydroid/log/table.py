@@ -181,10 +181,10 @@ def format_library(package: str, extra: str, path: Path, kind: str) -> Generator
         library = import_module(package)
     except ImportError:
         what = f"needs the package {package.partition('.')[0]}, which is not installed"
-        raise LogError(what, where=str(path), hint=f"pip install 'hydroid[{extra}]'") from None
+        raise LogError(what, where=path, hint=f"pip install 'hydroid[{extra}]'") from None
     try:
         yield library
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         what = f"cannot be read as {kind} ({reason})"
-        raise LogError(what, where=str(path), hint="save it again") from None
+        raise LogError(what, where=path, hint="save it again") from None

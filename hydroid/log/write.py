@@ -61,10 +61,10 @@ def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
     for joint, (driven, measured) in enumerate(zip(log.driven, log.measured, strict=True), 1):
         if driven and ("command", joint) not in mapped:
             what = f"joint {joint} is driven but no column holds its command"
-            raise LogError(what, where=str(path), hint=f"map a column in log.joints.{joint}.command")
+            raise LogError(what, where=path, hint=f"map a column in log.joints.{joint}.command")
         if not measured and ("angle", joint) in mapped:
             hint = f"set log.joints.{joint}.angle: null"
-            raise LogError(f"joint {joint} has no angle to write", where=str(path), hint=hint)
+            raise LogError(f"joint {joint} has no angle to write", where=path, hint=hint)
 
 
 def _cells(signal: Signal, values: Floats, exact: bool) -> list[str]:

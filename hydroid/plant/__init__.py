@@ -53,5 +53,5 @@ def load_plant(
     else:
         identified = load_identified(None, source, overrides, nominal=True)
         if identified.settings.stage == "mech":
-            raise SettingsError("stage mech has no nominal gain", where=str(source), hint="name a run folder")
+            raise SettingsError("stage mech has no nominal gain", where=source, hint="name a run folder")
     return Plant(identified, joints=joints, period=period, payload=payload)

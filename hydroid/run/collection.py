@@ -29,7 +29,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
         RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
-        raise RunError("is a run itself", where=str(out), hint="name another folder")
+        raise RunError("is a run itself", where=out, hint="name another folder")
     runs: list[Record] = []
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
     for path in sorted({path for group in groups for path in group}):

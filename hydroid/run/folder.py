@@ -48,7 +48,7 @@ class RunFolder:
         other = self.path.exists() and not (self.exists or (self.path / LOCK).exists())
         if other and (not self.path.is_dir() or any(self.path.iterdir())):
             hint = "choose another folder with --out"
-            raise RunError("exists and holds no run", where=str(self.path), hint=hint)
+            raise RunError("exists and holds no run", where=self.path, hint=hint)
         with locked(self.path), run_log(self.path / "run.log"):
             remove_parts(self.path)
             try:
@@ -76,7 +76,7 @@ class RunFolder:
         self.refuse_changes()
         if other := difference(self.identity(), own):
             hint = "continue it with the command that began it, or choose another folder"
-            raise RunError(f"the run here {other}", where=str(self.path), hint=hint)
+            raise RunError(f"the run here {other}", where=self.path, hint=hint)
         checkpoints = self.checkpoints()
         self.status("running")
         _log.info("resumed from %s", ", ".join(checkpoints) or "no checkpoint")
@@ -92,7 +92,7 @@ class RunFolder:
         for name, known in self.identity().get("files", {}).items():
             if hashes.get(name) != known:
                 hint = "put it back as it was, or choose another folder"
-                raise RunError("has changed since the run began", where=str(self.path / name), hint=hint)
+                raise RunError("has changed since the run began", where=self.path / name, hint=hint)
 
     def identity(self) -> dict[str, Any]:
         """Read the run's description.
@@ -105,9 +105,9 @@ class RunFolder:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
             what = f"cannot be read as a run ({getattr(error, 'strerror', None) or 'it is damaged'})"
-            raise RunError(what, where=str(file), hint="name a folder that a fit has made") from None
+            raise RunError(what, where=file, hint="name a folder that a fit has made") from None
         if not (isinstance(content, dict) and isinstance(content.get("logs", {}), dict)):
-            raise RunError("is not a run's description", where=str(file))
+            raise RunError("is not a run's description", where=file)
         return content
 
     def settings(self) -> FitSettings:

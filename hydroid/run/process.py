@@ -48,7 +48,7 @@ def locked(folder: Path) -> Generator[None]:
         file = (folder / LOCK).open("a+b", buffering=0)  # for writing: NFS grants no exclusive lock otherwise
         _take(file, folder)
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=str(folder)) from None
+        raise RunError(f"cannot be written ({error.strerror})", where=folder) from None
     with file:  # to close it ends the lock
         yield
 
@@ -63,7 +63,7 @@ def _take(file: IO[bytes], folder: Path) -> None:
             file.seek(0)
             holder = file.read(200).decode(errors="replace").strip() or "another process"
             hint = "wait for it to end, or choose another --out"
-            raise RunError(f"is in use by {holder}", where=str(folder), hint=hint) from None
+            raise RunError(f"is in use by {holder}", where=folder, hint=hint) from None
         _log.warning("%s: no lock on this file system (%s); let no two runs use it", folder, error.strerror)
         return
     file.truncate(0)
@@ -80,7 +80,7 @@ def run_log(file: Path) -> Generator[None]:
     try:
         handler = _File(file, encoding="utf-8")
     except OSError as error:
-        raise RunError(f"cannot be written ({error.strerror})", where=str(file)) from None
+        raise RunError(f"cannot be written ({error.strerror})", where=file) from None
     form = "%(asctime)s %(levelname)-7s %(message)s"
     handler.setFormatter(logging.Formatter(form, datefmt="%Y-%m-%dT%H:%M:%S%z"))
     with logging_to(handler):

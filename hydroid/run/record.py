@@ -184,10 +184,10 @@ def _read(file: Path, kind: type[T]) -> T:
     try:
         return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:
-        raise RunError("holds no result", where=str(file.parent), hint="finish the fit: --resume") from None
+        raise RunError("holds no result", where=file.parent, hint="finish the fit: --resume") from None
     except (OSError, ValueError, KeyError, EOFError, ValidationError) as error:
         what = f"cannot be read ({type(error).__name__})"
-        raise RunError(what, where=str(file), hint="fit again with this version") from None
+        raise RunError(what, where=file, hint="fit again with this version") from None
 
 
 @cache

@@ -74,9 +74,7 @@ class Arm(Settings):
 
     model: Beside
     """the arm's MJCF, relative to this file; its keyframes are the named poses"""
-    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = Field(
-        default_factory=dict[str, Cylinder | RotaryActuator]
-    )
+    actuators: dict[str, Annotated[Cylinder | RotaryActuator, Field(discriminator="kind")]] = {}
     """what moves the joints, by name; a joint that stage 2 does not drive needs none"""
     payload: str | None = None
     """site of the model where the gripper holds a payload's centre of mass; null: logs have no payloads"""
@@ -224,7 +222,7 @@ def _at_zero(path: Path) -> "mujoco.MjData":
     """The compiled MJCF with all joints at 0."""
     if not path.is_file():
         hint = "give the arm's MJCF; `hydroid init` writes one"
-        raise ModelError("no such model", where=str(path), hint=hint)
+        raise ModelError("no such model", where=path, hint=hint)
     state = path.stat()
     return _compiled(path, state.st_mtime_ns, state.st_size)
 

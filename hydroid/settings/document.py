@@ -40,12 +40,12 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SettingsError(f"cannot be read ({reason})", where=str(path)) from None
+        raise SettingsError(f"cannot be read ({reason})", where=path) from None
     if len(data) > most:
-        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", where=str(path))
+        raise SettingsError(f"is larger than {most >> 10} KiB, too large for settings", where=path)
     values, lines = read_document(text, str(path))
     if not isinstance(values, dict):
-        raise SettingsError("must be a mapping of settings", where=str(path), hint="write `key: value` lines")
+        raise SettingsError("must be a mapping of settings", where=path, hint="write `key: value` lines")
     return values, lines
 
 

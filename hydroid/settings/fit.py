@@ -49,9 +49,9 @@ class FitSettings(Settings):
     """log: parameters with a lower bound above 0 are searched, refined and reported by their logarithm;
     linear: by their value, as in equations (15) and (16)"""
     hydraulics: HydraulicSettings = HydraulicSettings()
-    priors: dict[str, PriorSettings] = Field(default_factory=dict[str, PriorSettings])
+    priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
-    payloads: dict[str, Annotated[float, Field(gt=0)]] = Field(default_factory=dict[str, float])
+    payloads: dict[str, Annotated[float, Field(gt=0)]] = {}
     """mass that the gripper holds, by the log's file name [kg]"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()

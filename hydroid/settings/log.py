@@ -126,7 +126,7 @@ class LogSettings(Settings):
     """columns of the angles; null: the log holds none"""
     pressure: Common = None
     """columns of the chamber pressures; null: the log holds none"""
-    joints: dict[JointNumber, JointColumns | None] = Field(default_factory=dict[int, JointColumns | None])
+    joints: dict[JointNumber, JointColumns | None] = {}
     """what differs for single joints, by joint; null: the log does not hold this joint"""
     period_s: Annotated[float, Field(ge=1e-4, le=1)] = 0.01
     """sample period to which logs are resampled [s]: angles are interpolated, commands held. Commands of a

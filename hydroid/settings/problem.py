@@ -168,7 +168,7 @@ class ObjectiveSettings(Settings):
     """divide by the norm of the measured output of the same segment, equation (19)"""
     segments: Annotated[int, Field(ge=1, le=10_000)] = 8
     """number of segments of equal length, one objective each"""
-    weights: dict[JointNumber, Positive] = Field(default_factory=dict[int, float])
+    weights: dict[JointNumber, Positive] = {}
     """factor on the error of a joint's angle, by joint; 1 for joints that are not listed"""
     pressure_weight: NotNegative = 0.0
     """stage 2: factor that turns a chamber pressure's error into an angle's [deg/bar]; 0: angles only"""

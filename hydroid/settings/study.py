@@ -24,11 +24,11 @@ class StudySettings(Settings):
     """what it answers"""
     base: str
     """settings of a fit: a shipped name, or a YAML file relative to the study's file"""
-    set: Changes = Field(default_factory=dict[str, Any])
+    set: Changes = {}
     """settings to replace in every cell, by dotted key"""
     logs: Annotated[tuple[str, ...], Field(min_length=1)]
     """fitted logs, relative to the study's file"""
-    axes: dict[str, Axis] = Field(default_factory=dict[str, Any])
+    axes: dict[str, Axis] = {}
     """what varies: a dotted key with a list of values, or a name with cells: {label: {key: value, ...}}"""
     seeds: Annotated[int, Field(ge=0, le=10_000)] = 10
     """number of seeds, from 1"""

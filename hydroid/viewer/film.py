@@ -113,7 +113,7 @@ def check_kind(file: Path) -> str:
     """
     kind = file.suffix.lower()
     if kind not in KINDS:
-        raise SettingsError("is no film or picture", where=str(file), hint=f"end it in {', '.join(KINDS)}")
+        raise SettingsError("is no film or picture", where=file, hint=f"end it in {', '.join(KINDS)}")
     return kind
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import yaml
 
+from hydroid.arrays import Array
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
 from hydroid.files import find_config, is_file, write_atomic
-from hydroid.parameters import Array
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 

@@ -8,11 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Mask
 from hydroid.errors import SettingsError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -87,12 +85,12 @@ class ParameterSet:
         return tuple(p.name for p in self.parameters)
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Mask:
         """Which parameters are not fixed, shape (P,)."""
         return np.array([p.fixed is None for p in self.parameters], dtype=bool)
 
     @property
-    def log(self) -> NDArray[np.bool_]:
+    def log(self) -> Mask:
         """Which parameters are on a log scale, shape (P,)."""
         return np.array([p.log for p in self.parameters], dtype=bool)
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.errors import RunError
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import make_simulation
 from hydroid.settings.fit import FitSettings

@@ -14,9 +14,9 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.findings import Finding
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.posterior.noise import fit_noise
 from hydroid.settings.fit import FitSettings
 

@@ -22,9 +22,9 @@ from hydroid.advice.experiment import (
     violation,
 )
 from hydroid.arm.model import load_machine, load_model
+from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
 from hydroid.posterior.noise import Noise
 from hydroid.posterior.posterior import Posterior

@@ -9,11 +9,10 @@ from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Ints
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
 from hydroid.settings.experiment import DesignSettings
@@ -23,7 +22,7 @@ from hydroid.settings.fit import FitSettings
 class Input(NamedTuple):
     """One joint's command: `level[i]` [%] from sample `start[i]` to the next, and none before the first."""
 
-    start: NDArray[np.int64]
+    start: Ints
     level: Array
 
 

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.advice.score import Explained, Score, explained, holm
 from hydroid.advice.terms import Term, terms
-from hydroid.parameters import Array
+from hydroid.arrays import Array, Mask
 from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.noise import prior_weight
 from hydroid.posterior.uncertainty import Uncertainty
@@ -112,7 +111,7 @@ def refitted(problem: Problem, theta: Array, weight: float | None = None) -> Ref
         weight = prior_weight(problem, row)
     rows = least_squares_rows(problem, theta, weight)
 
-    def fitted(point: Array, kept: slice | NDArray[np.bool_] = slice(None)) -> Descent:
+    def fitted(point: Array, kept: slice | Mask = slice(None)) -> Descent:
         return least_squares(point, lambda points: rows(parameters.from_unit(points))[:, kept], SHORT)
 
     whole = fitted(parameters.to_unit(theta))

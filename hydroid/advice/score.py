@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array, Mask
 from hydroid.posterior.noise import Noise, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
@@ -112,7 +111,7 @@ def explained(problem: Problem, known: Uncertainty) -> Explained:
     return Explained(linear.effects, residual, noise_of, rows, linear.prior_weight)
 
 
-def holm(chances: Sequence[float], level: float) -> NDArray[np.bool_]:
+def holm(chances: Sequence[float], level: float) -> Mask:
     """Return which findings hold, any false one with at most a probability `level` (S. Holm, 1979)."""
     p = np.array(chances, dtype=float)
     order = np.argsort(p)

@@ -12,10 +12,10 @@ from hydroid.advice.assumptions import assumption_findings, doubts
 from hydroid.advice.design import ExperimentSimulator, forecast
 from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import MIN_GAIN, Candidate, promising, refitted, score_terms
+from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.findings import Finding
-from hydroid.parameters import Array
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty
 from hydroid.problem.problem import Problem

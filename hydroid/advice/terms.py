@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.hydraulics.actuator import START_PRESSURE
-from hydroid.parameters import Array
 from hydroid.posterior.linear import with_open_start
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CHOICES, MECHANICAL, QUANTITIES, ROWS, TARGETS

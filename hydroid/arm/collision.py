@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import ModelError
-from hydroid.parameters import Array
 
 FARTHEST = 100.0
 """distance beyond which MuJoCo need not look [m]"""

@@ -12,11 +12,10 @@ from typing import Any, cast
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from hydroid.arrays import Array, Index, Mask
 from hydroid.mjcf import quiet_mujoco
-from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 
 _OPTIONS = (
@@ -46,7 +45,7 @@ class LockedArm:
     """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
     joints: tuple[str, ...]
     """the moving joints in the order of qpos and qvel, (V,)"""
-    columns: NDArray[np.intp]
+    columns: Index
     """the same among the arm's joints, 0-based, shape (V,)"""
     pose: Array
     """where they start [rad], shape (V,)"""
@@ -76,7 +75,7 @@ class LockedArm:
         return {"body_mass": mass, "body_ipos": ipos, "body_iquat": iquat, "body_inertia": inertia}
 
 
-def lock(spec: mujoco.MjSpec, arm: Arm, moving: NDArray[np.bool_], pose: Array) -> LockedArm:
+def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
     """Lock all joints but the moving ones.
 
     Args:

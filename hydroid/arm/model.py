@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.collision import CollisionChecker
+from hydroid.arrays import Array
 from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
-from hydroid.parameters import Array
 from hydroid.settings.arm import Arm
 
 ALONE = "alone"

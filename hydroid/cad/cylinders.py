@@ -15,9 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.cad.repair import compiled
 from hydroid.cad.source import Notes
-from hydroid.parameters import Array
 from hydroid.settings.linkage import FourBar, Triangle, four_bar
 
 PARTS = {"rod", "piston", "cylinder", "cyl", "ram", "tube", "barrel"}

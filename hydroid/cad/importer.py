@@ -8,10 +8,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.cad.chain import choose_chain
 from hydroid.cad.cylinders import take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
-from hydroid.cad.shapes import Array, convert_meshes, distinct, sort_shapes, word
+from hydroid.cad.shapes import convert_meshes, distinct, sort_shapes, word
 from hydroid.cad.source import Notes, read_source
 from hydroid.mjcf import mjcf_text, mujoco_errors
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from hydroid.cad.shapes import SHOWN, Array
+from hydroid.arrays import Array
+from hydroid.cad.shapes import SHOWN
 from hydroid.cad.source import Notes
 from hydroid.mjcf import mujoco_errors
 

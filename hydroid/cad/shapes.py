@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import trimesh
 
+from hydroid.arrays import Array
 from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
-from hydroid.parameters import Array
 
 MESHES = "links"
 """folder of the meshes beside the model"""

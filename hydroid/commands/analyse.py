@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hydroid.arrays import Array
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ConfigSource,

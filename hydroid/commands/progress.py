@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
+from hydroid.arrays import Array
+
 if TYPE_CHECKING:
     from hydroid.parameters import Array
     from hydroid.settings.fit import FitSettings

@@ -14,8 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
+from hydroid.arrays import Array
 from hydroid.log import Log
-from hydroid.log.log import Floats
 
 NAMES = ("standing still", "speed tables", "nine numbers")
 """of the baselines, the simplest first"""
@@ -37,12 +37,12 @@ class Baseline:
     """
 
     joint: int
-    limits: Floats
+    limits: Array
     delay: float = 0.0
-    table: Floats | None = None
-    numbers: Floats = field(default_factory=partial(np.zeros, (4, 2)))
+    table: Array | None = None
+    numbers: Array = field(default_factory=partial(np.zeros, (4, 2)))
 
-    def predict(self, log: Log) -> Floats:
+    def predict(self, log: Log) -> Array:
         """Return the angle from the log's start pose under its commands alone [rad], shape (T,)."""
         command = log.command[:, self.joint - 1]
         side = (command < 0).astype(int)
@@ -55,20 +55,20 @@ class Baseline:
         late, lag, start = self.delay / log.period, self.numbers[3] / log.period, log.start[self.joint - 1]
         return _follow(target * log.period, side, late, lag, start, self.limits)
 
-    def errors(self, logs: Sequence[Log]) -> Floats:
+    def errors(self, logs: Sequence[Log]) -> Array:
         """Return measured minus predicted angles of all logs [rad]."""
         return np.concatenate([log.angle[:, self.joint - 1] - self.predict(log) for log in logs])
 
 
 @njit(cache=True)
 def _follow(
-    target: Floats,
+    target: Array,
     side: NDArray[np.int64],
     delay: float,
-    lag: Floats,
+    lag: Array,
     start: float,
-    limits: Floats,
-) -> Floats:
+    limits: Array,
+) -> Array:
     """Angles of a joint whose speed follows `target` [rad/sample] after a delay and a lag [samples]."""
     whole, part = int(delay), delay - int(delay)
     left = [np.exp(-1.0 / time) if time > 1e-6 else 0.0 for time in lag]
@@ -86,7 +86,7 @@ def _follow(
     return angles
 
 
-def fit_baselines(logs: Sequence[Log], joint: int, limits: Floats) -> dict[str, Baseline]:
+def fit_baselines(logs: Sequence[Log], joint: int, limits: Array) -> dict[str, Baseline]:
     """Fit the baselines of a joint (number, from 1) to the logs that measure it; `limits` is its range [rad].
 
     Returns:
@@ -105,7 +105,7 @@ def fit_baselines(logs: Sequence[Log], joint: int, limits: Floats) -> dict[str, 
 
 def _mean_speeds(logs: Sequence[Log], still: Baseline, delay: float) -> Baseline:
     """Return the mean speed in each of 24 bins of a command that acts after a delay, but for zero command."""
-    pairs = list[Floats]()
+    pairs = list[Array]()
     for log in logs:
         command, angle = log.command[:, still.joint - 1], log.angle[:, still.joint - 1]
         late, margin = round(delay / log.period), 0.01 * np.ptp(angle)
@@ -127,10 +127,10 @@ def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
     upper = [90, 90, 5, 5, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY]
     scale = [10, 10, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1]
 
-    def made(x: Floats) -> Baseline:
+    def made(x: Array) -> Baseline:
         return replace(table, table=None, delay=float(x[8]), numbers=x[:8].reshape(4, 2))
 
-    def fit(start: Floats, evaluations: int) -> OptimizeResult:
+    def fit(start: Array, evaluations: int) -> OptimizeResult:
         return least_squares(
             lambda x: made(x).errors(logs), start, bounds=(lower, upper), x_scale=scale, max_nfev=evaluations
         )
@@ -139,7 +139,7 @@ def _nine_numbers(logs: Sequence[Log], table: Baseline) -> Baseline:
     return made(fit(best.x, 40).x)
 
 
-def _starts(table: Baseline) -> Iterator[Floats]:
+def _starts(table: Baseline) -> Iterator[Array]:
     """Dead bands that end where the table begins to move, its last speeds, and three exponents."""
     assert table.table is not None
     commands, speeds = table.table.T

@@ -14,11 +14,11 @@ must be 0.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
-from hydroid.hydraulics.records import JOINT_STATE, NONE, Array, Records, coefficients
+from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
 START_PRESSURE = 50e5
@@ -41,7 +41,7 @@ class Observation:
     line: Array
 
 
-def make_plugin(joints: Records, entries: NDArray[np.intp], period: float, substeps: int) -> Plugin:
+def make_plugin(joints: Records, entries: Index, period: float, substeps: int) -> Plugin:
     """Return the actuators of n candidates.
 
     Args:
@@ -57,7 +57,7 @@ def make_plugin(joints: Records, entries: NDArray[np.intp], period: float, subst
     return Plugin(table, order, entries[np.ix_(order, order)], idle, period, substeps)
 
 
-def at_rest(plugin: Plugin, angle: Array, torque: Array) -> NDArray[np.void]:
+def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     """Return the state at rest at `angle` [rad], with the coils at I_min, of JOINT_STATE, shape (n, J).
 
     The torque g(q) [N·m] is what the actuators must hold, or what a joint rests on where oil is trapped; both
@@ -84,7 +84,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> NDArray[np.void]:
     return state
 
 
-def observe(coefficients: NDArray[np.void], state: NDArray[np.void], angle: Array) -> Observation:
+def observe(coefficients: Structs, state: Structs, angle: Array) -> Observation:
     """Return pressures, flows, spool and force at `angle` [rad], shape (n, J), of COEFFICIENTS and states.
 
     With the coefficients of one candidate, shape (J,), n may as well be the samples of its record.

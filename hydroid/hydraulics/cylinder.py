@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.hydraulics.elementwise import compilable, select
-from hydroid.hydraulics.records import LINEAR, ROTARY, Array
+from hydroid.hydraulics.records import LINEAR, ROTARY
 from hydroid.settings import linkage
 
 SLIDING = 1e-3

@@ -12,8 +12,8 @@ import math
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Mask, Structs
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import conductance
@@ -23,7 +23,6 @@ from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings, actuator_values
 from hydroid.settings.linkage import four_bar, triangle
 
-Array = NDArray[np.float64]
 Records: TypeAlias = np.recarray[Any, Any]
 Fields = list[tuple[str, Any]]
 
@@ -140,7 +139,7 @@ LINE = np.dtype(
 """scratch space of the pump's line during a look-ahead"""
 
 
-def nominal_joints(arm: Arm, settings: HydraulicSettings) -> NDArray[np.void]:
+def nominal_joints(arm: Arm, settings: HydraulicSettings) -> Structs:
     """Return what the settings and the arm's file say of the arm's joints, of JOINT, shape (J,)."""
     table = np.zeros(len(arm.joints), JOINT)
     for row, joint in zip(table, arm.joints, strict=True):
@@ -160,7 +159,7 @@ def nominal_joints(arm: Arm, settings: HydraulicSettings) -> NDArray[np.void]:
     return table
 
 
-def has_force_curve(joints: Any) -> NDArray[np.bool_]:
+def has_force_curve(joints: Any) -> Mask:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
     return np.asarray(exists.all(axis=1), dtype=bool)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import LogError
-from hydroid.log.log import Floats
 from hydroid.log.repair import hold
 from hydroid.log.table import Recording, Signal, Table, format_library
 
@@ -74,7 +74,7 @@ def open_bag(path: Path, time: str, period: float) -> BagTable:
     return BagTable(source=str(path), names=(time, *channels), channels=channels, period=period)
 
 
-def _resampled(at: Floats, values: Floats, grid: Floats, *, held: bool) -> Floats:
+def _resampled(at: Array, values: Array, grid: Array, *, held: bool) -> Array:
     """Return values at other times [s]; NaN between messages that are too far apart."""
     if held or len(at) == 1:
         return hold(at, values[:, None], grid, grid[1])[:, 0]

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.log.clues import KINDS, column_unit, likely_range
-from hydroid.log.log import Floats, Log, LogFinding, log_finding
+from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.motion import driven_joints
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording, Signal
@@ -78,7 +79,7 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
             yield recording.finding("error", kind, rows, signal, signal.joint, **names, **shown, **remedy)
 
 
-def _explained(signal: Signal, values: Floats) -> tuple[str, dict[str, str]]:
+def _explained(signal: Signal, values: Array) -> tuple[str, dict[str, str]]:
     """Return the kind of fault if another unit explains values outside their limits, and what it names."""
     if signal.kind == "command" and (likely := likely_range(values)) and likely.name != "%":
         return "outside in another range", likely.remedy(signal.gain, signal.offset)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.log.log import Floats
+from hydroid.arrays import Array
 from hydroid.units import Unit, unit_of
 
 WORDS = {
@@ -73,7 +73,7 @@ class CommandRange(NamedTuple):
         return {"range": self.name, "scale": f"{self.scale * gain:g}{more}"}
 
 
-def likely_range(values: Floats, negative: Floats | None = None) -> CommandRange | None:
+def likely_range(values: Array, negative: Array | None = None) -> CommandRange | None:
     """Return the range that fits the cells of a command, shape (R,), or of its two directions, or None.
 
     Converters overshoot, and joysticks do not rest exactly in the middle. A range with a positive middle must

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.clues import column_unit, direction, joint_of, kind_of, likely_range, number_in
-from hydroid.log.log import Floats
 from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
@@ -40,7 +40,7 @@ class _Column(NamedTuple):
     name: str
     kind: str
     unit: str
-    values: Floats
+    values: Array
 
     @property
     def why(self) -> str:
@@ -118,7 +118,7 @@ def _columns(table: Table) -> Iterator[_Column]:
                     yield _Column(name, kind, unit.name if unit else "", recording.time)
 
 
-def _rises(values: Floats) -> bool:
+def _rises(values: Array) -> bool:
     """Return whether a time rises steadily."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps) and (steps > 0).all() and np.median(steps) > 0.5 * steps.mean())

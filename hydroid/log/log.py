@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Mask
 from hydroid.errors import LogError
 from hydroid.findings import WORDS, Finding, Level
 from hydroid.words import listed
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +27,11 @@ class Log:
     """
 
     source: str
-    time: Floats
-    command: Floats
-    angle: Floats
+    time: Array
+    command: Array
+    angle: Array
     period: float
-    pressure: Floats | None = None
+    pressure: Array | None = None
     rest: int | None = None
 
     @property
@@ -42,12 +40,12 @@ class Log:
         return self.command.shape[1]
 
     @property
-    def driven(self) -> NDArray[np.bool_]:
+    def driven(self) -> Mask:
         """Joints that are ever commanded, shape (J,)."""
         return np.any(self.command != 0, axis=0)
 
     @property
-    def measured(self) -> NDArray[np.bool_]:
+    def measured(self) -> Mask:
         """Joints whose angle the log holds, shape (J,)."""
         return ~np.isnan(self.angle[0])
 
@@ -62,7 +60,7 @@ class Log:
         return int(np.argmax(np.any(self.command != 0, axis=1)))
 
     @property
-    def start(self) -> Floats:
+    def start(self) -> Array:
         """The start pose [rad], shape (J,): the mean of the angles while the arm still rests.
 
         A simulation starts there, and an error of its start stays in the whole response. A command moves
@@ -71,12 +69,12 @@ class Log:
         return self._mean_at_rest(self.angle)
 
     @property
-    def start_pressure(self) -> Floats | None:
+    def start_pressure(self) -> Array | None:
         """Chamber pressures before the first command, as `start` [Pa], shape (J, 2), NaN where unmeasured."""
         return None if self.pressure is None else self._mean_at_rest(self.pressure)
 
     @property
-    def start_samples(self) -> Floats:
+    def start_samples(self) -> Array:
         """Independent samples whose mean `start` is as precise as, shape (J,): few if the rest drifts."""
         resting = self._at_rest(self.angle)
         if len(resting) < 3:
@@ -110,11 +108,11 @@ class Log:
     def _rest(self) -> int:
         return self.first_command if self.rest is None else self.rest
 
-    def _at_rest(self, signal: Floats) -> Floats:
+    def _at_rest(self, signal: Array) -> Array:
         longest = round(2.0 / self.period)  # a leaking valve lets an arm sink
         return signal[: min(self._rest, longest) + 1]
 
-    def _mean_at_rest(self, signal: Floats) -> Floats:
+    def _mean_at_rest(self, signal: Array) -> Array:
         resting = self._at_rest(signal)
         return resting[0] + (resting - resting[0]).mean(axis=0)  # of equal values to the last bit
 

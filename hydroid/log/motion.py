@@ -5,7 +5,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.log.log import Floats, Log
+from hydroid.arrays import Array
+from hydroid.log.log import Log
 
 QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
 LEAST_PATH = 3.0  # [deg] that tell a direction
@@ -105,23 +106,23 @@ class JointMotion:
         return float((ends & (fast < 0.03) & (np.abs(command) > enough)).sum() * self.log.period)
 
     @property
-    def _logged(self) -> Floats:
+    def _logged(self) -> Array:
         """The joint's command [%], shape (T,)."""
         return self.log.command[:, self.joint - 1]
 
     @cached_property
-    def _following(self) -> Floats:
+    def _following(self) -> Array:
         return _correlations(self._logged, self._quick[2], round(0.8 / self.log.period))
 
     @cached_property
-    def _quick(self) -> tuple[Floats, Floats, Floats]:
+    def _quick(self) -> tuple[Array, Array, Array]:
         return self._smoothed(QUICK)
 
     @cached_property
-    def _slow(self) -> tuple[Floats, Floats, Floats]:
+    def _slow(self) -> tuple[Array, Array, Array]:
         return self._smoothed(SLOW)
 
-    def _smoothed(self, seconds: float) -> tuple[Floats, Floats, Floats]:
+    def _smoothed(self, seconds: float) -> tuple[Array, Array, Array]:
         """Return command [%], angle [rad] and speed [rad/s] behind a Gaussian."""
         width, angle = seconds / self.log.period, self.log.angle[:, self.joint - 1]
         reach = int(4 * width + 0.5)
@@ -135,7 +136,7 @@ class JointMotion:
         return command, angle, speed
 
 
-def _correlations(leading: Floats, following: Floats, most: int) -> Floats:
+def _correlations(leading: Array, following: Array, most: int) -> Array:
     """Return the size of the correlation of a signal with an earlier one, by lag below `most` samples."""
     n = len(leading)
     with np.errstate(invalid="ignore", divide="ignore"):

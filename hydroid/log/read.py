@@ -8,12 +8,13 @@ from typing import get_args
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.arrays import open_mat, open_parquet
 from hydroid.log.bag import open_bag
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
-from hydroid.log.log import Floats, Log, LogFinding, log_finding
+from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.repair import fill, resample, unwrap
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import Kind, LogSettings
@@ -54,7 +55,7 @@ def open_table(path: Path, settings: LogSettings = DEFAULT) -> Table:
 def check_log(
     path: Path,
     settings: LogSettings,
-    ranges: Floats,
+    ranges: Array,
     *,
     outputs: Sequence[int] | None = (),
     backward: Collection[int] = (),
@@ -102,7 +103,7 @@ def check_log(
     return log, sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 
-def map_signals(settings: LogSettings, ranges: Floats) -> list[Signal]:
+def map_signals(settings: LogSettings, ranges: Array) -> list[Signal]:
     """Return the signals that the settings ask for, time first; joint ranges [rad, m], shape (J, 2)."""
     signals = [Signal(settings.time.column, "time", gain=UNITS[settings.time.unit].factor)]
     for kind in get_args(Kind):

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.log.log import Floats, Log, LogFinding
+from hydroid.arrays import Array
+from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording
 from hydroid.settings.log import LogSettings
 
@@ -17,7 +18,7 @@ GAP = 1.95
 """in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2"""
 
 
-def sample_period(time: Floats) -> float:
+def sample_period(time: Array) -> float:
     """Return the usual step between samples [s]; NaN where there is none."""
     steps = np.diff(time[~np.isnan(time)])
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
@@ -101,7 +102,7 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     return Log(recording.table.source, grid, command.clip(-100, 100), measured[..., 0], period, pressure)
 
 
-def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:
+def hold(time: Array, command: Array, at: Array, period: float) -> Array:
     """Return the command for a period from each time in `at` [s]; 0 before the first, shape (len(at), J).
 
     It is the last one at or before that time, or where several fit into a period their mean over it.
@@ -110,7 +111,7 @@ def hold(time: Floats, command: Floats, at: Floats, period: float) -> Floats:
         steps = np.diff(time, prepend=time[0])[:, None]
         areas = np.cumsum(steps * np.roll(command, 1, axis=0), axis=0)
 
-        def area(end: Floats) -> Floats:
+        def area(end: Array) -> Array:
             """Return the integral of the command until some times [% s]."""
             index = np.searchsorted(time, end, side="right") - 1
             since = (end - time[index])[:, None]

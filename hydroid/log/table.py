@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Ints
 from hydroid.errors import LogError
 from hydroid.findings import Level
-from hydroid.log.log import Floats, LogFinding, log_finding
+from hydroid.log.log import LogFinding, log_finding
 
 _DAY = 86_400 * 10**9  # [ns]
 _TIME = re.compile(
@@ -66,7 +67,7 @@ class Table:
     header: int | None = None
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     remarks: tuple[str, ...] = ()
-    lines: NDArray[np.int64] | None = None
+    lines: Ints | None = None
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none.
@@ -102,11 +103,11 @@ class Recording:
 
     table: Table
     signals: tuple[Signal, ...]
-    values: Floats
-    rows: NDArray[np.int64]
+    values: Array
+    rows: Ints
 
     @property
-    def time(self) -> Floats:
+    def time(self) -> Array:
         """Time [s], shape (R,)."""
         return self.values[:, 0]
 
@@ -114,7 +115,7 @@ class Recording:
         self,
         level: Level,
         kind: str,
-        rows: Sequence[int] | NDArray[np.int64] = (),
+        rows: Sequence[int] | Ints = (),
         signal: Signal | None = None,
         *subjects: object,
         **numbers: Any,
@@ -146,7 +147,7 @@ def clock(cell: str) -> int | None:
     return ((hours * 60 + int(minute)) * 60 + int(second)) * 10**9 + int((fraction or "0").ljust(9, "0"))
 
 
-def _as_numbers(cells: NDArray[Any]) -> tuple[Floats, bool]:
+def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
     """Return cells as numbers, NaN for those that hold none, and whether they are times [s] from the first.
 
     Dates in text do not count, which programs write in many ways: a time of day that falls by more than half

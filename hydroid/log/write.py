@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import write_atomic
-from hydroid.log.log import Floats, Log
+from hydroid.log.log import Log
 from hydroid.log.read import map_signals
 from hydroid.log.repair import hold
 from hydroid.log.table import Signal
@@ -67,7 +68,7 @@ def _refuse_loss(path: Path, log: Log, mapped: set[tuple[str, int]]) -> None:
             raise LogError(f"joint {joint} has no angle to write", where=path, hint=hint)
 
 
-def _cells(signal: Signal, values: Floats, exact: bool) -> list[str]:
+def _cells(signal: Signal, values: Array, exact: bool) -> list[str]:
     """Return cells of ten digits, or the shortest of more that are read as these values."""
     wanted = (values - signal.offset) / signal.gain
     cells = np.array([f"{cell:.10g}" for cell in wanted], dtype=object)

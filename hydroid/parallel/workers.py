@@ -13,11 +13,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array
 from hydroid.errors import RunError
-
-Float = NDArray[np.float64]
 
 VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy", "numba")}
 """packages whose versions decide the bits of a result"""
@@ -42,7 +40,7 @@ class DaskWorkers:
         """Workers connected now; 1 where there is none."""
         return max(1, len(self.client.nthreads()))
 
-    def __call__(self, target: object, method: str, theta: Float, columns: int) -> Float:
+    def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
         """Apply `target.method`, which maps rows (m, P) to rows (m, columns), to theta on the workers.
 
         Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk.
@@ -80,7 +78,7 @@ class DaskWorkers:
                     result[i] = rows[0]
         return result
 
-    def _map(self, target: object, method: str, chunks: Sequence[Float]) -> list[Float | None]:
+    def _map(self, target: object, method: str, chunks: Sequence[Array]) -> list[Array | None]:
         """Results in the chunks' order; None for a chunk that Dask has given up."""
         import distributed
         from distributed.scheduler import KilledWorker
@@ -117,7 +115,7 @@ class DaskWorkers:
                 self.client.cancel(futures)
 
 
-def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Float) -> Float:
+def _apply(pickled: bytes, versions: dict[str, str], method: str, theta: Array) -> Array:
     """Compute a chunk in a worker, one at a time however many threads it has."""
     for name, ours in versions.items():
         if VERSIONS[name] != ours:

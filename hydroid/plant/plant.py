@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from hydroid.arm.export import dressed_model, locked_spec, write_fitted
 from hydroid.arm.locked import lock
 from hydroid.arm.model import add_payload, load_model
+from hydroid.arrays import Array
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.hydraulics.actuator import observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
-from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.simulation.chain import Chain

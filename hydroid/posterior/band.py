@@ -14,9 +14,9 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import t as student
 
+from hydroid.arrays import Array
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.posterior.linear import start_deviations
 from hydroid.posterior.posterior import COVERAGE, NORMAL, STEP, Posterior, stored_posterior
 from hydroid.posterior.uncertainty import Uncertainty

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
-from hydroid.parameters import Array
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Candidates, Simulation

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem

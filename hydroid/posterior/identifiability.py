@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from hydroid.arrays import Array
 from hydroid.errors import SettingsError
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import WEAK_ABOVE, Uncertainty

@@ -16,10 +16,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import norm as normal
 
+from hydroid.arrays import Array, Mask
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
-from hydroid.parameters import Array, ParameterSet
-from hydroid.search import Mask
+from hydroid.parameters import ParameterSet
 from hydroid.search.axes import Axes, Box, covariance_axes, differentiate
 
 UNIDENTIFIABLE_ABOVE = 1.0

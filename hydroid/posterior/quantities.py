@@ -6,10 +6,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
-from hydroid.parameters import Array
 from hydroid.posterior.bench import Bench, make_bench
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem

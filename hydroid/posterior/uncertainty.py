@@ -34,7 +34,8 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm as normal
 
-from hydroid.parameters import Array, ParameterSet
+from hydroid.arrays import Array
+from hydroid.parameters import ParameterSet
 from hydroid.posterior.linear import Linear, linearised, white_posterior
 from hydroid.posterior.noise import STEP, Noise, neighbours, problem_noise, transformed, unbiased
 from hydroid.posterior.posterior import (

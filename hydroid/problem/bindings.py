@@ -6,11 +6,10 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Mask
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import Records, nominal_joints
-from hydroid.parameters import Array
 from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -67,7 +66,7 @@ class Bindings:
                 target[:, row.places] = np.maximum(target[:, row.places] + value * factor, least * factor)
         return Candidates(joints, mass)
 
-    def refuse_idle(self, driven: NDArray[np.bool_], outputs: Sequence[int]) -> None:
+    def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
         """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no gain or no damping."""
         moved = {*np.flatnonzero(driven).tolist(), *outputs}
         for quantity in ("gain", "damping") if self._stage == "mech" else ():

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.settings.problem import ObjectiveSettings
 from hydroid.simulation import Response
 

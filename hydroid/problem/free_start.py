@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 from hydroid.problem.problem import OpenStart, Problem, compared_pressures, make_simulation
 
 STEP = float(np.radians(0.05))

@@ -13,13 +13,10 @@ empty.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Ints
 from hydroid.errors import SettingsError
-from hydroid.parameters import Array
 from hydroid.settings.problem import ObjectiveSettings
-
-Int = NDArray[np.int64]
 
 
 def norm(error: Array, p: float | str) -> Array:
@@ -59,7 +56,7 @@ def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings
     return value / scale
 
 
-def segment_objectives(error: Array, measured: Array, bounds: Int, settings: ObjectiveSettings) -> Array:
+def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: ObjectiveSettings) -> Array:
     """Return one objective per segment, equations (21) and (22), shape (n, S).
 
     A candidate whose error is not finite anywhere has inf in all segments: the first segments of a simulation
@@ -80,7 +77,7 @@ def segment_objectives(error: Array, measured: Array, bounds: Int, settings: Obj
     return objectives
 
 
-def segment_bounds(samples: int, segments: int) -> Int:
+def segment_bounds(samples: int, segments: int) -> Ints:
     """Cut a record of so many samples into segments of equal length.
 
     Returns:

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import SettingsError
-from hydroid.parameters import Array, ParameterSet
+from hydroid.parameters import ParameterSet
 from hydroid.settings.problem import PriorSettings
 
 REACH = 2.0

@@ -13,12 +13,11 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.arm.model import add_payload, load_model
+from hydroid.arrays import Array, Ints
 from hydroid.errors import SettingsError
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.problem.bindings import Bindings
 from hydroid.problem.channels import Channel, make_channels
 from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
@@ -104,7 +103,7 @@ class Problem:
         ]
         self.channels = make_channels(logs, outputs, pressures, settings.objective)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
-        self.bounds: NDArray[np.int64] = np.concatenate([self._segments(c) for c in self.channels])
+        self.bounds: Ints = np.concatenate([self._segments(c) for c in self.channels])
 
     @property
     def active_joints(self) -> tuple[int, ...]:
@@ -200,7 +199,7 @@ class Problem:
         threads = self.settings.simulation.threads or 1
         return Problem(self.settings.changed({"simulation.threads": threads}), self.logs)
 
-    def _segments(self, channel: Channel) -> NDArray[np.int64]:
+    def _segments(self, channel: Channel) -> Ints:
         """Samples of each objective: an angle's segments; a pressure is one objective, however long."""
         if channel.quantity != "angle":
             return np.array([[channel.rows.start, channel.rows.stop]])

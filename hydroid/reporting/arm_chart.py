@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
 from hydroid.arm.model import load_model
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 from hydroid.reporting.chart import SERIES
 from hydroid.reporting.figure import SHADES, legend, saved, style
 from hydroid.reporting.outlines import Shape, body_poses, placed, shapes, sight

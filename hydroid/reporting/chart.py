@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 
 Color = str
 """ink, grey, pale or one of SERIES"""

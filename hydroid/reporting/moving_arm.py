@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
+from hydroid.arrays import Array
 from hydroid.fitting.validation import Prediction
-from hydroid.parameters import Array
 from hydroid.reporting.outlines import Shape, body_poses, shapes, sight
 from hydroid.reporting.page import Plot, Section, Tab
 from hydroid.settings.arm import Arm

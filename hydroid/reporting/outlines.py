@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import trimesh
 
+from hydroid.arrays import Array
 from hydroid.cad.shapes import SHOWN
-from hydroid.parameters import Array
 
 
 @dataclass(frozen=True, eq=False)

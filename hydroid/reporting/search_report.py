@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 from hydroid.reporting.chart import SERIES, Chart, Mark, Panel, finite, joined
 from hydroid.reporting.page import Plot, Section
 from hydroid.run.record import Record

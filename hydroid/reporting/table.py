@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hydroid.parameters import Array
+from hydroid.arrays import Array
 from hydroid.words import number, plain
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydroid.arrays import Array
 from hydroid.errors import RunError, Stopped
 from hydroid.estimate import NAME, FitSummary, write_estimate
 from hydroid.files import remove_parts, write_atomic
 from hydroid.identified_model import CONFIG, IdentifiedModel, write_settings
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.plant import Plant
 from hydroid.run.archive import CheckpointFile
 from hydroid.run.identity import DESCRIPTION, difference, identity, own_hashes

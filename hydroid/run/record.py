@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from hydroid.arrays import Array
 from hydroid.errors import RunError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
@@ -23,7 +24,6 @@ from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines
 from hydroid.identified_model import IdentifiedModel, load_identified
-from hydroid.parameters import Array
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder
 from hydroid.settings.fit import FitSettings

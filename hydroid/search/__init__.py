@@ -1,8 +1,5 @@
 """Optimisers that know no robot."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from hydroid.arrays import Array as Array
+from hydroid.arrays import Ints as Ints
+from hydroid.arrays import Mask as Mask

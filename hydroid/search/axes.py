@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hydroid.search import Array, Mask
+from hydroid.arrays import Array, Mask
 
 Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from hydroid.search import Array, Ints, Mask
+from hydroid.arrays import Array, Ints, Mask
 from hydroid.settings.search import GeneticSettings
 
 Genes = NDArray[Any]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from hydroid.search import Array, Ints
+from hydroid.arrays import Array, Ints
 from hydroid.search.axes import Function
 
 WIDTH = 2.0**-26

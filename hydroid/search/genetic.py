@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.search import Array, Ints
+from hydroid.arrays import Array, Ints
 from hydroid.search.chromosomes import (
     Coding,
     Genes,

@@ -6,8 +6,8 @@ candidate dominates it.
 
 import numpy as np
 
+from hydroid.arrays import Array, Ints, Mask
 from hydroid.errors import SettingsError
-from hydroid.search import Array, Ints, Mask
 
 
 def feasible(objectives: Array) -> Mask:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, Strict, ValidationInfo
 
+from hydroid.arrays import Array
 from hydroid.errors import ModelError, SettingsError
 from hydroid.files import find_config
 from hydroid.settings.cylinder import LinearActuator, make_cylinder
@@ -167,12 +167,12 @@ class Arm(Settings):
         return tuple(self.mass_of)
 
     @property
-    def masses(self) -> NDArray[np.float64]:
+    def masses(self) -> Array:
         """Nominal masses of the links [kg], shape (L,)."""
         return np.array([*self.mass_of.values()])
 
     @property
-    def ranges(self) -> NDArray[np.float64]:
+    def ranges(self) -> Array:
         """Lower and upper joint stops [rad], or [m] of a slide, shape (J, 2); infinite where none is."""
         free = (-np.inf, np.inf)
         return np.array([free if joint.continuous else joint.limits for joint in self.joints])
@@ -189,16 +189,16 @@ class Arm(Settings):
         return tuple(j for j, one in actuators if isinstance(one, LinearActuator) and one.sense < 0)
 
     @property
-    def lower(self) -> NDArray[np.float64]:
+    def lower(self) -> Array:
         """Lower joint stops [rad], shape (J,)."""
         return self.ranges[:, 0]
 
     @property
-    def upper(self) -> NDArray[np.float64]:
+    def upper(self) -> Array:
         """Upper joint stops [rad], shape (J,)."""
         return self.ranges[:, 1]
 
-    def pose(self, name: str) -> NDArray[np.float64]:
+    def pose(self, name: str) -> Array:
         """Return a named pose [rad], shape (J,).
 
         Raises:

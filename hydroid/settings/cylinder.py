@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from hydroid.settings.linkage import DIGITS, Array, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
+from hydroid.arrays import Array
+from hydroid.settings.linkage import DIGITS, Cylinder, Pivots, Triangle, Vector, four_bar, triangle
 
 if TYPE_CHECKING:
     import mujoco

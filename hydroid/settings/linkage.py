@@ -10,13 +10,11 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from hydroid.settings.load import Positive, Settings
 
 Vector = tuple[float, float, float]
-Array = NDArray[np.float64]
 
 DIGITS = 9
 """of lengths in m and angles in deg that are read off a model: what is finer is its rounding"""

@@ -2,12 +2,12 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.arm.locked import LockedArm
+from hydroid.arrays import Array, Index, Mask, Structs
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
-from hydroid.hydraulics.records import NONE, Array, Records, coefficients, without_actuator
+from hydroid.hydraulics.records import NONE, Records, coefficients, without_actuator
 from hydroid.settings.arm import Arm
 from hydroid.simulation.scenario import Candidates
 
@@ -31,9 +31,7 @@ class Chain:
         pushed: as given.
     """
 
-    def __init__(
-        self, arm: Arm, locked: LockedArm, active: NDArray[np.bool_], substeps: int, pushed: NDArray[np.intp]
-    ) -> None:
+    def __init__(self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index) -> None:
         self.columns = np.setdiff1d(np.arange(len(locked.columns)), pushed)
         self.joints, self.pushed = locked.columns[self.columns], pushed
         self._pushed = locked.columns[pushed].tolist()
@@ -47,7 +45,7 @@ class Chain:
 
     def start(
         self, candidates: Candidates, pose: Array, balance: Array, pressure: Array | None = None
-    ) -> tuple[Plugin, NDArray[np.void]]:
+    ) -> tuple[Plugin, Structs]:
         """Return the actuators of n candidates, with a force-stroke curve each, and their states at rest.
 
         `pose` is the moving joints' [rad], shape (V,); `balance` holds them there [N·m], shape (n, V).
@@ -80,7 +78,7 @@ class Chain:
         return swallowed(each, angle, velocity).sum(axis=2)
 
 
-def mass_entries(model: mujoco.MjModel) -> NDArray[np.intp]:
+def mass_entries(model: mujoco.MjModel) -> Index:
     """Where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (V, V)."""
     entries = np.zeros((model.nv, model.nv), np.intp)
     rows, columns = np.repeat(np.arange(model.nv), model.M_rownnz), model.M_colind

@@ -7,11 +7,10 @@ what integration leaves over. The arm feels the joint's true motion, inertia cou
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from hydroid.arrays import Array, Index
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.settings.problem import SimulationSettings
 
 ARMATURE = 1e6
@@ -43,8 +42,8 @@ class Prescribed:
         self,
         model: mujoco.MjModel,
         log: Log,
-        joints: NDArray[np.intp],
-        columns: NDArray[np.intp],
+        joints: Index,
+        columns: Index,
         settings: SimulationSettings,
     ) -> None:
         armature = max(ARMATURE, HEAVIEST * float(model.dof_M0.max()))

@@ -23,9 +23,10 @@ from numba import njit, types
 from numba.core import event
 from numpy.typing import NDArray
 
+from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
-from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE, Array
+from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
 
 _log = logging.getLogger(__name__)
 
@@ -50,11 +51,11 @@ class Handles(NamedTuple):
     applied: Array
     armature: Array
     warnings: NDArray[np.int32]
-    columns: NDArray[np.intp]
+    columns: Index
     """joints with actuators and those they couple with, (J,)"""
     own: Array
     """the arm's own armature of these [kg·m²], (J,)"""
-    pushed: NDArray[np.intp]
+    pushed: Index
     """the other joints, (P,)"""
     steps: int
     """in one sample"""
@@ -83,7 +84,7 @@ class Record(NamedTuple):
     """What a rollout writes: angles of moving joints [rad], (T, V); states, (T, J) of JOINT_STATE, or ()."""
 
     angle: Array
-    states: NDArray[np.void]
+    states: Structs
 
 
 class SteppedArm:
@@ -104,8 +105,8 @@ class SteppedArm:
     def __init__(
         self,
         model: mujoco.MjModel,
-        columns: NDArray[np.intp] = NO_JOINTS,
-        pushed: NDArray[np.intp] = NO_JOINTS,
+        columns: Index = NO_JOINTS,
+        pushed: Index = NO_JOINTS,
         steps: int = 1,
         rollout: Callable[..., None] | None = None,
     ) -> None:
@@ -156,7 +157,7 @@ class SteppedArm:
         finite = np.isfinite([self.data.qpos, self.data.qvel]).all()
         return bool(finite) and not self.data.warning.number.any()
 
-    def roll(self, plugin: Plugin, state: NDArray[np.void], course: Course, record: Record) -> None:
+    def roll(self, plugin: Plugin, state: Structs, course: Course, record: Record) -> None:
         """Step one candidate up to the first warning of MuJoCo's; call it within `quiet_mujoco`.
 
         `state` is its actuators', (J,) of JOINT_STATE: steps change it.

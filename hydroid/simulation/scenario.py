@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from hydroid.arm.locked import Array, LockedArm, lock
+from hydroid.arm.locked import LockedArm, lock
+from hydroid.arrays import Array, Index, Mask
 from hydroid.hydraulics.records import Records
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
@@ -29,7 +29,7 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.mass)
 
-    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Candidates":
+    def __getitem__(self, rows: slice | Index) -> "Candidates":
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
 
@@ -42,7 +42,7 @@ class Response:
     """
 
     angle: Array
-    feasible: NDArray[np.bool_]
+    feasible: Mask
     pressure: Array | None = None
 
 

@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from hydroid.arrays import Array, Mask, Structs
 from hydroid.hydraulics.actuator import Observation, observe
-from hydroid.hydraulics.records import JOINT_STATE, Array, has_force_curve
+from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 from hydroid.simulation.chain import Chain
@@ -85,7 +85,7 @@ class Simulation:
             free = deque(self._stepped() for _ in range(threads))
             follow = self._follower(candidates[rows], free[0], observed=pressure is not None)
             deque(pool.map(simulate, range(rows.size)), maxlen=0)
-        feasible: NDArray[np.bool_] = np.all(np.isfinite(angle), axis=(1, 2))
+        feasible: Mask = np.all(np.isfinite(angle), axis=(1, 2))
         return Response(angle, feasible, pressure)
 
     def trace(self, candidates: Candidates) -> Observation:
@@ -133,7 +133,7 @@ class Simulation:
         return follow
 
 
-def reading(angle: Array, sensors: NDArray[np.void], period: float) -> Array:
+def reading(angle: Array, sensors: Structs, period: float) -> Array:
     """Return what the sensors of K joints read, shape (T, K) like their angles [rad], `period` [s] apart.
 
     That is the turn since the start times a scale, with a first-order lag (ours).

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from hydroid.arm.model import ALONE, Machine, load_machine
+from hydroid.arrays import Array, Mask
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
-from hydroid.parameters import Array
 from hydroid.plant import Plant
 from hydroid.prediction import predict_log
 
@@ -58,7 +57,7 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     return Motion(machine, first.time, machine.joined(simulated, rest), measured, rms)
 
 
-def _moves(angle: Array) -> NDArray[np.bool_]:
+def _moves(angle: Array) -> Mask:
     """Which angles, shape (T, J), are of a motion, (J,); a log of commands stands in its start pose."""
     return np.nan_to_num(np.ptp(angle, axis=0)) > 0
 

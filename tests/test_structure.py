@@ -83,4 +83,4 @@ def test_the_search_knows_no_robot():
 
 def test_the_workers_know_no_robot():
     for path in (ROOT / "parallel").glob("*.py"):
-        assert imported_packages(path) <= {"errors", "settings", "parallel"}, path
+        assert imported_packages(path) <= {"arrays", "errors", "settings", "parallel"}, path

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hydroid.arrays import Array
 from hydroid.commands.console import Result, written
 from hydroid.commands.inputs import (
     ConfigSource,
@@ -28,7 +27,7 @@ from hydroid.findings import Finding
 from hydroid.identified_model import start_values
 
 if TYPE_CHECKING:
-    from hydroid.parameters import Array
+    from hydroid.arrays import Array
     from hydroid.plant import Plant
     from hydroid.posterior.identifiability import Identifiability, Profile
     from hydroid.posterior.uncertainty import Uncertainty

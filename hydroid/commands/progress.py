@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
-from hydroid.arrays import Array
-
 if TYPE_CHECKING:
-    from hydroid.parameters import Array
+    from hydroid.arrays import Array
     from hydroid.settings.fit import FitSettings
 
 NOTICES = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGUSR1") if hasattr(signal, name))

@@ -211,7 +211,7 @@ WORDS: dict[str, tuple[str, str]] = {
         "if the command is logged with the opposite sign, set log.joints.{0}.command.scale: -1",
     ),
     "no motion": (
-        "strong commands hardly move joint{s} {names}: by {most:.2g} deg at most",
+        "strong commands hardly move joint{s} {names}: by {most} at most",
         "check log.joints (is this the angle of that command?), and if angles are in rad, "
         "set log.angle.unit: rad",
     ),

@@ -65,3 +65,8 @@ def likely_time_unit(step: float) -> str:
     """Return the unit in which a step between samples is one of 2 to 1000 samples a second; "": in none."""
     units = ("s", "ms", "us", "ns", "min", "day")
     return next((name for name in units if 9e-4 < step * UNITS[name].factor < 0.6), "")
+
+
+def way(degrees: float, *, slides: bool) -> str:
+    """Write how far a joint moves, in m of one that slides."""
+    return f"{math.radians(degrees):.3g} m" if slides else f"{degrees:.3g} deg"

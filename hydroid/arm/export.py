@@ -118,6 +118,7 @@ def _set_joint(joint: mujoco.MjsJoint, model: mujoco.MjModel, j: int, *, degrees
     body.inertia, body.fullinertia = model.body_inertia[k], [np.nan, 0, 0, 0, 0, 0]
     joint.damping, joint.stiffness = [model.dof_damping[j], 0, 0], [model.jnt_stiffness[j], 0, 0]
     joint.frictionloss, joint.armature = model.dof_frictionloss[j], model.dof_armature[j]
+    joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # a URDF's effort is of another motor
     turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
     joint.springref = math.degrees(slack) if degrees and turns else slack
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +20,7 @@ from hydroid.commands.inputs import (
 )
 from hydroid.commands.logs import check_file, named, plain_findings
 from hydroid.settings.log import LogSettings
+from hydroid.units import way
 
 if TYPE_CHECKING:
     from hydroid.log import ColumnGuess, Log, LogFinding
@@ -79,10 +79,7 @@ def check(
             moved = {names[joint - 1]: travel for joint, travel in travels.items()}
             driven = [name for name, one in zip(names, log.driven, strict=True) if one]
             samples, duration = len(log.time), float(log.duration)
-            ways = [
-                f"{names[j - 1]} by {f'{radians(d):.3g} m' if j in slides else f'{d:.3g} deg'}"
-                for j, d in travels.items()
-            ]
+            ways = (f"{names[j - 1]} by {way(d, slides=j in slides)}" for j, d in travels.items())
             moves = ", ".join(ways) or "nothing"
             sizes.append(f"{path}: {samples} samples, {duration:.2f} s; driven and moved: {moves}")
         row = {"log": str(path), "usable": log is not None, "samples": samples, "duration_s": duration}

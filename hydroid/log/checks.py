@@ -12,7 +12,7 @@ from hydroid.log.motion import driven_joints
 from hydroid.log.repair import GAP, sample_period
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.log import LogSettings
-from hydroid.units import UNITS, likely_time_unit
+from hydroid.units import UNITS, likely_time_unit, way
 
 DEGREE = UNITS["deg"].factor
 
@@ -147,12 +147,11 @@ def check_motion(
         likely = common if small else likely_range(log.command[:, joint - 1])
         if likely and (small or (likely.offset and command.low < 0)):
             yield warning("range", command, **likely.remedy(command.gain, command.offset))
+        (path, against), slides = motion.directed, angle.unit != "deg"
         if motion.turned and joint not in backward:
-            path, against = motion.directed
-            way = f"{path:.3g} deg" if angle.unit == "deg" else f"{np.radians(path):.3g} m"
-            yield warning("turned", command, path=way, against=against)
+            yield warning("turned", command, path=way(path, slides=slides), against=against)
         if motion.push > 300 and 0 < motion.travel < 2:
-            yield warning("no motion", angle, most=motion.travel)
+            yield warning("no motion", angle, most=way(motion.travel, slides=slides))
         if ahead := motion.ahead:
             yield warning("late", command, lag=ahead, delay=delay - ahead)
 

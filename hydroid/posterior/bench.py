@@ -39,10 +39,10 @@ class Bench:
     scenario: Scenario
 
     @property
-    def speed_unit(self) -> tuple[float, str]:
-        """What a speed of 1 rad/s, or m/s of a joint that slides, is in the unit of quantities."""
+    def unit(self) -> tuple[float, str]:
+        """What 1 rad, or 1 m of a joint that slides, is in the unit of quantities."""
         slides = self.settings.arm.joints[self.joint - 1].slides
-        return (1e3, "mm/s") if slides else (np.degrees(1.0), "deg/s")
+        return (1e3, "mm") if slides else (np.degrees(1.0), "deg")
 
     @property
     def sense(self) -> float:
@@ -69,8 +69,8 @@ class Bench:
 class Movement:
     """A step of the command [%] from an angle [rad], held for some samples.
 
-    Speeds are in the direction of the command, in `Bench.speed_unit`; the one at the end is the mean over a
-    tenth of a second.
+    Speeds are in the direction of the command, in `Bench.unit` per second; the one at the end is the mean
+    over a tenth of a second.
     """
 
     bench: Bench
@@ -101,7 +101,7 @@ class Movement:
 
     def speeds(self, candidates: Candidates) -> Array:
         """Return speeds between samples, shape (n, samples)."""
-        factor = self.sign * self.bench.speed_unit[0] / self.bench.period
+        factor = self.sign * self.bench.unit[0] / self.bench.period
         return factor * np.diff(self.angles(candidates), axis=1)
 
     def end(self, speeds: Array) -> Array:

@@ -99,8 +99,10 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Callable[[Candidates], 
 
     def measure(candidates: Candidates) -> list[tuple[Column, Array]]:
         torque, inertia = bench.weigh(candidates)
-        label = f"gravity torque at {np.degrees(bench.angle):.0f} deg"
-        gravity = Column("gravity_torque_at_pose", label, "N·m", False), torque
+        factor, unit = bench.unit
+        word, of = ("force", "N") if unit == "mm" else ("torque", "N·m")
+        label = f"gravity {word} at {factor * bench.angle:.0f} {unit}"
+        gravity = Column("gravity_torque_at_pose", label, of, False), torque
         moved = [row for test in tests for row in test(candidates)]
         return [*moved, *further(bench, candidates, inertia), gravity]
 
@@ -111,14 +113,15 @@ def gain_model(bench: Bench, candidates: Candidates, inertia: Array) -> Measured
     """Stage 1: what the joint does under K u = D q̇ + F_c sign(q̇), before springs and gravity's change act."""
     joint = candidates.joints[:, bench.joint - 1]
     gain, damping, friction = joint["gain"], joint["damping"], joint["friction"]
+    factor, unit = bench.unit
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.degrees(gain / damping)
-        yield Column("gain", "gain between command and speed, K/D", "deg/s per %"), ratio
+        ratio = factor * (gain / damping)
+        yield Column("gain", "gain between command and speed, K/D", f"{unit}/s per %"), ratio
         yield Column("time_constant", "time constant, inertia/D", "s"), inertia / damping
         yield Column("dead_band", "dead band, friction/K", "%"), friction / gain
         for u in (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0):
             torque = np.sign(u) * np.maximum(gain * abs(u) - friction, 0.0)
-            yield Column("speed", "speed", "deg/s", False, u), np.degrees(torque / damping)
+            yield Column("speed", "speed", f"{unit}/s", False, u), factor * (torque / damping)
 
 
 def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
@@ -187,7 +190,7 @@ def speed_tests(
         below, above = (below, middle) if moves else (middle, above)
 
     def measure(candidates: Candidates) -> Measured:
-        unit = bench.speed_unit[1]
+        unit = f"{bench.unit[1]}/s"
         runs = {u: step.speeds(candidates) for u, step in steps.items()}
         speed = {u: steps[u].end(run) for u, run in runs.items()}
         for u, value in speed.items():

@@ -62,7 +62,7 @@ refinement: {{iterations: 60, gain_tolerance: 1.0e-5}}
 """
 JOINT = """\
 {actuator}
-  D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 10}}    # N·m·s/rad
+  D_{own}: {{quantity: damping, joints: [{name}], nominal: {damping}, within: 10}}    # {unit}
   delay_{own}: {{quantity: delay, joints: [{name}], bounds: [0, 1], start: {delay:.2f}}}    # s
   dead_A_{own}: {{quantity: dead_band_a, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}    # %
   dead_B_{own}: {{quantity: dead_band_b, joints: [{name}], nominal: {dead}, sd: 15, bounds: [0, 75]}}
@@ -118,6 +118,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
                 damping=short(0.1 * size.damping),
                 delay=min(max(motion.likely_lag - RESPONSE, 0.0), 0.9) if motion else 0.0,
                 # a stand-in's size is a guess, but the valves of one machine let like flows through
+                unit="N·s/m" if own.slides else "N·m·s/rad",
                 draw=1 if linear else short(middle / flows[joint]),
                 dead=short(DEAD * min(max(motion.dead_band, 5.0), 40.0) if motion else 10.0),
                 **words,

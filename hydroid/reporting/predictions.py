@@ -23,11 +23,11 @@ _COLUMNS = {
     "log": "log",
     "kind": "",
     "name": "joint",
-    "mae_deg": "mean absolute [deg]",
-    "rms_deg": "rms [deg]",
-    "max_deg": "largest [deg]",
+    "mae_deg": "mean absolute [{0}]",
+    "rms_deg": "rms [{0}]",
+    "max_deg": "largest [{0}]",
     "fit_percent": "fit [%]",
-    "expected_deg": "expected [deg]",
+    "expected_deg": "expected [{0}]",
     "inside_percent": "inside band [%]",
 }
 
@@ -64,9 +64,13 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         for row in one.plain(arm.joint_names)
     ]
     note = "fit: 0 % for the mean of the measured angle. expected: rms error that the fit leads to expect."
-    note += " Of a joint that slides 1 deg stands for 17.5 mm." if arm.slides else ""
-    optional = ("mean absolute [deg]", "largest [deg]", "inside band [%]", "expected [deg]")
-    errors = Table.of("All errors", _COLUMNS, rows, note, optional)
+    for row in rows:
+        if row["joint"] in arm.slides:
+            row |= {key: error and 1e3 * np.radians(error) for key, error in row.items() if "_deg" in key}
+    unit = "deg, mm of joints that slide" if arm.slides else "deg"
+    columns = {key: name.format(unit) for key, name in _COLUMNS.items()}
+    optional = tuple(columns[key] for key in ("mae_deg", "max_deg", "inside_percent", "expected_deg"))
+    errors = Table.of("All errors", columns, rows, note, optional)
     return (
         *motion_section(arm, {names[log]: first for log, (first, *_) in by_log.items()}),
         Section(

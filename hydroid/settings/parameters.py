@@ -117,7 +117,9 @@ def _default_bounds(own: ParameterSettings, prior: Prior | None) -> tuple[float,
 
 
 def _unit(arm: Arm, own: ParameterSettings) -> str:
-    """The unit of a parameter; areas and dry friction of rotary actuators have their own."""
+    """The unit of a parameter; joints that slide, and areas of rotary actuators, have their own."""
+    if own.quantity in MECHANICAL and own.joints and {*own.joints} <= {*arm.slides}:
+        return own.unit.replace("N·m", "N").replace("rad", "m")
     actuators = _actuators(arm, own) if own.joints else []
     rotary = bool(actuators) and all(isinstance(one, RotaryActuator) for one in actuators)
     sized = own.quantity in ("area", "area_a", "area_b", "dry_friction")

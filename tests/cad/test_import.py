@@ -141,6 +141,11 @@ TRAPS = [
         "Say what you know: --total-mass KG",
         [800, 144, 54],
     ),
+    (
+        {"boom": link("boom", mass=7.0, mesh="lost.stl")},  # 2 m long
+        "MASSES THAT NO MACHINE HAS [kg]: boom 7 -> 144",
+        [800, 144, 90],
+    ),
 ]
 """changes of a URDF, the beginning of the note on them, and the masses of the moving bodies [kg]"""
 

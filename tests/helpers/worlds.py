@@ -16,10 +16,12 @@ BUCKET: Joint = ("bucket", "stick_link", "bucket_link", "revolute", (1.8, 0, 0),
 TELESCOPE: Joint = ("telescope", "stick_link", "telescope_link", "prismatic", (0.4, 0, 0), "0 1.4")
 TOOL: Joint = ("bucket", "telescope_link", "bucket_link", "revolute", (1.8, 0, 0), "-2 0.6")
 SIZES = {"house": 1.5, "boom_link": 3.0, "stick_link": 1.8, "telescope_link": 1.8, "bucket_link": 0.9}
+SIZES |= {"turret": 0.6, "mast": 2.0, "jib": 1.5}
 """length of the links [m]; they are a fifth as wide and high"""
 EXCAVATOR = (SWING, BOOM, STICK, BUCKET)
 CRANE = (SWING, BOOM, STICK, TELESCOPE, TOOL)
-AXES = {"swing": "0 0 1", "telescope": "1 0 0"}
+AXES = {"house": "0 0 1", "turret": "0 0 1", "telescope_link": "1 0 0"}
+"""of the joints that move these links; all others lift"""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def urdf(world: World, folder: Path) -> Path:
         limit = f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/>' if limits else ""
         text += (
             f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{at[0]} {at[1]} {at[2]}"/><axis xyz="{AXES.get(name, "0 -1 0")}"/>{limit}</joint>'
+            f'<origin xyz="{at[0]} {at[1]} {at[2]}"/><axis xyz="{AXES.get(child, "0 -1 0")}"/>{limit}</joint>'
         )
         solid = trimesh.creation.box((1e3 * length, 200 * length, 200 * length))
         if "mm_" in world.shape:
@@ -87,7 +89,7 @@ def mjcf(world: World, folder: Path) -> Path:
         length, slides = SIZES[child], kind == "prismatic"
         body = (
             f'<body name="{child}" pos="{at[0]} {at[1]} {at[2]}"><joint name="{name}" range="{limits}" '
-            f'type="{"slide" if slides else "hinge"}" axis="{AXES.get(name, "0 -1 0")}"/><geom type="box" '
+            f'type="{"slide" if slides else "hinge"}" axis="{AXES.get(child, "0 -1 0")}"/><geom type="box" '
             f'size="{length / 2} {length / 10} {length / 10}" pos="{length / 2} 0 0" material="paint" '
             f'mass="{1200 * length**3 / 25}"/>{body}</body>'
         )

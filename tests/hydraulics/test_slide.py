@@ -10,6 +10,10 @@ from recovery import assert_recovered, duties, recover
 import hydroid
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
+from hydroid.fitting.validation import Prediction
+from hydroid.fitting.verdict import judge
+from hydroid.log import Log
+from hydroid.reporting.predictions import validation_page
 from hydroid.settings.fit import FitSettings
 
 CRANE = """<mujoco model="crane"><worldbody><body name="boom" pos="0 0 2">
@@ -29,7 +33,7 @@ PARAMETERS = {
     "area_B": {"quantity": "area_b", "joints": ["telescope"], "bounds": [800, 3500], "start": 1750},
     "delay": {"quantity": "delay", "joints": ["telescope"], "bounds": [0, 0.5], "start": 0.05},
     "M_telescope": {"quantity": "mass", "link": "telescope", "within": 2},
-    "D": {"quantity": "damping", "fixed": 2000},
+    "D": {"quantity": "damping", "joints": ["telescope"], "fixed": 2000},
 }
 
 
@@ -60,6 +64,16 @@ def test_locking_the_boom_leaves_a_mass_on_a_slope(settings: FitSettings) -> Non
     mujoco.mj_forward(locked.model, data)
     assert data.qacc[0] == pytest.approx(-9.81 * np.sin(0.9), rel=1e-9)
     assert data.M[0] == pytest.approx(250)
+
+
+def test_a_reader_meets_millimetres_and_newtons(settings: FitSettings) -> None:
+    assert [p.unit for p in settings.parameter_set().parameters if p.name == "D"] == ["N·s/m"]
+    time, place = np.arange(300) * 0.01, np.zeros((300, 2))
+    log = Log("a.csv", time, np.tile([0.0, 50.0], (300, 1)), place, 0.01)
+    one = Prediction("fit", log, (2,), place[:, [1]] - 0.02)
+    errors = validation_page([one], {"fit": judge(settings, [], {}, [one])}, settings.arm).tables["errors"]
+    row = dict(zip(errors.header, errors.rows[0], strict=True))
+    assert row["rms [deg, mm of joints that slide]"] == pytest.approx(20)
 
 
 def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:

@@ -85,9 +85,9 @@ def perform(task: Task) -> Result:
     refined = sum(r.evaluations for r in result.refinements.values())
     measures = {
         "objective": unit * result.best.overall,
-        "largest error": float(np.abs(angles).max()),
-        "mean absolute error": float(np.abs(angles).mean()),
-        "rms error": float(np.sqrt(np.mean(angles**2))),
+        "largest error": np.abs(angles).max(),
+        "mean absolute error": np.abs(angles).mean(),
+        "rms error": np.sqrt(np.mean(angles**2)),
         "simulations": int(result.history[-1, 2]) + refined,
         "diverged": int(result.history[-1, 3]),
         "seconds": round(sum(result.seconds.values()), 3),

@@ -63,7 +63,7 @@ class _Motion:
             command = self.command(other, late)
             command -= command.mean()
             size = np.linalg.norm(command) * np.linalg.norm(speed)
-            found.append((float(abs(command @ speed) / max(size, TINY)), -late))
+            found.append((abs(command @ speed) / max(size, TINY), -late))
         best, late = max(found)
         return best, -late
 

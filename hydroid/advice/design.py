@@ -58,7 +58,7 @@ def measured(signals: Iterable[tuple[Array, Noise]]) -> Array:
 
 def sensor_noise(settings: DesignSettings, samples: int, period: float) -> Noise:
     """Return the noise of a future log of angles [rad]: white, or a first-order autoregression."""
-    level, time = float(np.radians(settings.noise_deg)), settings.noise_correlation_s
+    level, time = np.radians(settings.noise_deg), settings.noise_correlation_s
     reflection = np.array([-np.exp(-period / time)]) if time > 0 else np.empty(0)
     return Noise(samples, level, reflection, "settings")
 
@@ -183,7 +183,7 @@ class Design:
 
 def weakest(known: Posterior, directions: Array) -> float:
     """Relative standard deviation of the least known of some directions, (p, d)."""
-    return float(np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1]))
+    return np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1])
 
 
 def design(

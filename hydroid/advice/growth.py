@@ -33,7 +33,7 @@ VISIBLE = 3.0
 LARGEST_EFFECT = 0.5
 """rms effect of the change that is tested, in parts of the rms residual: large enough for terms that act
 beyond a threshold, small enough for a derivative"""
-MIN_RESIDUAL = float(np.deg2rad(0.05))
+MIN_RESIDUAL = np.deg2rad(0.05)
 """what the rms residual counts at least [rad]"""
 SHORT = RefinementSettings(iterations=30, gain_tolerance=1e-3)
 """of the refinements from an estimate"""
@@ -136,7 +136,7 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
     values = np.geomspace(high, low, 16) if limit else term.value + parts * (end - term.value)
     residual = known.linear.residual
     effects = term.residuals(problem, known.theta, values.tolist()) - residual
-    unit = max(float(np.sqrt(np.mean(residual**2))), MIN_RESIDUAL)
+    unit = max(np.sqrt(np.mean(residual**2)), MIN_RESIDUAL)
     sizes = np.sqrt(np.mean(effects**2, axis=1)) / unit
     acting = np.flatnonzero(np.isfinite(sizes) & (sizes > 0))
     if not limit:
@@ -149,7 +149,7 @@ def _tested(term: Term, problem: Problem, known: Uncertainty, fit: Explained) ->
             gain = 0.0 if one_sided and score.statistic <= 0 else score.part
             away = values[i] - term.value
             start = values[i] if limit else term.value + np.copysign(away, away * score.amount)
-            scores.append((gain, score, float(np.clip(start, low, high))))
+            scores.append((gain, score, np.clip(start, low, high)))
     if not scores:
         return []
     gain, score, start = max(scores, key=lambda one: one[0])

@@ -93,7 +93,7 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[dict[str, Any]]:
             action |= {"total": len(names), "parameter": str(names[best])}
             action |= {"before_percent": 100 * wide[best], "after_percent": 100 * narrow[best]}
             # by which all deviations shrink on geometric average
-            useful.append((after, float(np.mean(np.log(wide / narrow))), action))
+            useful.append((after, np.mean(np.log(wide / narrow)), action))
     return [action for *_, action in sorted(useful, key=lambda one: one[:2], reverse=True)[:MOST_ACTIONS]]
 
 
@@ -125,7 +125,7 @@ def _forecasts(problem: Problem, known: Uncertainty, now: Posterior) -> Iterator
     simulator = ExperimentSimulator(settings, now)
     gained = [t.gained for _ in range(6) if (t := simulator.trial(draws.draw())) is not None]
     if gained:
-        best = max(gained, key=lambda rows: float(np.sum(np.log(np.diag(now.add(rows).root)))))
+        best = max(gained, key=lambda rows: np.sum(np.log(np.diag(now.add(rows).root))))
         yield "experiment", f"{settings.design.duration_s:g}", best
 
 

@@ -138,5 +138,5 @@ def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Me
     samples = np.flatnonzero(depth)
     for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
         begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
-        when = float(time[begins]), float(time[ends])
-        yield Meeting(*names, *when, float(depth[worst]), float(time[worst]))
+        when = time[begins], time[ends]
+        yield Meeting(*names, *when, depth[worst], time[worst])

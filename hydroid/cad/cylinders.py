@@ -145,7 +145,7 @@ def _polar(joint: Any, point: Array) -> tuple[float, float]:
     axis, away = joint.xaxis, point - joint.xanchor
     x = np.cross([0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0], axis)
     x /= np.linalg.norm(x)
-    across, along = float(away @ np.cross(axis, x)), float(away @ x)
+    across, along = away @ np.cross(axis, x), away @ x
     return math.hypot(across, along), math.atan2(across, along)
 
 
@@ -174,7 +174,7 @@ def _four_bar(joint: Any, pins: Sequence[_Pin]) -> dict[str, Any] | None:
     psi, first, _ = map(float, four_bar(joint.qpos[0], bars))
     if not math.isfinite(psi):
         return None
-    theta = _wrapped(float(np.angle(eye - ground) - np.angle(foot - ground)))
+    theta = _wrapped(np.angle(eye - ground) - np.angle(foot - ground))
     sense = 1.0 if math.sin(theta) * first > 0 else -1.0  # the rod's pin turns with the rocker, by psi
     theta0 = math.degrees(_wrapped(theta - psi))
     theta0 += 360.0 * sense if theta0 * sense < 0 else 0.0  # its sign is the rod's way

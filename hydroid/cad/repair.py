@@ -76,13 +76,13 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
     places = [data.joint(body.joints[0].name).xanchor for body in links]
     before = places[-2] if len(links) > 1 else places[-1] - [1.0, 0.0, 0.0]
     places.append(1.5 * places[-1] - 0.5 * before)
-    longest = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max())
+    longest = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
     for body, (here, there) in zip(links, pairwise(places), strict=True):
         usual, least, most = inertial_of(hulls, model.body(body.name).id), LEAST, MOST
         if usual.mass <= MASSLESS or body.name in lost:
             # a slender link to the next joint; the last one goes on, half as long
             way = data.body(body.name).xmat.reshape(3, 3).T @ (there - here)
-            length, least, most = max(float(np.linalg.norm(way)), 0.4 * longest, 0.1), SLIGHT, np.inf
+            length, least, most = max(np.linalg.norm(way), 0.4 * longest, 0.1), SLIGHT, np.inf
             mass = USUAL * SLENDER * length**3
             usual = Inertial(mass, 0.5 * way, mass * length**2 / 12 * np.eye(3))
         if least <= USUAL * body.mass / usual.mass <= most:
@@ -132,7 +132,7 @@ def inertial_of(model: mujoco.MjModel, body: int) -> Inertial:
     mujoco.mju_quat2Mat(turn, model.body_iquat[body])
     axes = turn.reshape(3, 3)
     tensor = axes * model.body_inertia[body] @ axes.T
-    return Inertial(float(model.body_mass[body]), model.body_ipos[body].copy(), tensor)
+    return Inertial(model.body_mass[body], model.body_ipos[body].copy(), tensor)
 
 
 def set_inertia(body: mujoco.MjsBody, mass: float, centre: Array, tensor: Array) -> None:
@@ -171,4 +171,4 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
 
 def _gyration(tensor: Array, mass: float) -> float:
     """Return the largest radius of gyration [m]."""
-    return float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))
+    return np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass)

@@ -32,7 +32,7 @@ def convert_meshes(
     read = {name: mesh for name, path in files.items() if (mesh := _read_mesh(path, notes)) is not None}
     used = {geom.meshname for geom in spec.geoms}
     sizes = [
-        float(np.max(read[mesh.file].extents * np.abs(mesh.scale)))
+        np.max(read[mesh.file].extents * np.abs(mesh.scale))
         for mesh in spec.meshes
         if mesh.file in read and mesh.name in used
     ]

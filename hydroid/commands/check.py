@@ -78,7 +78,7 @@ def check(
             travels = {joint: motion.travel for joint, motion in driven_joints(log).items()}
             moved = {names[joint - 1]: travel for joint, travel in travels.items()}
             driven = [name for name, one in zip(names, log.driven, strict=True) if one]
-            samples, duration = len(log.time), float(log.duration)
+            samples, duration = len(log.time), log.duration
             ways = (f"{names[j - 1]} by {way(d, slides=j in slides)}" for j, d in travels.items())
             moves = ", ".join(ways) or "nothing"
             sizes.append(f"{path}: {samples} samples, {duration:.2f} s; driven and moved: {moves}")

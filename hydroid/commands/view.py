@@ -88,7 +88,7 @@ def simulate(
     if target:
         write_logs(target, [(log, columns.of_arm(n) if arm else columns) for n, log in logs.items()])
     first, file = next(iter(logs.values())), target and str(target)
-    content = {"out": file, "samples": len(first.time), "duration_s": float(first.duration)}
+    content = {"out": file, "samples": len(first.time), "duration_s": first.duration}
     return Simulated([file] if file else [], content, logs)
 
 
@@ -183,8 +183,8 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     ]
     content = {
         "free": not meetings,
-        "clearance_m": float(result.distance[nearest]),
-        "clearance_at_s": float(result.time[nearest]),
+        "clearance_m": result.distance[nearest],
+        "clearance_at_s": result.time[nearest],
         "clearance_between": [*result.nearest[nearest]],
         "collisions": meetings,
         "checked_pairs": result.checked,

@@ -80,7 +80,7 @@ def _resampled(at: Array, values: Array, grid: Array, *, held: bool) -> Array:
         return hold(at, values[:, None], grid, grid[1])[:, 0]
     after = np.searchsorted(at, grid - 1e-9).clip(1, len(at) - 1)
     # a hole is longer than 0.1 s, or than three usual steps of the topic if these are longer
-    far = np.diff(at)[after - 1] > max(0.1, 3 * float(np.median(np.diff(at))))
+    far = np.diff(at)[after - 1] > max(0.1, 3 * np.median(np.diff(at)))
     between = (grid > at[after - 1] + 1e-9) & (grid < at[after] - 1e-9)
     return np.where(far & between, np.nan, np.interp(grid, at, values))
 

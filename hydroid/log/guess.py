@@ -72,7 +72,7 @@ def guess_columns(
     if time is None:
         hint = f"it has {listed([*filter(None, table.names)], 6)}"
         raise LogError("has no column that looks like a time", where=table.source, hint=hint)
-    step = float(np.nanmedian(np.diff(time.values)))
+    step = np.nanmedian(np.diff(time.values))
     unit = time.unit or likely_time_unit(step) or "s"
     step *= UNITS[unit].factor
     reasons = [f"{time.name}: time in {unit}, {time.why}, every {step:.3g} s"]

@@ -23,18 +23,18 @@ class JointMotion:
     @cached_property
     def travel(self) -> float:
         """Range of its angle but for the noise [deg]."""
-        return float(np.rad2deg(np.ptp(self._slow[1])))
+        return np.rad2deg(np.ptp(self._slow[1]))
 
     @cached_property
     def speed(self) -> float:
         """At which it moves when it moves [rad/s]: what its valves let through."""
-        return float(np.percentile(np.abs(self._quick[2]), 95))
+        return np.percentile(np.abs(self._quick[2]), 95)
 
     @cached_property
     def push(self) -> float:
         """Time integral of its strong commands, past the dead band of a valve [% s]."""
         size = np.abs(self._logged)
-        return float(np.where(size > 30, size, 0.0).sum() * self.log.period)
+        return np.where(size > 30, size, 0.0).sum() * self.log.period
 
     @cached_property
     def directed(self) -> tuple[float, float]:
@@ -43,8 +43,8 @@ class JointMotion:
         command, _, speed = self._slow
         command, steps = command[: len(command) - late], np.rad2deg(speed[late:]) * self.log.period
         strong = np.abs(command) > 0.3 * np.abs(self._logged).max()
-        path = float(np.abs(steps[strong]).sum())
-        against = float(np.abs(steps[strong & (steps * command < 0)]).sum())
+        path = np.abs(steps[strong]).sum()
+        against = np.abs(steps[strong & (steps * command < 0)]).sum()
         return (path, against / path) if path >= LEAST_PATH else (path, 0.0)
 
     @property
@@ -61,7 +61,7 @@ class JointMotion:
     @cached_property
     def likely_lag(self) -> float:
         """At which its speed correlates best with its command [s], from 0 to 0.8."""
-        return float(self._following.argmax() * self.log.period)
+        return self._following.argmax() * self.log.period
 
     @cached_property
     def ahead(self) -> float:
@@ -73,7 +73,7 @@ class JointMotion:
             return 0.0
         period = self.log.period
         before = _correlations(self._quick[2], self._logged, round(0.5 / period) + 1)
-        best, most = float(before.argmax() * period), before.max()
+        best, most = before.argmax() * period, before.max()
         clear = most > 0.8 and 1 - most**2 < 0.75 * (1 - self._following.max() ** 2)
         return best if clear and 0.02 < best < 0.5 - period / 2 else 0.0
 
@@ -103,7 +103,7 @@ class JointMotion:
         at = (angle - angle.min()) / np.ptp(angle)
         ends = ((at > 0.98) & (push > 0)) | ((at < 0.02) & (push < 0))
         enough = 0.99 * np.median(np.abs(command[fast > 0.1]))
-        return float((ends & (fast < 0.03) & (np.abs(command) > enough)).sum() * self.log.period)
+        return (ends & (fast < 0.03) & (np.abs(command) > enough)).sum() * self.log.period
 
     @property
     def _logged(self) -> Array:

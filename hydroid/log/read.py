@@ -124,7 +124,7 @@ def map_signals(settings: LogSettings, ranges: Array) -> list[Signal]:
 
 def angle_margin(low: float, high: float) -> float:
     """Return how far angles may lie outside a range [rad]: sensors are noisy at stops, and ranges rough."""
-    return max(float(np.deg2rad(1.0)), 0.02 * (high - low))
+    return max(np.deg2rad(1.0), 0.02 * (high - low))
 
 
 def _match(

@@ -21,7 +21,7 @@ GAP = 1.95
 def sample_period(time: Array) -> float:
     """Return the usual step between samples [s]; NaN where there is none."""
     steps = np.diff(time[~np.isnan(time)])
-    return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
+    return np.median(steps[steps > 0]) if (steps > 0).any() else np.nan
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:

@@ -103,7 +103,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
         unseen = np.radians(left_out.get(f"q{joint}", ()))
         wrong = max(np.mean(unseen**2) - np.mean(variance + noise**2), 0.0) if unseen.size else 0.0
-        widened = wrong * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
+        widened = wrong * (student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
         variance = variance + np.sum(start[joint] ** 2, axis=0)
         few = np.vstack([parts[:, :, column], start[joint]])
         square = np.sum((few @ few.T / few.shape[1]) ** 2) + widened**2
@@ -121,7 +121,7 @@ def _band(
     """
     variance = variance + noise**2
     half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
-    inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
+    inside, rms = np.mean(np.abs(error) <= half), np.sqrt(np.mean(error**2))
     return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong))
 
 
@@ -135,7 +135,7 @@ def _limit(mean: float, square: float) -> float:
     if not np.isfinite(mean):
         return np.inf
     freedom = mean**2 / max(square, 1e-3 * mean**2)
-    return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
+    return np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom)
 
 
 def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:

@@ -80,7 +80,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
             if deviance > THRESHOLD or value == bound:
                 break
             near = deviance
-        ends.append(float(crossing))
+        ends.append(crossing)
     return Profile(name, (ends[0], ends[1]), lowest)
 
 

@@ -64,7 +64,7 @@ def make_channels(
             signals.append((i, joint + 1, "angle", column, log.angle[:, joint], weight))
         for column, joint in enumerate(pressures[i]):
             assert log.pressure is not None
-            weight = float(np.deg2rad(objective.pressure_weight)) / 1e5  # deg/bar -> rad/Pa
+            weight = np.deg2rad(objective.pressure_weight) / 1e5  # deg/bar -> rad/Pa
             for side, quantity in enumerate(SIDES):
                 measured = log.pressure[:, joint, side]
                 if not np.isnan(measured[0]):

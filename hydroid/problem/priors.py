@@ -142,7 +142,7 @@ def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _
         return None
     width = np.where(free, parameters.upper - parameters.lower, 0.0)
     step = factors * width**2 / np.sum((factors * width) ** 2)
-    sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
+    sd = prior.sd or CONSTRAINT_SD * (np.abs(factors) @ width)
     if prior.ratio is None:
         return _Combination(name, factors, prior.value, sd, None, step)
     divisor = names.index(prior.ratio[1])

@@ -103,7 +103,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
     lines, alike, volumes = list[str](), list[str](), list[float]()
     outputs = range(1, len(arm.joints) + 1) if layout is None else layout.outputs
     flows = {joint: 0.06 * sizes[joint - 1].displacement * sizes[joint - 1].speed for joint in outputs}
-    middle = float(np.median([*flows.values()]))
+    middle = np.median([*flows.values()])
     for joint in outputs:
         name, size, own = arm.joint_names[joint - 1], sizes[joint - 1], arm.joints[joint - 1]
         motion = layout.motions.get(joint) if layout else None

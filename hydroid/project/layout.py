@@ -92,8 +92,8 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
     """Yield what a user should know of a joint and its angles in the log."""
     angle, (path, against) = motion.log.angle[:, motion.joint - 1], motion.directed
-    what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", float(np.degrees(1)))
-    low, high, margin = float(angle.min()), float(angle.max()), angle_margin(*joint.limits)
+    what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", np.degrees(1))
+    low, high, margin = angle.min(), angle.max(), angle_margin(*joint.limits)
     if not joint.continuous and (low < joint.limits[0] - margin or high > joint.limits[1] + margin):
         yield (
             f"{joint.name}: {what} in the log run from {low * factor:.4g} to {high * factor:.4g} {unit}, but "

@@ -64,7 +64,7 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
         speed = max(speeds.get(joint, 0.5), 0.01)
         oil, own, lever = 1e6 * most / pressure, arm.joints[joint - 1], 0.0
         if isinstance(own.actuator, LinearActuator):
-            lever = float(np.abs(own.actuator.moment_arm(np.linspace(*own.limits, 50))).mean())
+            lever = np.abs(own.actuator.moment_arm(np.linspace(*own.limits, 50))).mean()
         sizes.append(
             JointSize(oil, oil * speed / through, most / speed, speed, oil / lever if lever else 0.0)
         )

@@ -74,7 +74,7 @@ def _view(axes: Axes, arm: Arm, data: Any, outlines: Sequence[Shape], poses: Arr
             bodies = [model.body_parentid[child], child]
             ends = placed(np.array(joint.actuator.pivots)[:, None], poses[bodies])[:, 0]
             axes.plot(*(ends @ onto).T, "o-", color="black", lw=3, ms=4)
-    size = 0.12 * float(np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1)
+    size = 0.12 * (np.ptp(data.xipos[1:], axis=0).max() + np.ptp(data.xanchor, axis=0).max() + 0.1)
     for number, (joint, at, axis) in enumerate(zip(arm.joints, data.xanchor, data.xaxis, strict=True)):
         sense = "turns counter-clockwise" if axis @ ahead < 0 else "turns clockwise"
         sense = "slides along the line" if joint.slides else sense

@@ -103,7 +103,7 @@ def _fitted(
     """Return the picture's size, and poses (F, parts, 2, 4) in its units, with the arm always inside."""
     corners = [shape.placed(pose).reshape(-1, 2) for pose in seen.values() for shape in outlines]
     low, high = (end(np.concatenate(corners), axis=0) for end in (np.min, np.max))
-    scale = (_SIZE - 2 * _MARGIN) / float(max(high - low))
+    scale = (_SIZE - 2 * _MARGIN) / max(high - low)
     width, height = (scale * (high - low) + 2 * _MARGIN).round().astype(int).tolist()
     fitted: dict[str, list[Array]] = {}
     for name, pose in seen.items():

@@ -91,10 +91,10 @@ def draw_response(
     upper = [Mark("line", log.time, measured, color="ink", label="measured", width=5, alpha=0.35)]
     middle = [ZERO]
     # a response that runs away, by three ranges of the measured angle, must not flatten the others
-    far = 3.0 * max(float(np.ptp(measured)), 1.0)
+    far = 3.0 * max(np.ptp(measured), 1.0)
     for i, (one, color) in enumerate(zip(several, cycle(SERIES), strict=False)):
         residual, name, time = factor * finite(one.error(joint)), short_name(one.fit), one.log.time
-        rms = float(np.sqrt(np.mean(residual**2)))
+        rms = np.sqrt(np.mean(residual**2))
         label = f"{name} ({number(rms)} {unit} rms)" if np.isfinite(rms) else f"{name} (diverged)"
         residual[np.abs(residual) > far] = np.nan
         angle = factor * one.log.angle[:, column] - residual
@@ -104,7 +104,7 @@ def draw_response(
             half = factor * band.half
             useless = ", wider than the motion" if np.mean(2 * half) > np.ptp(measured) else ""
             # nor must a band that the parameters leave open
-            half = np.fmin(half, 2.0 * float(np.nanmax(np.abs(residual), initial=1e-6)))
+            half = np.fmin(half, 2.0 * np.nanmax(np.abs(residual), initial=1e-6))
             label = f"95 % band of {name}{useless}"
             middle.insert(0, Mark("band", time, -half, half, color=color, label=label, alpha=0.18, off=i > 0))
     panels = [

@@ -157,7 +157,7 @@ class LinearModel:
     def gain(self, s: Array) -> float:
         """Part of the cost that the linear model promises to save by a step."""
         after = self._right + self._triangle @ s
-        return 0.5 * float(self._right @ self._right - after @ after)
+        return 0.5 * (self._right @ self._right - after @ after)
 
     def reach(self, s: Array) -> Array:
         """Return the point of the box that a step leads to, shape (p,)."""

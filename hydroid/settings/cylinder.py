@@ -124,7 +124,7 @@ def _triangle(ends: Array, axis: Array) -> Triangle:
     if min(a, b) < 1e-6:
         which = "parent" if a < 1e-6 else "child"
         raise ValueError(f"the pivot on the {which} lies on the joint's axis, so it has no moment arm")
-    length, skew = float(np.linalg.norm(near - far)), float(np.ptp(heights))
+    length, skew = np.linalg.norm(near - far), np.ptp(heights)
     if skew > 0.1 * length:  # the triangle is flat, and errs by half the square of this part
         raise ValueError(
             f"its pivots lie {skew:.4g} m apart along the joint's axis and {length:.4g} m across it; "

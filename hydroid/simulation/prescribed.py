@@ -46,7 +46,7 @@ class Prescribed:
         columns: Index,
         settings: SimulationSettings,
     ) -> None:
-        armature = max(ARMATURE, HEAVIEST * float(model.dof_M0.max()))
+        armature = max(ARMATURE, HEAVIEST * model.dof_M0.max())
         model.dof_armature[columns] = armature
         model.qpos_spring[columns] = 0.0
         model.jnt_limited[columns] = False  # the machine's own stops are in the log

@@ -88,7 +88,7 @@ def render_motion(
         SettingsError: a span without time.
         RunError: this machine cannot render, or cannot write films.
     """
-    begin, end = max(span[0], 0.0), min(span[1], float(motion.time[-1]))
+    begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:
         what = f"{span[0]:g}:{span[1]:g} s holds nothing of a motion of {motion.time[-1]:g} s"
         raise SettingsError(what, where="--span", hint="write FROM:TO in seconds")

@@ -53,7 +53,7 @@ def simulated_motion(model: IdentifiedModel, logs: Mapping[str, Log]) -> Motion:
     rest, error = arm.pose(model.settings.start_pose), np.concatenate(errors)
     moved = {side: log.angle for side, log in logs.items() if _moves(log.angle).any()}
     measured = machine.joined(simulated | moved, rest) if moved else None
-    rms = float(np.degrees(np.sqrt(np.mean(error**2)))) if error.size else np.nan
+    rms = np.degrees(np.sqrt(np.mean(error**2))) if error.size else np.nan
     return Motion(machine, first.time, machine.joined(simulated, rest), measured, rms)
 
 
@@ -123,7 +123,7 @@ class Replay:
         """Go on to the sample before `until` [s]."""
         motion = self._motion
         sample = max(0, int(np.searchsorted(motion.time, until + 1e-9)) - 1)
-        self.time = self.data.time = float(motion.time[sample])
+        self.time = self.data.time = motion.time[sample]
         place(self.model, self.data, motion.simulated[sample])
         if self.ghost is not None and motion.measured is not None:
             place(self.model, self.ghost, motion.measured[sample])

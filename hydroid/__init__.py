@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hydroid.commands.adapt import adapt as adapt
     from hydroid.commands.analyse import QuantityResult as QuantityResult
     from hydroid.commands.analyse import analyse as analyse
     from hydroid.commands.analyse import quantity as quantity
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from hydroid.commands.logs import read_logs as read_logs
     from hydroid.commands.plan import design as design
     from hydroid.commands.plan import suggest as suggest
+    from hydroid.commands.stages import adapt as adapt
     from hydroid.commands.stages import fit_hyd as fit_hyd
     from hydroid.commands.stages import fit_mech as fit_mech
     from hydroid.commands.study import study as study

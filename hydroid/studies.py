@@ -32,7 +32,7 @@ from hydroid.fitting.fit import fit
 from hydroid.log import Log
 from hydroid.problem.problem import Problem
 from hydroid.progress import NOTE, Progress
-from hydroid.run.identity import deciding, model_hash, samples_hash
+from hydroid.run.folder import deciding, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load

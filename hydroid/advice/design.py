@@ -34,8 +34,8 @@ from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Problem, make_simulation
 from hydroid.progress import Progress, no_progress
 from hydroid.search.axes import differentiate
-from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.search import DesignSettings
 
 PRIOR_SD = 1.0
 """relative standard deviation that a forecast assumes of every parameter at most (ours): a fit's own prior is

@@ -15,8 +15,8 @@ from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.arm import Arm
-from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.search import DesignSettings
 
 
 class Input(NamedTuple):

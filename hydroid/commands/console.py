@@ -19,8 +19,7 @@ from hydroid.errors import HydroidError
 from hydroid.progress import logging_to
 
 if TYPE_CHECKING:
-    from hydroid.reporting.page import Page
-    from hydroid.reporting.table import Table
+    from hydroid.reporting.page import Page, Table
 
 OPTIONS = {
     "search.algorithm": "--algorithm",

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hydroid.fitting.verdict import Baselines
     from hydroid.plant import Plant
     from hydroid.problem.problem import Problem, Spread
-    from hydroid.reporting.table import Table
+    from hydroid.reporting.page import Table
     from hydroid.run.folder import RunFolder
 
 

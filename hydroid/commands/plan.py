@@ -85,7 +85,7 @@ def suggest(
     problem = problem_of(model, logs, repair=repair)
     from hydroid.advice.suggestions import advice
     from hydroid.posterior.uncertainty import uncertainty
-    from hydroid.reporting.table import Table
+    from hydroid.reporting.page import Table
 
     folder = Path(model.source).parent
     run = str(folder) if is_file(folder / CONFIG) else "RUN"
@@ -151,7 +151,7 @@ def design(
     from hydroid.advice.design import design as best_experiment
     from hydroid.log import write_log
     from hydroid.posterior.uncertainty import flag_of
-    from hydroid.reporting.table import Table
+    from hydroid.reporting.page import Table
 
     settings = model.settings
     with Progress() as progress:

@@ -47,7 +47,7 @@ def study(
     path, folder = Path(file), Path(out)
     load(path, StudySettings)  # a wrong file is refused before anything heavy is imported
     from hydroid.estimate import finite
-    from hydroid.reporting.table import Table
+    from hydroid.reporting.page import Table
     from hydroid.run.process import locked
     from hydroid.studies import processes as open_processes
     from hydroid.studies import run_study

@@ -73,7 +73,7 @@ def validate(
     from hydroid.reporting.page import unique
     from hydroid.reporting.predictions import validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
-    from hydroid.run.identity import log_hash
+    from hydroid.run.folder import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
 
     stated = {} if tolerance is None else {"tolerance_deg": tolerance}
@@ -158,7 +158,7 @@ def report(
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())
     from hydroid.reporting.parameters_report import merged_tables
-    from hydroid.run.collection import read_runs
+    from hydroid.run.record import read_runs
 
     collected = read_runs([str(run) for run in as_list(runs)], out)
     tables, best = merged_tables(collected), min(collected, key=lambda run: run.rms_deg)

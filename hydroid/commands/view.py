@@ -158,8 +158,8 @@ def view(
         write_atomic(Path(out), film)
         return Result([str(out)], {"out": str(out)}, None)
     from hydroid.plant import Plant
+    from hydroid.viewer.film import show
     from hydroid.viewer.motion import Replay, Sliders
-    from hydroid.viewer.window import show
 
     with suppress(KeyboardInterrupt):  # as good as closing the window
         every = range(1, 1 + len(model.settings.arm.joints))

@@ -17,7 +17,7 @@ from hydroid.posterior.identifiability import Identifiability, identifiability
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
-from hydroid.problem.objectives import overall_objective, segment_objectives
+from hydroid.problem.channels import overall_objective, segment_objectives
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.search.descent import Descent
 from hydroid.search.pareto import average, best, non_dominated, utopia

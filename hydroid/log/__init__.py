@@ -4,9 +4,8 @@ from hydroid.log.checks import motion_findings
 from hydroid.log.guess import ColumnGuess, guess_columns
 from hydroid.log.log import Log, LogFinding, grouped
 from hydroid.log.motion import JointMotion, driven_joints, motion_of
-from hydroid.log.read import check_log, open_table
+from hydroid.log.read import check_log, open_table, write_log, write_logs
 from hydroid.log.table import Table
-from hydroid.log.write import write_log, write_logs
 
 __all__ = [
     "ColumnGuess",

@@ -20,10 +20,9 @@ from hydroid.identified_model import IdentifiedModel, write_settings
 from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
-from hydroid.simulation.chain import Chain
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
-from hydroid.simulation.scenario import model_values
+from hydroid.simulation.scenario import Chain, model_values
 
 
 class Plant:

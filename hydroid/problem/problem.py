@@ -19,8 +19,13 @@ from hydroid.arrays import Array, Ints
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
-from hydroid.problem.channels import Channel, make_channels
-from hydroid.problem.objectives import overall_objective, segment_bounds, segment_objectives
+from hydroid.problem.channels import (
+    Channel,
+    make_channels,
+    overall_objective,
+    segment_bounds,
+    segment_objectives,
+)
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response, Simulation

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from hydroid.project.arm_file import JointSize
 from hydroid.project.layout import Layout
-from hydroid.project.sizes import JointSize
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 

@@ -15,10 +15,9 @@ from hydroid.cad.shapes import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, arm_text
+from hydroid.project.arm_file import LIFT, TEMPLATE_FILE, TEMPLATE_MODEL, JointSize, arm_text, joint_sizes
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
-from hydroid.project.sizes import LIFT, JointSize, joint_sizes
 from hydroid.reporting.arm_chart import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml

@@ -10,7 +10,7 @@ from hydroid.findings import Finding
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.reporting import page_file
-from hydroid.reporting.page import Page, Section
+from hydroid.reporting.page import Page, Section, numbers_csv
 from hydroid.reporting.parameters_report import (
     parameter_section,
     quantity_section,
@@ -20,7 +20,6 @@ from hydroid.reporting.parameters_report import (
 )
 from hydroid.reporting.predictions import prediction_sections
 from hydroid.reporting.search_report import search_section
-from hydroid.reporting.table import numbers_csv
 from hydroid.reporting.verdict_table import lead, next_step, verdict_section
 from hydroid.run.record import Record, load_record
 

@@ -18,8 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hydroid.files import write_atomic
 from hydroid.reporting.chart import Chart
-from hydroid.reporting.page import Page
-from hydroid.reporting.table import Table
+from hydroid.reporting.page import Page, Table
 
 
 def write_page(page: Page, out: Path) -> list[Path]:

@@ -12,8 +12,7 @@ from hydroid.parameters import Parameter
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.quantity_table import CHOICES
 from hydroid.reporting.chart import Chart, Mark, Panel
-from hydroid.reporting.page import Plot, Section
-from hydroid.reporting.table import Given, Table
+from hydroid.reporting.page import Given, Plot, Section, Table
 from hydroid.run.record import Record
 from hydroid.settings.fit import FitSettings
 from hydroid.words import number

@@ -11,8 +11,7 @@ from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import rms_deg
 from hydroid.reporting.chart import SERIES, ZERO, Chart, Mark, Panel, finite
 from hydroid.reporting.moving_arm import motion_section
-from hydroid.reporting.page import Page, Plot, Section, Tab, log_names, short_name
-from hydroid.reporting.table import Table
+from hydroid.reporting.page import Page, Plot, Section, Tab, Table, log_names, short_name
 from hydroid.reporting.verdict_table import Verdicts, horizon_section, lead, verdict_section
 from hydroid.settings.arm import Arm
 from hydroid.words import number

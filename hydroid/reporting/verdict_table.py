@@ -9,8 +9,7 @@ from hydroid.estimate import JointVerdict
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.validation import HORIZONS
-from hydroid.reporting.page import Section, short_name
-from hydroid.reporting.table import Cell, Given, Table, shown
+from hydroid.reporting.page import Cell, Given, Section, Table, short_name, shown
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed
 

@@ -6,18 +6,22 @@
 A validation stores each unseen log as VALIDATIONS/NAME/result.npz in the folder of the run.
 """
 
+import glob
+import logging
 import math
+import os
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from hydroid.arrays import Array
-from hydroid.errors import RunError
+from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
 from hydroid.fitting.fit import Fit
@@ -25,7 +29,7 @@ from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines
 from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.run.archive import pack, unpack
-from hydroid.run.folder import RunFolder
+from hydroid.run.folder import RunFolder, difference
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 
@@ -195,3 +199,57 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     # inside a tuple: pydantic takes a configuration for no dataclass by itself
     one: Any = tuple.__class_getitem__((kind,))
     return TypeAdapter(one, config=ConfigDict(arbitrary_types_allowed=True))
+
+
+_log = logging.getLogger(__name__)
+
+
+def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
+    """Read finished runs that differ in nothing but their seeds; those that are not finished are left out.
+
+    Args:
+        names: run folders, or patterns of them, in any order.
+        out: the folder for what is to be written about them, if anything is.
+
+    Returns:
+        One run for each seed, in the order of the seeds.
+
+    Raises:
+        RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
+    """
+    if out is not None and RunFolder(Path(out)).exists:
+        raise RunError("is a run itself", where=out, hint="name another folder")
+    runs: list[Record] = []
+    groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
+    for path in sorted({path for group in groups for path in group}):
+        try:
+            runs.append(_read(path))
+        except HydroidError as error:
+            _log.warning("left out: %s", error)
+    if not runs:
+        hint = "resume those that were stopped"
+        raise RunError("no finished run is there", where=" ".join(names), hint=hint)
+    runs.sort(key=lambda run: run.seed)
+    for before, run in pairwise(runs):
+        other = difference(run.identity, before.identity, but="search.seed")
+        if run.seed == before.seed:
+            other = f"has seed {run.seed}, as {before.folder} has"
+        if other:
+            raise RunError(other, where=run.folder, hint="leave it out, or merge it apart")
+    return tuple(runs)
+
+
+def _read(path: str) -> Record:
+    """Read a finished run.
+
+    Raises:
+        HydroidError: it is not finished or is damaged.
+    """
+    folder = RunFolder(Path(path))
+    if (status := folder.identity().get("status")) != "done":
+        raise RunError(f"is not finished ({status})", where=path, hint="resume it")
+    folder.refuse_changes()
+    record = load_record(path)
+    if record.summary.rms_deg is None:
+        raise RunError("has no final estimate that could be simulated", where=path)
+    return record

@@ -9,13 +9,12 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import Arm, load_arm
-from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import JointNumber, Positive, Settings, validate
 from hydroid.settings.log import LogSettings
 from hydroid.settings.parameters import expanded, make_parameter
 from hydroid.settings.problem import ObjectiveSettings, ParameterSettings, PriorSettings, SimulationSettings
-from hydroid.settings.search import RefinementSettings, SearchSettings
+from hydroid.settings.search import DesignSettings, RefinementSettings, SearchSettings
 
 
 def _read_arm(value: Any, info: ValidationInfo) -> Any:

@@ -1,7 +1,7 @@
 """One log simulated for populations of candidates.
 
 Stage 1 takes the hydraulics for a gain, tau = K u + tau0 on every driven joint (article section 3), stage 2
-steps the whole chain from command to torque on every active joint (`hydroid.simulation.chain`). Every
+steps the whole chain from command to torque on every active joint (`hydroid.simulation.scenario`). Every
 candidate starts at rest in the log's first pose, in static balance with gravity: its springs are slack there,
 and its oil, or in stage 1 a constant torque tau0 = g(q0), holds it. Each is rolled out by compiled code, as
 many at a time as there are threads; candidates are independent, and no number of threads changes a bit.
@@ -20,10 +20,9 @@ from hydroid.hydraulics.actuator import Observation, observe
 from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
-from hydroid.simulation.chain import Chain
 from hydroid.simulation.quasi_static import roll_quasi_static
 from hydroid.simulation.rollout import Course, Record, SteppedArm, compile_rollout, roll
-from hydroid.simulation.scenario import Candidates, Response, Scenario
+from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario
 
 Follow = Callable[[SteppedArm, int], tuple[Array, Observation | None]]
 """simulates one of n candidates: angles of the moving joints [rad], (1 + T, V), and what its actuators do"""

@@ -12,8 +12,8 @@ from hydroid.errors import SettingsError
 from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.settings.experiment import DesignSettings
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.search import DesignSettings
 
 THETA = np.array(list(TRUTH.values()))
 DESIGN = {"duration_s": 6, "effort": 24, "dwell_s": [0.5, 2], "poses": "any"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hydroid.advice.score import Explained, holm
+from hydroid.advice.growth import Explained, holm
 from hydroid.posterior.noise import Noise, fit_noise
 
 SAMPLES = 1000

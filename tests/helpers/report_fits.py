@@ -17,8 +17,7 @@ from hydroid.posterior.linear import Linear, estimate_box
 from hydroid.posterior.noise import problem_noise
 from hydroid.posterior.quantities import Quantities
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty_from
-from hydroid.problem.channels import make_channels
-from hydroid.problem.objectives import overall_objective, segment_objectives
+from hydroid.problem.channels import make_channels, overall_objective, segment_objectives
 from hydroid.problem.priors import Priors
 from hydroid.problem.problem import Evaluation, Problem
 from hydroid.run.record import Record, fit_result

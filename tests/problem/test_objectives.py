@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hydroid.errors import SettingsError
-from hydroid.problem.objectives import norm, overall_objective, segment_bounds, segment_objectives
+from hydroid.problem.channels import norm, overall_objective, segment_bounds, segment_objectives
 from hydroid.settings.problem import ObjectiveSettings
 
 ORDERS = [1, 2, "inf"]

@@ -8,9 +8,8 @@ from report_fits import MODEL, make_fit, make_problem, make_uncertainty
 
 from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
-from hydroid.reporting.page import log_names
+from hydroid.reporting.page import Table, log_names
 from hydroid.reporting.parameters_report import parameter_table
-from hydroid.reporting.table import Table
 
 
 def column(table: Table, name: str) -> list:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hydroid.reporting.table import Given, Table
+from hydroid.reporting.page import Given, Table
 from hydroid.words import number
 
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc",)), max_size=30)

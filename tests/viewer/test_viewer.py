@@ -16,9 +16,8 @@ from hydroid.identified_model import IdentifiedModel, load_identified
 from hydroid.log import Log
 from hydroid.plant import Plant
 from hydroid.viewer import film
-from hydroid.viewer.film import Stage
+from hydroid.viewer.film import LATE, Stage, play
 from hydroid.viewer.motion import Motion, Replay, Sliders, simulated_motion
-from hydroid.viewer.window import LATE, play
 
 SHOULDER = 1
 

@@ -6,9 +6,9 @@ term. The best few are then really freed: least squares goes on from the estimat
 once without each part of them, on which the result is judged. A term that only follows the noise loses there.
 
 The score test: let r be the residual of a least-squares fit and d the change of the residual with a quantity
-that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is projected off their
-effects, with the priors as further residuals: d' = d - U' U d with orthonormal rows U. The statistic is the
-score of C. R. Rao (1948), robust to autocorrelated noise of covariance S (H. White, 1982):
+that the fit holds. What the free parameters can do as well as d, the fit has done already. So d is projected
+off their effects, with the priors as further residuals: d' = d - U' U d with orthonormal rows U. The
+statistic is the score of C. R. Rao (1948), robust to autocorrelated noise of covariance S (H. White, 1982):
 
     z = -d' r / sqrt(d' S d').
 

@@ -1,4 +1,4 @@
-"""Settings of the searches: defaults are the article's table 5, and ours where it is silent; and of designs."""
+"""Settings of the searches, by default the article's table 5, and ours where it is silent; and of designs."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""A motion on the screen, as a film or as a picture: the simulated machine over the measured one, its ghost."""
+"""A motion on the screen, as a film or a picture: the simulated machine over the measured one, its ghost."""
 
 import io
 import os

@@ -177,7 +177,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
 
 def _store(folder: "RunFolder", result: FitResult) -> Path:
     """Write a finished fit to its folder; return the page."""
-    from hydroid.reporting.fit_report import draw
+    from hydroid.reporting.predictions import draw
     from hydroid.run.record import fit_result, save_result
 
     began = time.monotonic()

@@ -69,9 +69,8 @@ def validate(
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.validation import predicted
     from hydroid.fitting.verdict import judge
-    from hydroid.reporting.fit_report import draw
     from hydroid.reporting.page import unique
-    from hydroid.reporting.predictions import validation_page
+    from hydroid.reporting.predictions import draw, validation_page
     from hydroid.reporting.verdict_table import next_lines, next_step, ordered, verdict_lines
     from hydroid.run.folder import log_hash
     from hydroid.run.record import fitted_by, keep_validation, run_of
@@ -153,7 +152,7 @@ def report(
             seeds, or the page cannot be written.
     """
     if not merge:
-        from hydroid.reporting.fit_report import draw
+        from hydroid.reporting.predictions import draw
 
         files = [str(draw(run, figures=figures)) for run in as_list(runs)]
         return Result(files, {"files": files}, ())

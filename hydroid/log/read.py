@@ -13,8 +13,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import write_atomic
-from hydroid.log.arrays import open_mat, open_parquet
-from hydroid.log.bag import open_bag
+from hydroid.log.binary import open_bag, open_mat, open_parquet
 from hydroid.log.checks import check_motion, check_recording
 from hydroid.log.csv import open_csv
 from hydroid.log.log import Log, LogFinding, log_finding

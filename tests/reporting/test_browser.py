@@ -12,9 +12,8 @@ import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.fitting.verdict import judge
-from hydroid.reporting.fit_report import fit_page
 from hydroid.reporting.page_file import write_page
-from hydroid.reporting.predictions import validation_page
+from hydroid.reporting.predictions import fit_page, validation_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")

@@ -10,8 +10,7 @@ from report_fits import make_problem
 from hydroid.arm.model import load_model
 from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
-from hydroid.reporting.moving_arm import MOST, VIEW, MovingArm, motion_section, moving_arm
-from hydroid.reporting.outlines import sight
+from hydroid.reporting.outlines import MOST, VIEW, MovingArm, motion_section, moving_arm, sight
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 ARM = PROBLEM.settings.arm

@@ -16,10 +16,9 @@ from hydroid.errors import RunError
 from hydroid.estimate import JointVerdict
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
-from hydroid.reporting.fit_report import fit_page
 from hydroid.reporting.page import Page, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page
-from hydroid.reporting.predictions import validation_page
+from hydroid.reporting.predictions import fit_page, validation_page
 from hydroid.reporting.verdict_table import horizon_section, next_step, ordered, verdict_table, worst
 
 HOSTILE = "<b>&_%$.csv"

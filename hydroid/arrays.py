@@ -7,5 +7,4 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
-Structs = NDArray[np.void]
-"""of a structured type"""
+Structs = NDArray[np.void]  # of a structured type

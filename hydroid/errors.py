@@ -6,8 +6,7 @@ hydroid and keeps its traceback.
 
 from functools import partial
 
-LONGEST = 1500
-"""largest length of a message, in characters"""
+LONGEST = 1500  # largest length of a message, in characters
 
 
 class HydroidError(Exception):

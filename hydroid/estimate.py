@@ -13,8 +13,7 @@ from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
 from hydroid.settings.load import Settings, load
 
-NAME = "estimate.yaml"
-"""name of the file in a run folder and beside a saved plant"""
+NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
 
 
 class ParameterEstimate(Settings):
@@ -198,11 +197,7 @@ class FitSummary(Settings):
 
 
 def write_estimate(folder: Path, summary: FitSummary) -> None:
-    """Write `estimate.yaml`.
-
-    Raises:
-        RunError: the folder cannot be written.
-    """
+    """Write `estimate.yaml`; raises RunError: the folder cannot be written."""
     one_line_a_list: Any = {"default_flow_style": None, "width": 110}
     text = yaml.safe_dump(summary.plain(), sort_keys=False, allow_unicode=True, **one_line_a_list)
     write_atomic(folder / NAME, text)

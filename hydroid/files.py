@@ -14,8 +14,7 @@ from typing import Literal
 
 from hydroid.errors import RunError, SettingsError
 
-PART = ".part"
-"""suffix of a file that is being written"""
+PART = ".part"  # suffix of a file that is being written
 
 _log = logging.getLogger(__name__)
 
@@ -31,9 +30,7 @@ def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) 
         content: its content; text is written as UTF-8.
         keep: path in the same folder to which the old file, if any, is moved first. After a crash between the
             two renamings only this file exists.
-
-    Raises:
-        RunError: the folder cannot be written, or the disk is full.
+    Raises RunError: the folder cannot be written, or the disk is full.
     """
     with undisturbed():
         _write(path, content.encode() if isinstance(content, str) else content, keep)
@@ -129,9 +126,7 @@ def find_config(
         name: a path, or the name of a shipped config with or without `.yaml`.
         beside: folder in which a relative path is looked up first.
         kind: config of a fit, or file of an arm; decides which names the error lists.
-
-    Raises:
-        SettingsError: no such file, with the names of the shipped configs.
+    Raises SettingsError: no such file, with the names of the shipped configs.
     """
     shipped = assets() / "configs"
     folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]

@@ -15,8 +15,7 @@ from hydroid.settings.load import load
 
 CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
 """the files of a folder that `load_identified` reads, beside the estimate"""
-PAIR = "model/pair.xml"
-"""the machine of two arms"""
+PAIR = "model/pair.xml"  # the machine of two arms
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +62,7 @@ class IdentifiedModel:
 
 def identified(settings: FitSettings, values: Mapping[str, Any], source: str) -> IdentifiedModel:
     """Return the model of some settings at parameters by name; a fixed parameter may be left out.
-
-    Raises:
-        SettingsError: a name that does not exist or is missing, or a value that is not allowed.
+    Raises SettingsError: a name that does not exist or is missing, or a value that is not allowed.
     """
     return IdentifiedModel(settings, settings.parameter_set().vector(values, source), source)
 
@@ -115,9 +112,7 @@ def start_values(settings: FitSettings) -> IdentifiedModel:
 
 def write_settings(folder: Path, settings: FitSettings) -> None:
     """Write the settings, the arm and its models to a folder, so that it can be read anywhere.
-
-    Raises:
-        RunError: the folder cannot be written, or a mesh cannot be read.
+    Raises RunError: the folder cannot be written, or a mesh cannot be read.
     """
     from hydroid.mjcf import copy_models  # imports MuJoCo
 

@@ -41,9 +41,7 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
 
 def copy_models(models: Mapping[str, Path], folder: Path) -> None:
     """Write MJCFs by their new names, with their meshes, to a folder that stands alone.
-
-    Raises:
-        RunError: a mesh cannot be read, or the folder cannot be written.
+    Raises RunError: a mesh cannot be read, or the folder cannot be written.
     """
     kept: dict[str, bytes] = {}
     for name, path in models.items():

@@ -144,9 +144,7 @@ class ParameterSet:
 
     def vector(self, values: Mapping[str, object], source: str) -> Array:
         """Return theta, shape (P,), from values by name; a fixed parameter may be left out.
-
-        Raises:
-            SettingsError: an unknown or a missing name, or a value that is not a number from 0.
+        Raises SettingsError: an unknown or a missing name, or a value that is not a number from 0.
         """
         unknown = [name for name in values if name not in self.names]
         if unknown:

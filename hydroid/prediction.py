@@ -19,9 +19,7 @@ from hydroid.simulation import Response
 
 def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     """Return the angles [rad] of some joints, numbered from 1, for a log's commands, shape (T, K).
-
-    Raises:
-        RunError: the simulation diverged.
+    Raises RunError: the simulation diverged.
     """
     return _respond(model, log, joints).angle[0]
 
@@ -31,9 +29,7 @@ def predict_log(model: IdentifiedModel, log: Log, *, all_pressures: bool = False
 
     Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
     chamber pressures of driven joints, where `log.pressure` maps columns for them or with `all_pressures`.
-
-    Raises:
-        RunError: the simulation diverged.
+    Raises RunError: the simulation diverged.
     """
     settings = model.settings
     passive = settings.simulation.other_joints == "passive"

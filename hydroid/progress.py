@@ -4,8 +4,7 @@ import logging
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
-NOTE = logging.INFO + 5
-"""level of a log line that a user sees though nothing is wrong"""
+NOTE = logging.INFO + 5  # level of a log line that a user sees though nothing is wrong
 logging.addLevelName(NOTE, "NOTE")
 
 Progress = Callable[[str, int, int], None]

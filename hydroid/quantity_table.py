@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 from hydroid.units import UNITS
 
 FROM_ZERO = (0.0, math.inf)
-OFF, ONE = (0.0, 0.0), (1.0, 1.0)
-"""defaults of quantities with two sides"""
+OFF, ONE = (0.0, 0.0), (1.0, 1.0)  # defaults of quantities with two sides
 
 
 @dataclass(frozen=True)
@@ -232,8 +231,7 @@ _HYDRAULIC = (
 )
 """of all joints, in the settings `hydraulics` and in their order"""
 
-ROWS = (*_MECHANICAL, *_ACTUATOR, *_HYDRAULIC)
-"""the one table"""
+ROWS = (*_MECHANICAL, *_ACTUATOR, *_HYDRAULIC)  # the one table
 
 QUANTITIES = {quantity.name: quantity for row in ROWS for quantity in row.each()}
 """the quantities by name, each side by itself"""
@@ -241,11 +239,9 @@ QUANTITIES = {quantity.name: quantity for row in ROWS for quantity in row.each()
 HYDRAULIC = {quantity.name: quantity for row in _HYDRAULIC for quantity in row.each()}
 """those that `hydraulics` sets for all joints"""
 
-CHOICES = {row.name: row for row in ROWS} | QUANTITIES
-"""what a parameter of a fit can be, by name"""
+CHOICES = {row.name: row for row in ROWS} | QUANTITIES  # what a parameter of a fit can be, by name
 
 TARGETS = {name: tuple(quantity.name for quantity in row.each()) for name, row in CHOICES.items()}
 """the quantities that a name sets: itself, or both sides"""
 
-MECHANICAL = tuple(row.name for row in _MECHANICAL)
-"""the quantities that both stages have"""
+MECHANICAL = tuple(row.name for row in _MECHANICAL)  # the quantities that both stages have

@@ -38,8 +38,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import load
 from hydroid.settings.study import StudySettings, cell_settings
 
-Result = dict[str, Any]
-"""what `perform` returns, or {"failed": why}"""
+Result = dict[str, Any]  # what `perform` returns, or {"failed": why}
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +67,7 @@ def perform(task: Task) -> Result:
     `measures` are those of docs/studies.md, by name. `history` has generation, simulations and best
     objective; `segment_bests` are the parameters of the best candidate of each segment, as `theta` are those
     of the estimate.
-
-    Raises:
-        RunError: every candidate diverged.
+    Raises RunError: every candidate diverged.
     """
     problem = Problem(task.settings, task.logs)
     result = fit(problem)
@@ -101,8 +98,7 @@ def perform(task: Task) -> Result:
     }
 
 
-Read = Callable[[Sequence[Path], FitSettings], list[Log]]
-"""reads logs as settings map their columns"""
+Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as settings map their columns
 
 _log = logging.getLogger(__name__)
 
@@ -156,9 +152,7 @@ def run_all(tasks: Sequence[Task], folder: Path, executor: Executor, progress: P
     """Return the result of every task, in order; what `folder`/runs has is read, the others are performed.
 
     A run that fails is a result too: {"failed": why}.
-
-    Raises:
-        RunError: a file cannot be written or is damaged, or a process of the executor died.
+    Raises RunError: a file cannot be written or is damaged, or a process of the executor died.
     """
     files = [folder / "runs" / f"{task.key()}.json" for task in tasks]
     results = {file: _read(file) for file in files if file.is_file()}

@@ -22,9 +22,7 @@ def adapted(model: IdentifiedModel, free: Sequence[str]) -> FitSettings:
     """Return the settings in which only some parameters of a model are free, by name, from its estimate.
 
     Their priors stay as wide as they were, around the estimate.
-
-    Raises:
-        SettingsError: a name that is none of a parameter with bounds or a prior.
+    Raises SettingsError: a name that is none of a parameter with bounds or a prior.
     """
     settings, parameters = model.settings, dict(model.settings.parameters)
     possible = [name for name, own in parameters.items() if own.can_be_free]

@@ -20,18 +20,15 @@ from hydroid.log import Log
 from hydroid.posterior.noise import fit_noise
 from hydroid.settings.fit import FitSettings
 
-ENOUGH = 6.0
-"""evidence that names a joint: turned round is 400 times as likely"""
+ENOUGH = 6.0  # evidence that names a joint: turned round is 400 times as likely
 LOWER = 0.99
 """part of the laws' rms error, on geometric average, that turning a joint round must leave at most"""
 FOLLOWED = 0.2
 """by how much a joint's speed must correlate better with another joint's command than with its own"""
 PERIOD, WINDOW, LATEST = 0.05, 0.2, 0.8
 """of the samples; over which speeds and commands are averaged; from a command to its effect at most [s]"""
-TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)
-"""between the commands that a speed follows [s]"""
-KNOTS = np.linspace(-100.0, 100.0, 11)
-"""of the piecewise linear effect of each of them [%]"""
+TAPS = (0.0, 0.1, 0.2, 0.3, 0.4)  # between the commands that a speed follows [s]
+KNOTS = np.linspace(-100.0, 100.0, 11)  # of the piecewise linear effect of each of them [%]
 FROM_STOPS, FROM_ZERO = 0.02, 3.0
 """angle from a stop [rad], and largest command [%], above which a sample counts"""
 TINY = np.finfo(float).tiny

@@ -200,9 +200,7 @@ def design(
         logs: records whose information is there already; may be empty.
         seed: of draws and changes.
         progress: called with the number of experiments so far.
-
-    Raises:
-        SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
+    Raises SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
     """
     effort, parameters = settings.design.effort, Bindings(settings).parameters
     rng = np.random.default_rng(seed)

@@ -68,9 +68,7 @@ def experiment_samples(settings: FitSettings) -> int:
 
 class RandomExperiments:
     """Draws experiments, and random changes of them, that the settings allow.
-
-    Raises:
-        SettingsError: joints or poses that cannot be used.
+    Raises SettingsError: joints or poses that cannot be used.
     """
 
     def __init__(self, settings: FitSettings, rng: np.random.Generator) -> None:

@@ -133,8 +133,7 @@ def holm(chances: Sequence[float], level: float) -> Mask:
     return kept
 
 
-LEVEL = 0.05
-"""probability that any term is a candidate where none is missing"""
+LEVEL = 0.05  # probability that any term is a candidate where none is missing
 MIN_GAIN = 0.02
 """part of the rms error that a candidate must promise to save, and then save on the parts left out"""
 VISIBLE = 3.0
@@ -142,10 +141,8 @@ VISIBLE = 3.0
 LARGEST_EFFECT = 0.5
 """rms effect of the change that is tested, in parts of the rms residual: large enough for terms that act
 beyond a threshold, small enough for a derivative"""
-MIN_RESIDUAL = np.deg2rad(0.05)
-"""what the rms residual counts at least [rad]"""
-SHORT = RefinementSettings(iterations=30, gain_tolerance=1e-3)
-"""of the refinements from an estimate"""
+MIN_RESIDUAL = np.deg2rad(0.05)  # what the rms residual counts at least [rad]
+SHORT = RefinementSettings(iterations=30, gain_tolerance=1e-3)  # of the refinements from an estimate
 
 
 @dataclass(frozen=True)

@@ -23,15 +23,12 @@ from hydroid.progress import Progress, no_progress
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 
-MOST_TRIED = 6
-"""terms that are really freed, the most promising first"""
+MOST_TRIED = 6  # terms that are really freed, the most promising first
 
 STATED_SD = {"weigh": 0.02, "state": 0.05}
 """relative standard deviation of a mass that was weighed, and of a value from a data sheet (ours)"""
-FEWEST_TIMES = 1.5
-"""factor by which an action must improve a parameter to be listed"""
-MOST_ACTIONS = 5
-"""actions that are listed"""
+FEWEST_TIMES = 1.5  # factor by which an action must improve a parameter to be listed
+MOST_ACTIONS = 5  # actions that are listed
 Content = Mapping[str, Any]
 
 

@@ -14,8 +14,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import ModelError
 
-FARTHEST = 100.0
-"""distance beyond which MuJoCo need not look [m]"""
+FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
 
 
 @dataclass(frozen=True)
@@ -24,14 +23,10 @@ class Meeting:
 
     first: str
     second: str
-    begins: float
-    """[s]"""
-    ends: float
-    """[s]"""
-    depth: float
-    """how far they are inside each other at most [m]"""
-    deepest: float
-    """when [s]"""
+    begins: float  # [s]
+    ends: float  # [s]
+    depth: float  # how far they are inside each other at most [m]
+    deepest: float  # when [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +56,7 @@ class CollisionChecker:
     Args:
         model: compiled; contacts may be switched off.
         source: for messages.
-
-    Raises:
-        ModelError: nothing in the model can collide.
+    Raises ModelError: nothing in the model can collide.
     """
 
     def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:

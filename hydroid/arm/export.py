@@ -145,9 +145,7 @@ def write_fitted(
         timestep: MuJoCo's [s].
         joints: names of the joints that take commands.
         actuators: hydraulic parameters by joint (stage 2); None: the MJCF has motors (stage 1).
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     name, words = "fitted.xml", _MECHANICAL_README
     if actuators is not None:

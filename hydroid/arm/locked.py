@@ -43,14 +43,10 @@ class LockedArm:
 
     model: mujoco.MjModel
     """one body per moving joint, no actuator: torques go to qfrc_applied [N·m]; contacts, auto-reset off"""
-    joints: tuple[str, ...]
-    """the moving joints in the order of qpos and qvel, (V,)"""
-    columns: Index
-    """the same among the arm's joints, 0-based, shape (V,)"""
-    pose: Array
-    """where they start [rad], shape (V,)"""
-    parts: Any
-    """what the bodies consist of, (P,) of PART"""
+    joints: tuple[str, ...]  # the moving joints in the order of qpos and qvel, (V,)
+    columns: Index  # the same among the arm's joints, 0-based, shape (V,)
+    pose: Array  # where they start [rad], shape (V,)
+    parts: Any  # what the bodies consist of, (P,) of PART
     held: dict[str, tuple[Array, Array]]
     """place in its parent of a locked joint's body, by name: [m], (3,), and a quaternion (w, x, y, z)"""
 

@@ -13,18 +13,13 @@ from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
 from hydroid.settings.arm import Arm
 
-ALONE = "alone"
-"""the name of the arm that is not one of two"""
+ALONE = "alone"  # the name of the arm that is not one of two
 SIDES = ("right", "left")
 """the arms of a pair in the order of its joints; the names of their parts begin with these and `_`"""
 
 
 def load_model(arm: Arm) -> mujoco.MjSpec:
-    """Read the arm's MJCF, which compiles.
-
-    Raises:
-        ModelError: as `read_mjcf`.
-    """
+    """Read the arm's MJCF, which compiles; raises ModelError: as `read_mjcf`."""
     spec = read_mjcf(arm.model)
     with mujoco_errors(str(arm.model)):
         spec.compile()
@@ -33,9 +28,7 @@ def load_model(arm: Arm) -> mujoco.MjSpec:
 
 def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     """Return a copy of the arm's model that carries `mass` [kg] at the site of its payload.
-
-    Raises:
-        SettingsError: the arm's file names no site.
+    Raises SettingsError: the arm's file names no site.
     """
     if arm.payload is None:
         hint = "name the site of the model that holds it in the arm's file, payload: SITE"
@@ -66,11 +59,7 @@ class Machine:
 
     @cached_property
     def checker(self) -> CollisionChecker:
-        """Which of its bodies meet.
-
-        Raises:
-            ModelError: none can.
-        """
+        """Which of its bodies meet; raises ModelError: none can."""
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:

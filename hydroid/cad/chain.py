@@ -21,9 +21,7 @@ def choose_chain(
     The best tip is the one with the most joints that the columns of a log name, then the one with the most
     joints, then the first. Rods and tubes of cylinders are no tips. What is left out is held, and its mass
     belongs to the link that carries it.
-
-    Raises:
-        ModelError: no joint, a body with several, or no such tip.
+    Raises ModelError: no joint, a body with several, or no such tip.
     """
     _hold(spec, notes)
     chains: dict[str, tuple[str, ...]] = {}

@@ -70,9 +70,7 @@ def import_arm(
         columns: names of a log's columns, which help to choose among branches.
         tip: name of the link at which the arm ends; None: the tip that fits best.
         total_mass: of the links that move [kg]; None: masses are those of the file.
-
-    Raises:
-        ModelError: the file cannot be read, or holds no arm.
+    Raises ModelError: the file cannot be read, or holds no arm.
     """
     notes = Notes()
     spec, files, urdf = read_source(path, notes)

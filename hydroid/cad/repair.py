@@ -12,19 +12,15 @@ from hydroid.cad.shapes import SHOWN
 from hydroid.cad.source import Notes
 from hydroid.mjcf import mujoco_errors
 
-MASSLESS = 1e-6
-"""mass up to which a body counts as a frame without mass [kg]"""
+MASSLESS = 1e-6  # mass up to which a body counts as a frame without mass [kg]
 USUAL = 1200.0
 """mass of a link over the volume of its hull [kg/m³]: compact parts of machines have 500 to 3,000. A welded
 boom has less: 10 mm of steel around 0.4 m square make 770 of the box, and a bend half empties its hull"""
-LEAST, MOST = 200.0, 8000.0
-"""outside these no link can be: half of the lightest such booms, and solid steel"""
-SLENDER = 0.015
-"""volume of a link without a shape, over the cube of its length: a box of 1 to 8"""
+LEAST, MOST = 200.0, 8000.0  # outside these no link can be: half of the lightest such booms, and solid steel
+SLENDER = 0.015  # volume of a link without a shape, over the cube of its length: a box of 1 to 8
 SLIGHT = LEAST / 3
 """the least density of this box: that of a boom of 1 to 20 with 400 kg/m³, 1 kg for a length of 1 m"""
-NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]
-"""MuJoCo's word for a full inertia that is not given"""
+NO_TENSOR = [np.nan, 0, 0, 0, 0, 0]  # MuJoCo's word for a full inertia that is not given
 
 
 class Inertial(NamedTuple):
@@ -39,9 +35,7 @@ def repair_inertias(spec: mujoco.MjSpec, urdf: bool, notes: Notes) -> None:
     """Give every body a mass and an inertia that a rigid body can have; one without a mass is a mere frame.
 
     What the file says is kept where it is possible, else the mass with the inertia of the shape's hull.
-
-    Raises:
-        ModelError: MuJoCo refuses the file for another reason.
+    Raises ModelError: MuJoCo refuses the file for another reason.
     """
     faults = {body.name: _stated_fault(body, urdf) for body in spec.bodies[1:]}
     model, hulls = compiled(spec), hull_model(spec)

@@ -13,10 +13,8 @@ from hydroid.cad.source import Notes
 from hydroid.errors import ModelError
 from hydroid.mjcf import mujoco_errors
 
-MESHES = "links"
-"""folder of the meshes beside the model"""
-SHOWN, HIDDEN = 2, 3
-"""groups of shapes that are seen, and of those that only collide"""
+MESHES = "links"  # folder of the meshes beside the model
+SHOWN, HIDDEN = 2, 3  # groups of shapes that are seen, and of those that only collide
 
 
 def convert_meshes(

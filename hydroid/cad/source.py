@@ -56,9 +56,7 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
 
     Returns:
         MuJoCo's spec, where each file of a mesh that it names lies, and whether the file is a URDF.
-
-    Raises:
-        ModelError: missing, not XML, of another kind, or refused by MuJoCo.
+    Raises ModelError: missing, not XML, of another kind, or refused by MuJoCo.
     """
     where = str(path)
     if not is_file(path):

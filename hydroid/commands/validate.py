@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from hydroid.log import Log
     from hydroid.run.record import Record
 
-MOST_ROWS = 12
-"""joints of all fits that a terminal shows; of more those of the best fit"""
+MOST_ROWS = 12  # joints of all fits that a terminal shows; of more those of the best fit
 
 
 @command

@@ -21,8 +21,7 @@ from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
-START_PRESSURE = 50e5
-"""in chamber B at the start where neither settings nor log say [Pa]; ours"""
+START_PRESSURE = 50e5  # in chamber B at the start where neither settings nor log say [Pa]; ours
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,8 @@ from hydroid.hydraulics.elementwise import compilable, select
 from hydroid.hydraulics.records import LINEAR, ROTARY
 from hydroid.settings import linkage
 
-SLIDING = 1e-3
-"""speed [m/s, or rad/s] above which dry friction is nearly full; ours"""
-GIVE = 5e-4
-"""what a joint's rest gives under the load that it carries at the start [rad]; ours"""
+SLIDING = 1e-3  # speed [m/s, or rad/s] above which dry friction is nearly full; ours
+GIVE = 5e-4  # what a joint's rest gives under the load that it carries at the start [rad]; ours
 SMALLEST = 0.1
 """part of the dead volume that a chamber keeps, however far a joint is driven beyond its stops; ours"""
 

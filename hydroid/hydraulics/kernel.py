@@ -79,16 +79,11 @@ def substitute(matrix: Any, vector: Any) -> None:
 class Plugin(NamedTuple):
     """What stays the same during a run, of one candidate's J joints; `of` takes one of n."""
 
-    coefficients: Any
-    """(J,), of COEFFICIENTS, or (n, J)"""
-    order: Any
-    """the joints, those without actuator first, (J,)"""
-    entries: Any
-    """where their M[i, j] stands in a row of masses, in this order, (J, J)"""
-    idle: int
-    """how many have none"""
-    period: float
-    """of a step [s]"""
+    coefficients: Any  # (J,), of COEFFICIENTS, or (n, J)
+    order: Any  # the joints, those without actuator first, (J,)
+    entries: Any  # where their M[i, j] stands in a row of masses, in this order, (J, J)
+    idle: int  # how many have none
+    period: float  # of a step [s]
     substeps: int
 
     @property

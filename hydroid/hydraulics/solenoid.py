@@ -22,8 +22,7 @@ import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, implicit_weight, select
 
-FULL_SCALE = 10.0
-"""voltage at full command, and from which the current is I_max [V], equation (4)"""
+FULL_SCALE = 10.0  # voltage at full command, and from which the current is I_max [V], equation (4)
 
 
 @compilable

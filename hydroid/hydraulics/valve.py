@@ -25,11 +25,9 @@ import numpy as np
 
 from hydroid.hydraulics.elementwise import compilable, select
 
-DENSITY = 860.0
-"""ρ of the oil [kg/m³]; ours"""
+DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 
-NOTCHES = (0.04, 0.1, 0.25, 0.5)
-"""parts of the full opening where the notches of a valve's curve end; ours"""
+NOTCHES = (0.04, 0.1, 0.25, 0.5)  # parts of the full opening where the notches of a valve's curve end; ours
 
 
 @compilable

@@ -18,8 +18,7 @@ from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
-PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
-"""[s], of which a guess takes the nearest"""
+PERIODS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)  # [s], of which a guess takes the nearest
 
 
 class ColumnGuess(NamedTuple):
@@ -47,8 +46,7 @@ class _Column(NamedTuple):
         return "by its unit" if self.unit else "by its name"
 
 
-_Pairs = dict[int, list[_Column]]
-"""the column, or the two for the directions of a command, of each joint"""
+_Pairs = dict[int, list[_Column]]  # the column, or the two for the directions of a command, of each joint
 
 
 def guess_columns(
@@ -63,9 +61,7 @@ def guess_columns(
         joints: names of the arm's joints, in order.
         links: names of the links that they move, in order, which columns may have instead.
         slides: joints (numbers, from 1) that slide: their positions are in m.
-
-    Raises:
-        LogError: no column looks like a time.
+    Raises LogError: no column looks like a time.
     """
     columns = [*_columns(table)]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)

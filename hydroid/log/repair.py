@@ -14,8 +14,7 @@ from hydroid.log.log import Log, LogFinding
 from hydroid.log.table import Recording
 from hydroid.settings.log import LogSettings
 
-GAP = 1.95
-"""in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2"""
+GAP = 1.95  # in sample periods: a longer step is a gap, a shorter one jitter; one dropped sample makes it 2
 
 
 def sample_period(time: Array) -> float:

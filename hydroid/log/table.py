@@ -71,9 +71,7 @@ class Table:
 
     def read(self, signals: Sequence[Signal]) -> "Recording":
         """Read the columns of signals; a number that is too large counts as none.
-
-        Raises:
-            LogError: columns that cannot be read together.
+        Raises LogError: columns that cannot be read together.
         """
         first = signals[0].name
         values = np.empty((len(self.columns[first]), len(signals)))
@@ -174,9 +172,7 @@ def _as_numbers(cells: NDArray[Any]) -> tuple[Array, bool]:
 @contextmanager
 def format_library(package: str, extra: str, path: Path, kind: str) -> Generator[Any]:
     """Yield a library that reads a format; what it raises on damaged bytes, errors of any kind, is one line.
-
-    Raises:
-        LogError: it is not installed, or cannot read the file.
+    Raises LogError: it is not installed, or cannot read the file.
     """
     try:
         library = import_module(package)

@@ -26,8 +26,7 @@ import yaml
 from hydroid.errors import RunError, SettingsError
 from hydroid.parallel.workers import DaskWorkers
 
-CONNECT = 20.0
-"""seconds in which a scheduler must answer"""
+CONNECT = 20.0  # seconds in which a scheduler must answer
 
 
 @contextmanager
@@ -82,9 +81,7 @@ def write_credentials(folder: Path) -> None:
     """Write new TLS credentials, as a Dask configuration, into a new folder that only its user can read.
 
     Scheduler, workers and hydroid use them where the environment variable DASK_CONFIG names the folder.
-
-    Raises:
-        FileExistsError: the folder is there already.
+    Raises FileExistsError: the folder is there already.
     """
     from distributed.security import Security
 

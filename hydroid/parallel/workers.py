@@ -53,9 +53,7 @@ class DaskWorkers:
 
         Returns:
             Shape (n, columns), in theta's order; NaN in the row of a candidate that kills its workers.
-
-        Raises:
-            RunError: the scheduler is gone, or a worker has other VERSIONS.
+        Raises RunError: the scheduler is gone, or a worker has other VERSIONS.
         """
         result = np.full((len(theta), columns), np.nan)
         with _lost_scheduler(self.client):

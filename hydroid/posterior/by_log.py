@@ -32,8 +32,7 @@ from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
 
-FEW = 5.0
-"""degrees of freedom below which a standard deviation by log is rough: to a third, or worse"""
+FEW = 5.0  # degrees of freedom below which a standard deviation by log is rough: to a third, or worse
 
 
 @dataclass(frozen=True, eq=False)

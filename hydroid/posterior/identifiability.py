@@ -16,10 +16,8 @@ from hydroid.search.axes import Function
 from hydroid.search.least_squares import least_squares
 from hydroid.settings.search import RefinementSettings
 
-THRESHOLD = float(chi2.ppf(COVERAGE, 1))
-"""deviance beyond which a value lies outside the interval"""
-STEPS = 6
-"""points on each side before the steps grow: they reach three standard deviations, or the bound"""
+THRESHOLD = float(chi2.ppf(COVERAGE, 1))  # deviance beyond which a value lies outside the interval
+STEPS = 6  # points on each side before the steps grow: they reach three standard deviations, or the bound
 
 
 @dataclass(frozen=True)
@@ -47,9 +45,7 @@ def profile(problem: Problem, uncertainty: Uncertainty, name: str) -> Profile:
 
     With autocorrelated noise the rise of a sum of squares is no likelihood ratio. It is scaled so that its
     curvature is the estimate's variance (L. Pace, A. Salvan, N. Sartori, 2011).
-
-    Raises:
-        SettingsError: no free parameter of that name.
+    Raises SettingsError: no free parameter of that name.
     """
     parameters, linear, theta = problem.parameters, uncertainty.linear, uncertainty.theta
     free = [p.name for p in parameters.parameters if p.fixed is None]

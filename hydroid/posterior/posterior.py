@@ -22,16 +22,12 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import ParameterSet
 from hydroid.search.axes import Axes, Box, covariance_axes, differentiate
 
-UNIDENTIFIABLE_ABOVE = 1.0
-"""relative standard deviation above which a linear interval means nothing"""
-COVERAGE = 0.95
-"""probability with which an interval covers the true value"""
+UNIDENTIFIABLE_ABOVE = 1.0  # relative standard deviation above which a linear interval means nothing
+COVERAGE = 0.95  # probability with which an interval covers the true value
 NORMAL = float(normal.ppf(0.5 + COVERAGE / 2))
 """half the interval of a normal estimate of known variance, in standard deviations"""
-WEAK_PRIOR = 10.0
-"""relative standard deviation of every parameter before any log and any stated prior (ours)"""
-STEP = 0.1
-"""step of the differences in standard deviations: wide enough for the small jumps that events make"""
+WEAK_PRIOR = 10.0  # relative standard deviation of every parameter before any log and any stated prior (ours)
+STEP = 0.1  # step of the differences in standard deviations: wide enough for the small jumps that events make
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,8 +155,7 @@ def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array]:
     return c, rod_motion(np.full(len(c), bench.angle), c)[1]
 
 
-COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
-"""of the curve of speed [%]"""
+COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)  # of the curve of speed [%]
 MOVES = 0.02
 """part of the speed at full command, added to that without a command, at which the joint begins to move"""
 ONSET, RISEN = 0.1, 1.0 - np.exp(-1.0)

@@ -50,8 +50,7 @@ from hydroid.posterior.posterior import (
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import Box, held_by_bound
 
-WEAK_ABOVE = 0.3
-"""relative standard deviation above which a parameter or direction is weakly identifiable"""
+WEAK_ABOVE = 0.3  # relative standard deviation above which a parameter or direction is weakly identifiable
 
 Side = Literal["lower", "upper"]
 

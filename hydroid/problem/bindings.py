@@ -35,9 +35,7 @@ class Bindings:
 
     What the settings do not name has its nominal value: 0 for gains, dampers, springs and dry friction, else
     what `hydraulics` and the arm's file say.
-
-    Raises:
-        SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
+    Raises SettingsError: a joint or link the arm lacks, or two parameters for the same thing.
     """
 
     def __init__(self, settings: FitSettings) -> None:

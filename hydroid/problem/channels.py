@@ -109,9 +109,7 @@ def norm(error: Array, p: float | str) -> Array:
 
 def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings) -> Array:
     """Return the norm (18) of each candidate's error, (n, T) -> (n,); where relative, (19).
-
-    Raises:
-        SettingsError: relative, and the measured output, shape (T,), is zero throughout.
+    Raises SettingsError: relative, and the measured output, shape (T,), is zero throughout.
     """
     value = norm(error, settings.norm)
     if not settings.relative:
@@ -137,9 +135,7 @@ def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: Ob
         measured: measured output, shape (T,), in the unit of the error.
         bounds: [first, end) of each segment in samples, shape (S, 2).
         settings: the norm.
-
-    Raises:
-        SettingsError: relative, and the measured output is zero throughout a segment.
+    Raises SettingsError: relative, and the measured output is zero throughout a segment.
     """
     columns = [overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds]
     objectives = np.stack(columns, axis=1)
@@ -152,9 +148,7 @@ def segment_bounds(samples: int, segments: int) -> Ints:
 
     Returns:
         [first, end) of each segment in samples, shape (S, 2): increasing, gapless, from 0 to T.
-
-    Raises:
-        SettingsError: more segments than samples.
+    Raises SettingsError: more segments than samples.
     """
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"

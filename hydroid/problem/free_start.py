@@ -17,8 +17,7 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.problem.problem import OpenStart, Problem, compared_pressures, make_simulation
 
-STEP = np.radians(0.05)
-"""of the differences by a start angle"""
+STEP = np.radians(0.05)  # of the differences by a start angle
 
 
 @dataclass(frozen=True, eq=False)

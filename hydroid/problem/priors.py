@@ -15,12 +15,10 @@ from hydroid.errors import SettingsError
 from hydroid.parameters import ParameterSet
 from hydroid.settings.problem import PriorSettings
 
-REACH = 2.0
-"""standard deviations that a candidate of a search may be away from a prior"""
+REACH = 2.0  # standard deviations that a candidate of a search may be away from a prior
 CONSTRAINT_SD = 1e-5
 """standard deviation of a constraint, as a part of the range that its parameters' bounds allow"""
-MAX_SWEEPS = 200
-"""projections on all priors in turn; two that are nearly parallel need the most"""
+MAX_SWEEPS = 200  # projections on all priors in turn; two that are nearly parallel need the most
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +50,7 @@ class Priors:
     """M priors about P parameters, named `names`; those about fixed parameters only are left out.
 
     Those of single parameters come first. `searched` are the parameters with bounds within REACH of these.
-
-    Raises:
-        SettingsError: a parameter that does not exist, or priors that the bounds contradict.
+    Raises SettingsError: a parameter that does not exist, or priors that the bounds contradict.
     """
 
     def __init__(self, settings: Mapping[str, PriorSettings], parameters: ParameterSet) -> None:
@@ -128,9 +124,7 @@ def _within_reach(parameters: ParameterSet) -> ParameterSet:
 
 def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _Combination | None:
     """Return a combination; None where all of its parameters are fixed.
-
-    Raises:
-        SettingsError: a parameter that does not exist, or a divisor that may be 0.
+    Raises SettingsError: a parameter that does not exist, or a divisor that may be 0.
     """
     names, free = parameters.names, parameters.free
     for parameter in prior.factors:

@@ -31,8 +31,7 @@ from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Response, Simulation
 from hydroid.simulation.scenario import Scenario
 
-CHUNK = 2**23
-"""residuals that are held in memory at a time, 64 MiB"""
+CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
 
 OpenStart = Callable[[Array], None]
 """takes what one log's open start angles can explain out of residuals, shape (n, R)"""

@@ -14,8 +14,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.hydraulics import HydraulicSettings
 
-LIFT = 2.0
-"""torque of a joint at the pump's pressure, over the largest that gravity asks of it"""
+LIFT = 2.0  # torque of a joint at the pump's pressure, over the largest that gravity asks of it
 
 
 class JointSize(NamedTuple):
@@ -41,9 +40,7 @@ def joint_sizes(arm: Arm, speeds: Mapping[int, float]) -> tuple[JointSize, ...]:
     Args:
         arm: with its model in place.
         speeds: that a log shows, by number of the joint [rad/s, m/s]; 0.5 for the others.
-
-    Raises:
-        ModelError: the arm's model cannot be read.
+    Raises ModelError: the arm's model cannot be read.
     """
     model = load_model(arm).compile()
     data = mujoco.MjData(model)

@@ -12,12 +12,9 @@ from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
 
-LONGEST_STEP = 0.025
-"""of MuJoCo [s], in a log of fewer samples"""
-DEAD = 0.8
-"""part of the command below which a joint seems to stand that its dead band is"""
-RESPONSE = 0.1
-"""of a valve and its oil without any delay [s]"""
+LONGEST_STEP = 0.025  # of MuJoCo [s], in a log of fewer samples
+DEAD = 0.8  # part of the command below which a joint seems to stand that its dead band is
+RESPONSE = 0.1  # of a valve and its oil without any delay [s]
 
 FIT = """\
 # hydroid fit-hyd LOG --config {file}

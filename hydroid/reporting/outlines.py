@@ -99,14 +99,10 @@ def _points(model: mujoco.MjModel, geom: int) -> Array | None:
             return None
 
 
-MOST, LOGS = 1200, 8
-"""moments of all logs of a page together, and logs that it shows in motion"""
-RATE = 10.0
-"""moments in a second; the page draws what lies between them"""
-VIEW = 112.0, -16.0
-"""where a camera would look to: azimuth and elevation [deg]"""
-_SIZE, _MARGIN = 1000, 30
-"""longer side of the picture, and what stays free around the arm"""
+MOST, LOGS = 1200, 8  # moments of all logs of a page together, and logs that it shows in motion
+RATE = 10.0  # moments in a second; the page draws what lies between them
+VIEW = 112.0, -16.0  # where a camera would look to: azimuth and elevation [deg]
+_SIZE, _MARGIN = 1000, 30  # longer side of the picture, and what stays free around the arm
 _CAPTION = (
     "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where they differ "
     "most. Joints that are not compared follow the log."

@@ -18,8 +18,7 @@ from hydroid.words import number, plain
 if TYPE_CHECKING:
     import rich.table
 
-Cell = str | int | float | None
-"""text, a count, a measured number, or nothing"""
+Cell = str | int | float | None  # text, a count, a measured number, or nothing
 
 
 class Given(float):

@@ -23,9 +23,7 @@ from hydroid.reporting.page import Page, Table
 
 def write_page(page: Page, out: Path) -> list[Path]:
     """Write a report to the folder `out`: the page, its tables as CSV, and its data.
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     content = {**page.data, f"{page.name}.html": html(page)}
     for name, text in content.items():
@@ -35,9 +33,7 @@ def write_page(page: Page, out: Path) -> list[Path]:
 
 def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
     """Write tables by name as CSV, to tables/ in the folder `out`.
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     files = {out / "tables" / f"{name}.csv": table.csv() for name, table in tables.items()}
     for file, text in files.items():
@@ -47,9 +43,7 @@ def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
 
 def write_figures(page: Page, out: Path) -> list[Path]:
     """Write every chart of a page to the folder `out` as PNG and SVG; return the files.
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     from hydroid.reporting.figure import figure, saved, style
 

@@ -17,8 +17,7 @@ from hydroid.run.record import Record
 from hydroid.settings.fit import FitSettings
 from hydroid.words import number
 
-BEST_WITHIN = 0.3
-"""half of a 95 % interval, relative to the value, up to which a property counts as known"""
+BEST_WITHIN = 0.3  # half of a 95 % interval, relative to the value, up to which a property counts as known
 SPREAD = ("name", "unit", "median", "lowest", "lower_quartile", "upper_quartile", "highest", "flag")
 Intervals = Mapping[str, tuple[float, float]]
 

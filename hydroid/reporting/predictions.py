@@ -149,9 +149,7 @@ def draw(run: str | Path, *, figures: bool = False) -> Path:
     Args:
         run: its folder.
         figures: write every chart as PNG and SVG too, to figures/ beside the page.
-
-    Raises:
-        RunError: the folder holds no finished run of this version, or the page cannot be written.
+    Raises RunError: the folder holds no finished run of this version, or the page cannot be written.
     """
     folder, page = Path(run), fit_page(load_record(run))
     page_file.write_page(page, folder)

@@ -13,16 +13,14 @@ from hydroid.reporting.page import Cell, Given, Section, Table, short_name, show
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed
 
-_SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}
-"""of verdicts; all others are a ✗"""
+_SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
 _NOTE = (
     "rms errors in deg over the logs that drive the joint. The last three columns are simple models, fitted "
     "to the same logs, here on the {logs} ones: no motion; mean speeds by command; dead band, exponent, "
     "speed and lag."
 )
 
-Verdicts = Mapping[str, Sequence[JointVerdict]]
-"""by fit"""
+Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 
 
 def verdict_table(fits: Verdicts) -> Table:

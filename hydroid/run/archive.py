@@ -47,9 +47,7 @@ def pack(tree: object, *, compressed: bool = True) -> bytes:
 
 def unpack(file: Path) -> Any:
     """Read a tree that `pack` made, its dataclasses as mappings and its sequences as lists.
-
-    Raises:
-        ValueError: the file is damaged. OSError: it cannot be read.
+    Raises ValueError: the file is damaged. OSError: it cannot be read.
     """
     packed = file.read_bytes()
     data, digest = packed[:-32], packed[-32:]

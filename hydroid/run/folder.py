@@ -169,9 +169,7 @@ class RunFolder:
 
     def refuse_changes(self) -> None:
         """Refuse a run whose settings or model were changed since it began.
-
-        Raises:
-            RunError: a file is gone, or is another.
+        Raises RunError: a file is gone, or is another.
         """
         hashes = own_hashes(self.path)
         for name, known in self.identity().get("files", {}).items():
@@ -180,11 +178,7 @@ class RunFolder:
                 raise RunError("has changed since the run began", where=self.path / name, hint=hint)
 
     def identity(self) -> dict[str, Any]:
-        """Read the run's description.
-
-        Raises:
-            RunError: missing or damaged.
-        """
+        """Read the run's description; raises RunError: missing or damaged."""
         file = self.path / DESCRIPTION
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
@@ -227,9 +221,7 @@ class RunFolder:
 
     def checkpoints(self) -> CheckpointFile:
         """Return what the run's search and refinements have stored, by name.
-
-        Raises:
-            RunError: no checkpoint is whole.
+        Raises RunError: no checkpoint is whole.
         """
         # what does not change while the run goes on
         fixed = {key: value for key, value in self.identity().items() if key not in ("status", "seconds")}

@@ -120,11 +120,7 @@ def fit_result(fit: Fit, fitted: tuple[Prediction, ...], baselines: Baselines) -
 
 
 def save_result(folder: Path, result: FitResult) -> None:
-    """Write `result.npz`.
-
-    Raises:
-        RunError: the folder cannot be written.
-    """
+    """Write `result.npz`; raises RunError: the folder cannot be written."""
     write_atomic(folder / RESULT, pack(result))
 
 
@@ -139,9 +135,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
     Nothing is stored of a model that is from no run, or whose settings are not the run's. A log that was
     validated before is replaced.
-
-    Raises:
-        RunError: the folder cannot be written.
+    Raises RunError: the folder cannot be written.
     """
     folder, unseen = run_of(model), [p for p in predictions if p.unseen]
     if folder is None or not unseen or load_identified(folder).settings != model.settings:
@@ -154,9 +148,7 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
 def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, set[str] | None]:
     """Return what the run of a model made of its logs, the baselines, and the logs' hashes; of no run None.
-
-    Raises:
-        RunError: what the run stored is damaged, or of another version.
+    Raises RunError: what the run stored is damaged, or of another version.
     """
     if (folder := run_of(model)) is None:
         return (), {}, None
@@ -165,11 +157,7 @@ def fitted_by(model: IdentifiedModel) -> tuple[Sequence[Prediction], Baselines, 
 
 
 def load_record(folder: str | Path) -> Record:
-    """Read a finished run.
-
-    Raises:
-        RunError: the folder holds no finished run, or it is damaged.
-    """
+    """Read a finished run; raises RunError: the folder holds no finished run, or it is damaged."""
     path = Path(folder)
     identity = RunFolder(path).identity()
     summary = load(path / NAME, FitSummary)
@@ -180,11 +168,7 @@ def load_record(folder: str | Path) -> Record:
 
 
 def _read(file: Path, kind: type[T]) -> T:
-    """Read a stored dataclass.
-
-    Raises:
-        RunError: it cannot be read, or another version wrote it.
-    """
+    """Read a stored dataclass; raises RunError: it cannot be read, or another version wrote it."""
     try:
         return _adapter(kind).validate_python((unpack(file),))[0]
     except FileNotFoundError:
@@ -213,9 +197,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
 
     Returns:
         One run for each seed, in the order of the seeds.
-
-    Raises:
-        RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
+    Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:
         raise RunError("is a run itself", where=out, hint="name another folder")
@@ -240,11 +222,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
 
 
 def _read(path: str) -> Record:
-    """Read a finished run.
-
-    Raises:
-        HydroidError: it is not finished or is damaged.
-    """
+    """Read a finished run; raises HydroidError: it is not finished or is damaged."""
     folder = RunFolder(Path(path))
     if (status := folder.identity().get("status")) != "done":
         raise RunError(f"is not finished ({status})", where=path, hint="resume it")

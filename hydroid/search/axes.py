@@ -18,12 +18,9 @@ Function = Callable[[Array], Array]
 
 LARGEST = 0.1
 """largest relative change of a coordinate in a step: nothing holds over the width of an unknown direction"""
-EDGE = 0.1
-"""standard deviations from a bound, below which a coordinate counts as held by it"""
-UNBALANCED = 0.3
-"""part of a step within which both sides must have room; else it goes twice to one side"""
-SHORTER = 0.1
-"""a step whose effect may be mostly curvature is taken again, this part as long"""
+EDGE = 0.1  # standard deviations from a bound, below which a coordinate counts as held by it
+UNBALANCED = 0.3  # part of a step within which both sides must have room; else it goes twice to one side
+SHORTER = 0.1  # a step whose effect may be mostly curvature is taken again, this part as long
 CURVED = 0.3
 """part of the long step's slope; where the short step's is smaller, the long one's is mostly curvature"""
 

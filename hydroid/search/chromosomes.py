@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from hydroid.arrays import Array, Ints, Mask
 from hydroid.settings.search import GeneticSettings
 
-Genes = NDArray[Any]
-"""Chromosomes, shape (n, length): bits (uint8) or integers (uint16)."""
+Genes = NDArray[Any]  # Chromosomes, shape (n, length): bits (uint8) or integers (uint16).
 
 BITS = 16
 STEPS = 2**BITS - 1
@@ -89,8 +88,7 @@ def _nearest(points: Array) -> Ints:
     return np.rint(np.clip(points, 0, 1) * STEPS).astype(np.int64)
 
 
-CUTS = 2
-"""of the pointwise crossover (ours; the article gives none)"""
+CUTS = 2  # of the pointwise crossover (ours; the article gives none)
 
 
 def roulette(objective: Array, count: int, rng: Generator) -> Ints:

@@ -11,16 +11,12 @@ from scipy.optimize import lsq_linear
 from hydroid.arrays import Array, Ints
 from hydroid.search.axes import Function
 
-WIDTH = 2.0**-26
-"""of the differences: the root of the rounding unit"""
-WIDER = 2.0**10
-"""how much wider the step is that tells a weak effect from rounding noise"""
-SUSPECT = 1e-3
-"""a column this much shorter than the longest one may be noise, and is taken twice"""
+WIDTH = 2.0**-26  # of the differences: the root of the rounding unit
+WIDER = 2.0**10  # how much wider the step is that tells a weak effect from rounding noise
+SUSPECT = 1e-3  # a column this much shorter than the longest one may be noise, and is taken twice
 TOLERANCE = 1e-12
 """of the box-constrained minimum: slope, in units of a column and the residual, that is only rounding"""
-DAMPING = 1e-3
-"""λ at the start"""
+DAMPING = 1e-3  # λ at the start
 
 
 class Ending(Enum):

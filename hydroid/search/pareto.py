@@ -94,9 +94,7 @@ def segment_best(objectives: Array) -> Ints:
 
     Returns:
         Indices, shape (S,); one candidate may be best in several segments.
-
-    Raises:
-        SettingsError: no candidate is feasible.
+    Raises SettingsError: no candidate is feasible.
     """
     return _ranked(objectives).argmin(axis=0)
 
@@ -110,9 +108,7 @@ def average(points: Array, objectives: Array) -> Array:
 
     Returns:
         Shape (p,): as a rule not a candidate of the set, and inside the bounds where all candidates are.
-
-    Raises:
-        SettingsError: no candidate is feasible.
+    Raises SettingsError: no candidate is feasible.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
@@ -130,9 +126,7 @@ def utopia(points: Array, objectives: Array) -> Array:
 
     Returns:
         Shape (p,), the first of equals.
-
-    Raises:
-        SettingsError: no candidate is feasible.
+    Raises SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
     usable = objectives[feasible(objectives)]
@@ -150,9 +144,7 @@ def best(points: Array, overall: Array) -> Array:
 
     Returns:
         Shape (p,), the first of equals.
-
-    Raises:
-        SettingsError: no candidate is feasible.
+    Raises SettingsError: no candidate is feasible.
     """
     return points[segment_best(overall[:, None])[0]]
 

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
-SLIDE = 2
-"""MuJoCo's number of a joint that slides"""
+SLIDE = 2  # MuJoCo's number of a joint that slides
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -200,9 +199,7 @@ class Arm(Settings):
 
     def pose(self, name: str) -> Array:
         """Return a named pose [rad], shape (J,).
-
-        Raises:
-            SettingsError: no such pose, with the names there are.
+        Raises SettingsError: no such pose, with the names there are.
         """
         if name not in self.poses:
             raise SettingsError(f"{self.name} has no pose {name!r}", hint=f"one of: {', '.join(self.poses)}")
@@ -211,9 +208,7 @@ class Arm(Settings):
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     """Read an arm's YAML, found as `find_config` does.
-
-    Raises:
-        SettingsError: no such file, or a setting that is not allowed.
+    Raises SettingsError: no such file, or a setting that is not allowed.
     """
     return load(find_config(name, beside, kind="arm"), Arm)
 

@@ -12,8 +12,7 @@ import yaml
 
 from hydroid.errors import SettingsError
 
-Lines = dict[tuple[str, ...], int]
-"""line [1-based] of each key or item, by its path"""
+Lines = dict[tuple[str, ...], int]  # line [1-based] of each key or item, by its path
 
 _PLAIN = {
     "mapping values are not allowed": "there is a second ': ' in this line, or the line is indented too far",
@@ -29,9 +28,7 @@ _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)(e[-+]?[0-9]+)?|[-+]?\.i
 
 def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
     """Read a file that holds one mapping.
-
-    Raises:
-        SettingsError: unreadable, not UTF-8, too large, not a mapping, or as `read_document`.
+    Raises SettingsError: unreadable, not UTF-8, too large, not a mapping, or as `read_document`.
     """
     most = 2**18
     try:
@@ -51,9 +48,7 @@ def read_yaml(path: Path) -> tuple[dict[str, Any], Lines]:
 
 def read_document(text: str, source: str) -> tuple[Any, Lines]:
     """Read one YAML document.
-
-    Raises:
-        SettingsError: not YAML, a key that occurs twice or is not plain text, another type, or too much.
+    Raises SettingsError: not YAML, a key that occurs twice or is not plain text, another type, or too much.
     """
     lines: Lines = {}
     try:

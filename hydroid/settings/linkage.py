@@ -16,8 +16,7 @@ from hydroid.settings.load import Positive, Settings
 
 Vector = tuple[float, float, float]
 
-DIGITS = 9
-"""of lengths in m and angles in deg that are read off a model: what is finer is its rounding"""
+DIGITS = 9  # of lengths in m and angles in deg that are read off a model: what is finer is its rounding
 
 
 def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:

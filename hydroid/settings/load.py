@@ -83,9 +83,7 @@ def load(path: Path, kind: type[S], overrides: Mapping[str, Any] | None = None) 
         path: the file.
         kind: the settings class.
         overrides: values by dotted key, as `--set search.seed=3` gives them.
-
-    Raises:
-        SettingsError: a key or value that is not allowed, with file and line.
+    Raises SettingsError: a key or value that is not allowed, with file and line.
     """
     values, lines = read_yaml(path)
     for key, value in (overrides or {}).items():
@@ -128,9 +126,7 @@ def validate(
 
 def parse_override(text: str) -> tuple[str, Any]:
     """Split `key=value`; the value is read as YAML.
-
-    Raises:
-        SettingsError: no `=` or no key, or a value that is not YAML.
+    Raises SettingsError: no `=` or no key, or a value that is not YAML.
     """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
@@ -140,9 +136,7 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 def replace_setting(values: dict[str, Any], key: str, value: Any) -> None:
     """Set a value of nested mappings by its dotted key; numbers of joints may be keys.
-
-    Raises:
-        SettingsError: what the key names has no settings below it.
+    Raises SettingsError: what the key names has no settings below it.
     """
     *folders, last = key.split(".")
     for folder in folders:

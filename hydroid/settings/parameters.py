@@ -17,9 +17,7 @@ def expanded(parameters: Mapping[str, Any], compared: Any, arm: Arm | None) -> d
 
     `compared` are the joints that `each: true` means; of masses it means all links. With one joint a
     mechanical parameter serves all joints, because those that are driven but not compared need it too.
-
-    Raises:
-        ValueError: a parameter with `joints` or `link` and `each`.
+    Raises ValueError: a parameter with `joints` or `link` and `each`.
     """
     result: dict[str, Any] = {}
     for name, entry in parameters.items():
@@ -72,9 +70,7 @@ def make_parameter(
     """Return one parameter with its bounds, prior and start.
 
     `log`: on a log scale where it is positive, as one with a log-normal prior always is.
-
-    Raises:
-        ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
+    Raises ValueError: a prior without a nominal value, or one that does not fit, with the parameter's name.
     """
     nominal = nominal_value(arm, hydraulics, own)
     try:

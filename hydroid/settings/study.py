@@ -11,8 +11,7 @@ from hydroid.files import find_config
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.load import Settings, load
 
-Changes = dict[str, Any]
-"""settings to replace, by dotted key, as `--set` has them"""
+Changes = dict[str, Any]  # settings to replace, by dotted key, as `--set` has them
 
 Axis = Annotated[dict[str, Changes] | tuple[Any, ...], Field(min_length=1)]
 
@@ -49,9 +48,7 @@ class StudySettings(Settings):
 
 def cell_settings(study: StudySettings, path: Path, extra: Changes | None = None) -> dict[str, FitSettings]:
     """Return the settings of a fit of every cell, with `extra` ones replaced, by the cell's name.
-
-    Raises:
-        SettingsError: a setting that does not exist or is not allowed, with the study's file.
+    Raises SettingsError: a setting that does not exist or is not allowed, with the study's file.
     """
     config = find_config(study.base, path.parent)
     try:

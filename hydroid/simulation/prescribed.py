@@ -15,10 +15,8 @@ from hydroid.settings.problem import SimulationSettings
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than 1e-6 of a radian"""
-HEAVIEST = 1e4
-"""times the largest inertia of the arm: the armature of a machine that is heavier"""
-SERVO = 10.0
-"""natural frequency of the servo [rad/s], slow against a step and fast against drift"""
+HEAVIEST = 1e4  # times the largest inertia of the arm: the armature of a machine that is heavier
+SERVO = 10.0  # natural frequency of the servo [rad/s], slow against a step and fast against drift
 
 
 class Prescribed:

@@ -36,12 +36,9 @@ _kinematics: Any = types.ExternalFunction("mj_kinematics", types.void(types.intp
 _com_pos: Any = types.ExternalFunction("mj_comPos", types.void(types.intp, types.intp))
 _rne: Any = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.int32, types.intp))
 
-ITERATIONS = 30
-"""for the line's pressure at most; three to five suffice"""
-LEAST_LEVER = 1e-6
-"""moment arm below which a cylinder stands at its dead centre [m]"""
-SETTLED = 1e-9
-"""part of the pump's flow, or of its pressure, that may be left when they end"""
+ITERATIONS = 30  # for the line's pressure at most; three to five suffice
+LEAST_LEVER = 1e-6  # moment arm below which a cylinder stands at its dead centre [m]
+SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left when they end
 
 
 @compilable

@@ -51,20 +51,13 @@ class Handles(NamedTuple):
     applied: Array
     armature: Array
     warnings: NDArray[np.int32]
-    columns: Index
-    """joints with actuators and those they couple with, (J,)"""
-    own: Array
-    """the arm's own armature of these [kg·m²], (J,)"""
-    pushed: Index
-    """the other joints, (P,)"""
-    steps: int
-    """in one sample"""
-    gravity: Array
-    """torques that hold the arm, where a rollout asks for them [N·m], (V,)"""
-    slack: Array
-    """angles at which springs are slack [rad], (V,)"""
-    limits: Array
-    """of the angles [rad], (V, 2)"""
+    columns: Index  # joints with actuators and those they couple with, (J,)
+    own: Array  # the arm's own armature of these [kg·m²], (J,)
+    pushed: Index  # the other joints, (P,)
+    steps: int  # in one sample
+    gravity: Array  # torques that hold the arm, where a rollout asks for them [N·m], (V,)
+    slack: Array  # angles at which springs are slack [rad], (V,)
+    limits: Array  # of the angles [rad], (V, 2)
 
 
 class Course(NamedTuple):

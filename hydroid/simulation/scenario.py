@@ -113,8 +113,7 @@ def model_values(arm: LockedArm, candidates: Candidates) -> dict[str, Array]:
     }
 
 
-STOP_REACH = np.radians(1.0)
-"""how near an end of its range a joint must start to rest on its stop"""
+STOP_REACH = np.radians(1.0)  # how near an end of its range a joint must start to rest on its stop
 
 
 class Chain:

@@ -24,8 +24,7 @@ Picture = NDArray[np.uint8]
 
 KINDS = {".mp4": ((1920, 1080), 20.0), ".gif": ((960, 540), 10.0), ".png": ((1920, 1080), 0.0)}
 """width and height of a file's pictures [px], and pictures in a second"""
-AZIMUTH, ELEVATION = 125.0, -18.0
-"""where a camera looks to at first [deg]"""
+AZIMUTH, ELEVATION = 125.0, -18.0  # where a camera looks to at first [deg]
 
 
 class Stage:
@@ -34,9 +33,7 @@ class Stage:
     Args:
         motion: what moves.
         size: width and height of a picture [px].
-
-    Raises:
-        RunError: this machine cannot render.
+    Raises RunError: this machine cannot render.
     """
 
     def __init__(self, motion: Motion, size: tuple[int, int]) -> None:
@@ -110,11 +107,7 @@ def render_motion(
 
 
 def check_kind(file: Path) -> str:
-    """Return the ending of a file that `render_motion` writes.
-
-    Raises:
-        SettingsError: another one.
-    """
+    """Return the ending of a file that `render_motion` writes; raises SettingsError: another one."""
     kind = file.suffix.lower()
     if kind not in KINDS:
         raise SettingsError("is no film or picture", where=file, hint=f"end it in {', '.join(KINDS)}")
@@ -183,9 +176,7 @@ def play(
     """Show what moves in real time until the window is closed; the viewer's reset starts it again.
 
     `viewer` is a `mujoco.viewer.Handle`, or what behaves like one.
-
-    Raises:
-        RunError: the simulation diverged.
+    Raises RunError: the simulation diverged.
     """
     begun = clock()
     while viewer.is_running():
@@ -205,9 +196,7 @@ def play(
 
 def show(playback: Playback) -> None:
     """Show a playback in MuJoCo's viewer until its window is closed.
-
-    Raises:
-        RunError: no window can be opened, or the simulation diverged.
+    Raises RunError: no window can be opened, or the simulation diverged.
     """
     others = set(threading.enumerate())
     try:

@@ -90,11 +90,7 @@ class Sliders:
         self.advance(0.0)
 
     def advance(self, until: float) -> None:
-        """Step to the period before `until` [s].
-
-        Raises:
-            RunError: the simulation diverged.
-        """
+        """Step to the period before `until` [s]; raises RunError: the simulation diverged."""
         plant = self.plant
         while plant.time + plant.period <= until + 1e-9:
             plant.step(plant.command)

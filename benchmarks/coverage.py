@@ -219,11 +219,14 @@ def left_out(given: Any) -> None:
         model = hydroid.fit(settings, logs).model
         print(f"\nstage {stage}")
         table("left out | expected [deg] | actual [deg] | actual / expected | inside the band")
-        for result in hydroid.validate(logs, fit=model, out=None, leave_one_out=True).result:
-            band = result.bands[2]
+        for i, log in enumerate(logs):
+            problem = Problem(model.settings, [*logs[:i], *logs[i + 1 :]])
+            theta, _ = refined(problem, model.theta)
+            fold = IdentifiedModel(settings, theta, "fold", account(problem, uncertainty(problem, theta)))
+            band = prediction_bands(fold, log, predict(fold, log, settings.outputs))[2]
             errors = f"{np.degrees(band.expected):.3f} | {np.degrees(band.error):.3f}"
             ratio = f"{band.error / band.expected:.1f}"
-            row(Path(result.log.source).stem, errors, ratio, f"{100 * band.inside:.0f} %")
+            row(Path(log.source).stem, errors, ratio, f"{100 * band.inside:.0f} %")
 
 
 if __name__ == "__main__":

@@ -24,11 +24,11 @@ def predict(model: IdentifiedModel, log: Log, joints: Sequence[int]) -> Array:
     return _respond(model, log, joints).angle[0]
 
 
-def predict_log(model: IdentifiedModel, log: Log, *, all_pressures: bool = False) -> Log:
+def predict_log(model: IdentifiedModel, log: Log) -> Log:
     """Return the log with the angles that the model gives for its commands, from its first pose.
 
     Locked joints stay where they start; prescribed joints keep their logged motion. Stage 2 also gives the
-    chamber pressures of driven joints, where `log.pressure` maps columns for them or with `all_pressures`.
+    chamber pressures of driven joints for which `log.pressure` maps columns.
     Raises RunError: the simulation diverged.
     """
     settings = model.settings
@@ -39,8 +39,8 @@ def predict_log(model: IdentifiedModel, log: Log, *, all_pressures: bool = False
         angle[:] = log.start
     measured: list[int] = []
     if settings.stage == "hyd":
-        measured = [j for j in range(log.joints) if log.driven[j]]
-        measured = [j for j in measured if all_pressures or settings.log.columns("pressure", j + 1)]
+        columns = settings.log.columns
+        measured = [j for j in range(log.joints) if log.driven[j] and columns("pressure", j + 1)]
     response = _respond(model, log, moving, measured)
     angle[:, [j - 1 for j in moving]] = response.angle[0]
     pressure = None

@@ -16,13 +16,11 @@ from hydroid.commands.inputs import (
     open_model,
 )
 from hydroid.commands.logs import read_logs
-from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.words import listed
 
 if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
-    from hydroid.log import Log
     from hydroid.run.record import Record
 
 MOST_ROWS = 12  # joints of all fits that a terminal shows; of more those of the best fit
@@ -33,7 +31,6 @@ def validate(
     logs: "LogSources",
     *,
     fit: "ModelSource | Sequence[ModelSource]",
-    leave_one_out: bool = False,
     tolerance: float | None = None,
     out: "Source | None" = None,
     set: "SettingChanges" = None,
@@ -52,8 +49,6 @@ def validate(
     Args:
         fit (RUN|YAML): An estimate: a run folder, a folder written by Plant.save (Python), or a YAML file.
             Repeat the option for several estimates.
-        leave_one_out: Give the fit's own logs. For each of them: refit without it, and predict it. Takes one
-            fit.
         tolerance (0.001 to 90): An rms error [deg] that you accept, of every joint; config.yaml can
             hold one for each (tolerance_deg) [default: that of the fit, or else 2 % of a joint's travel].
 
@@ -62,8 +57,6 @@ def validate(
         RunError: a simulation diverged, or the folder cannot be written.
     """
     given: list[ModelSource] = as_list(fit)
-    if leave_one_out and len(given) > 1:
-        raise SettingsError("takes one fit", where="--leave-one-out", hint="call it for each fit")
     models = [open_model(one, None, set) for one in given]
     read = [read_logs(logs, model.settings, repair=repair) for model in models]
     from hydroid.fitting.validation import predicted
@@ -78,16 +71,13 @@ def validate(
     results, verdicts = dict[str, Any](), dict[str, Any]()
     for one, model, own in zip(given, models, read, strict=True):
         name = unique(model.name, results)
-        if leave_one_out:
-            fitted, baselines, predictions = _left_out(model, own)
-        else:
-            fitted, baselines, hashes = fitted_by(model)
-            if not isinstance(one, str | Path | IdentifiedModel):
-                fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
-            new = [None if hashes is None else log_hash(log) not in hashes for log in own]
-            predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
-            if out is not None and (run := keep_validation(model, predictions)):
-                draw(run)
+        fitted, baselines, hashes = fitted_by(model)
+        if not isinstance(one, str | Path | IdentifiedModel):
+            fitted, baselines, hashes = one.predictions, one.baselines, {*map(log_hash, one.problem.logs)}
+        new = [None if hashes is None else log_hash(log) not in hashes for log in own]
+        predictions = [predicted(model, log, unseen) for log, unseen in zip(own, new, strict=True)]
+        if out is not None and (run := keep_validation(model, predictions)):
+            draw(run)
         unseen = [prediction for prediction in predictions if prediction.unseen is not False]
         verdicts[name] = judge(model.settings.changed(stated), fitted, baselines, unseen)
         results[name] = [replace(prediction, fit=name) for prediction in predictions]
@@ -108,17 +98,6 @@ def validate(
     if seen := [one.log.source for one in results[best] if one.unseen is False]:
         lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
     return Result([*lines, *written(page, out)], content, every, page, details=details)
-
-
-def _left_out(model: "IdentifiedModel", logs: "Sequence[Log]") -> Any:
-    """Return what a fit makes of its logs, baselines that know all of them, and each predicted without it."""
-    from hydroid.fitting.validation import predicted, without_one
-    from hydroid.fitting.verdict import baselines_of
-
-    folds = [without_one(model, logs, i) for i in range(len(logs))]
-    predictions = [predicted(fold, log, unseen=True) for fold, log in zip(folds, logs, strict=True)]
-    fitted = [predicted(model, log, unseen=False) for log in logs]
-    return fitted, baselines_of(model.settings, logs), predictions
 
 
 @command

@@ -176,9 +176,10 @@ def _collisions(logs: "dict[str, Log]", settings: "FitSettings") -> "Result[Clea
     rest = settings.arm.pose(settings.start_pose)
     angle = machine.joined({side: log.angle for side, log in logs.items()}, rest)
     result = machine.checker.clearance(next(iter(logs.values())).time, angle)
-    nearest, keys = int(result.distance.argmin()), ("from_s", "to_s", "depth_m", "deepest_at_s")
+    nearest = int(result.distance.argmin())
     meetings = [
-        {"bodies": [m.first, m.second]} | dict(zip(keys, (m.begins, m.ends, m.depth, m.deepest), strict=True))
+        {"bodies": [m.first, m.second], "from_s": m.begins, "to_s": m.ends}
+        | {"depth_m": m.depth, "deepest_at_s": m.deepest}
         for m in result.meetings
     ]
     content = {

@@ -4,24 +4,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import degrees
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hydroid.errors import RunError, SettingsError
+from hydroid.errors import RunError
 from hydroid.estimate import finite
 from hydroid.fitting.fit import Fit
-from hydroid.fitting.refinement import refine
-from hydroid.fitting.summary import account
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.parameters import Array
 from hydroid.posterior.band import Band, fitted_bands, prediction_bands
-from hydroid.posterior.uncertainty import uncertainty
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
-from hydroid.settings.search import RefinementSettings
 
 HORIZONS = (0.5, 1.0, 2.0, 5.0, 10.0)
 """over which a predicted change of an angle is compared [s]"""
@@ -144,18 +139,3 @@ def fitted(problem: Problem, fit: Fit) -> tuple[Prediction, ...]:
     joints, responses = tuple(problem.settings.outputs), fit.best.responses
     logs = zip(problem.logs, responses, fitted_bands(problem, fit.uncertainty, responses), strict=True)
     return tuple(Prediction(fit.final, log, joints, angles, bands, False) for log, angles, bands in logs)
-
-
-def without_one(model: IdentifiedModel, logs: Sequence[Log], left_out: int) -> IdentifiedModel:
-    """Return the model refined on all logs but one, with its own uncertainty.
-
-    Raises:
-        SettingsError: there is one log only.
-    """
-    if len(logs) < 2:
-        raise SettingsError("needs two logs or more", where="--leave-one-out")
-    problem = Problem(model.settings, [log for i, log in enumerate(logs) if i != left_out])
-    refinement = model.settings.refinement or RefinementSettings()
-    theta = problem.parameters.from_unit(refine(problem, model.theta, refinement).point)
-    name = f"{model.name} without {Path(logs[left_out].source).stem}"
-    return IdentifiedModel(model.settings, theta, name, account(problem, uncertainty(problem, theta)))

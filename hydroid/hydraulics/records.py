@@ -14,7 +14,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hydroid.arrays import Array, Mask, Structs
-from hydroid.errors import SettingsError
 from hydroid.hydraulics.solenoid import curve_exists, force_curve, plunger_weight
 from hydroid.hydraulics.valve import conductance
 from hydroid.quantity_table import QUANTITIES, ROWS
@@ -163,13 +162,6 @@ def has_force_curve(joints: Any) -> Mask:
     """Return which candidates have a force-stroke curve at every actuator, shape (n,)."""
     exists = curve_exists(joints.force_1, joints.force_2, joints.stroke_1, joints.stroke_2)
     return np.asarray(exists.all(axis=1), dtype=bool)
-
-
-def without_actuator(arm: Arm, joint: int) -> SettingsError:
-    """Return the error of a joint, 0-based, that is driven in stage 2 and has no actuator."""
-    what = f"joint {joint + 1} ({arm.joints[joint].name}) has no actuator"
-    hint = "stage 2 needs its cylinder (two pivots, areas) or rotary actuator: add actuator: to the joint"
-    return SettingsError(what, where=f"the arm's file of {arm.name}", hint=hint)
 
 
 def coefficients(joints: Records, period: float = 0.01, substeps: int = 1) -> Records:

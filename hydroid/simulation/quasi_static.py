@@ -22,7 +22,7 @@ import llvmlite.binding
 import numpy as np
 from numba import njit, types
 
-from hydroid.hydraulics.cylinder import bent, four_bar, triangle, volume
+from hydroid.hydraulics.cylinder import bent, rod, volume
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import command, move_spool, net_opening
 from hydroid.hydraulics.kernel import SOURCE, Plugin, make_pad
@@ -110,14 +110,8 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any)
 @compilable
 def linkage(c: Any, angle: float) -> Any:
     """Travel of a joint's rod [m] and its moment arm [m/rad] at an angle; of a rotary actuator as `bent`."""
-    if c.kind != LINEAR:
-        way, arm, _ = bent(angle, c)
-        return way, arm
-    psi, first = angle, 1.0
-    if c.rocker > 0.0:
-        psi, first, _ = four_bar(angle, c)
-    out, arm, _ = triangle(psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest)
-    return out, first * arm
+    way, arm, _ = rod(angle, c) if c.kind == LINEAR else bent(angle, c)
+    return way, arm
 
 
 @compilable

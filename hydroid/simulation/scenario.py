@@ -8,9 +8,10 @@ import numpy as np
 
 from hydroid.arm.locked import LockedArm, lock
 from hydroid.arrays import Array, Index, Mask, Structs
+from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
-from hydroid.hydraulics.records import NONE, Records, coefficients, without_actuator
+from hydroid.hydraulics.records import NONE, Records, coefficients
 from hydroid.log import Log
 from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
@@ -139,7 +140,12 @@ class Chain:
         self._idle = ~active[self.joints]
         for joint in self.joints[active[self.joints]].tolist():
             if arm.joints[joint].actuator is None:
-                raise without_actuator(arm, joint)
+                raise SettingsError(
+                    f"joint {joint + 1} ({arm.joints[joint].name}) has no actuator",
+                    where=f"the arm's file of {arm.name}",
+                    hint="stage 2 needs its cylinder (two pivots, areas) or rotary actuator: "
+                    "add actuator: to the joint",
+                )
         self._range = np.array([arm.lower, arm.upper])[:, self.joints]
         self._entries = mass_entries(locked.model)[np.ix_(self.columns, self.columns)]
         self._period, self._substeps = locked.model.opt.timestep, substeps

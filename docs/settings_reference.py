@@ -16,9 +16,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hydroid.settings.arm import Arm
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import FitSettings, StudySettings
 from hydroid.settings.log import JointColumns
-from hydroid.settings.study import StudySettings
 
 _HEAD = """# Settings
 

@@ -17,36 +17,31 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hydroid.commands.analyse import QuantityResult as QuantityResult
-    from hydroid.commands.analyse import analyse as analyse
-    from hydroid.commands.analyse import quantity as quantity
-    from hydroid.commands.check import check as check
-    from hydroid.commands.check import convert as convert
-    from hydroid.commands.fit import FitResult as FitResult
-    from hydroid.commands.fit import fit as fit
+    from hydroid.commands.analyse import (
+        QuantityResult as QuantityResult,
+        analyse as analyse,
+        quantity as quantity,
+    )
+    from hydroid.commands.check import check as check, convert as convert
+    from hydroid.commands.fit import FitResult as FitResult, fit as fit
     from hydroid.commands.init import init as init
     from hydroid.commands.inputs import load_settings as load_settings
     from hydroid.commands.logs import read_logs as read_logs
-    from hydroid.commands.plan import design as design
-    from hydroid.commands.plan import suggest as suggest
-    from hydroid.commands.stages import adapt as adapt
-    from hydroid.commands.stages import fit_hyd as fit_hyd
-    from hydroid.commands.stages import fit_mech as fit_mech
+    from hydroid.commands.plan import design as design, suggest as suggest
+    from hydroid.commands.stages import adapt as adapt, fit_hyd as fit_hyd, fit_mech as fit_mech
     from hydroid.commands.study import study as study
-    from hydroid.commands.validate import report as report
-    from hydroid.commands.validate import validate as validate
-    from hydroid.commands.view import simulate as simulate
-    from hydroid.commands.view import view as view
+    from hydroid.commands.validate import report as report, validate as validate
+    from hydroid.commands.view import simulate as simulate, view as view
     from hydroid.errors import HydroidError as HydroidError
-    from hydroid.identified_model import IdentifiedModel as IdentifiedModel
-    from hydroid.identified_model import identified as identified
-    from hydroid.identified_model import load_identified as load_identified
-    from hydroid.identified_model import start_values as start_values
-    from hydroid.log import Log as Log
-    from hydroid.log import write_log as write_log
+    from hydroid.identified_model import (
+        IdentifiedModel as IdentifiedModel,
+        identified as identified,
+        load_identified as load_identified,
+        start_values as start_values,
+    )
+    from hydroid.log import Log as Log, write_log as write_log
     from hydroid.parallel.cluster import open_workers as open_workers
-    from hydroid.plant import Plant as Plant
-    from hydroid.plant import load_plant as load_plant
+    from hydroid.plant import Plant as Plant, load_plant as load_plant
 
 __version__ = "0.1.0"
 

@@ -34,9 +34,8 @@ from hydroid.problem.problem import Problem
 from hydroid.progress import NOTE, Progress
 from hydroid.run.folder import deciding, model_hash, samples_hash
 from hydroid.search.pareto import segment_best
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load
-from hydroid.settings.study import StudySettings, cell_settings
 
 Result = dict[str, Any]  # what `perform` returns, or {"failed": why}
 

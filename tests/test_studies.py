@@ -15,8 +15,8 @@ from small_studies import content, run, written
 
 from hydroid import read_logs, studies
 from hydroid.errors import HydroidError, RunError
+from hydroid.settings.fit import StudySettings, cell_settings
 from hydroid.settings.load import load
-from hydroid.settings.study import StudySettings, cell_settings
 from hydroid.studies import make_tasks
 
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.stats import nct
-from scipy.stats import t as student
+from scipy.stats import nct, t as student
 from studies import Claim, Runs, Table, of_cell
 
 from hydroid.parameters import Array

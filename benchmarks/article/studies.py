@@ -19,9 +19,8 @@ from hydroid.errors import RunError
 from hydroid.log import Log
 from hydroid.prediction import simulate_log
 from hydroid.problem.problem import Problem
-from hydroid.settings.fit import FitSettings
+from hydroid.settings.fit import Changes, FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import Settings, load
-from hydroid.settings.study import Changes, StudySettings, cell_settings
 from hydroid.studies import Result, Task
 
 FOLDER = Path(__file__).parent

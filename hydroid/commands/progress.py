@@ -105,8 +105,7 @@ class FitProgress(Progress):
 
 def _new_bar() -> Any:
     from rich.console import Console
-    from rich.progress import Progress as Bar
-    from rich.progress import TextColumn
+    from rich.progress import Progress as Bar, TextColumn
 
     text = TextColumn("{task.fields[text]}")
     bar = Bar(*Bar.get_default_columns(), text, console=Console(stderr=True), transient=True)

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hydroid.commands.fit import FitResult, fit
-from hydroid.commands.fit import fit as run_fit
+from hydroid.commands.fit import FitResult, fit, fit as run_fit
 from hydroid.commands.inputs import (
     ConfigSource,
     LogSources,

@@ -11,8 +11,8 @@ from hydroid.commands.inputs import Source, command
 from hydroid.commands.logs import read_logs
 from hydroid.commands.progress import Progress
 from hydroid.errors import Stopped
+from hydroid.settings.fit import StudySettings
 from hydroid.settings.load import load
-from hydroid.settings.study import StudySettings
 
 if TYPE_CHECKING:
     from hydroid.studies import Row
@@ -49,8 +49,7 @@ def study(
     from hydroid.estimate import finite
     from hydroid.reporting.page import Table
     from hydroid.run.process import locked
-    from hydroid.studies import processes as open_processes
-    from hydroid.studies import run_study
+    from hydroid.studies import processes as open_processes, run_study
 
     try:
         with locked(folder), open_processes(processes) as executor, Progress() as progress:

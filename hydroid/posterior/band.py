@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.stats import chi2, t as student
 
 from hydroid.arrays import Array
 from hydroid.identified_model import IdentifiedModel

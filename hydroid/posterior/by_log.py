@@ -24,8 +24,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.stats import chi2, t as student
 
 from hydroid.arrays import Array
 from hydroid.posterior.posterior import COVERAGE

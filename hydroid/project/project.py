@@ -18,7 +18,7 @@ from hydroid.log import open_table
 from hydroid.project.arm_file import LIFT, TEMPLATE_FILE, TEMPLATE_MODEL, JointSize, arm_text, joint_sizes
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
-from hydroid.reporting.arm_chart import arm_picture
+from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.document import read_yaml
 from hydroid.settings.fit import FitSettings

@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from arms import BOOM, CHILD, CYLINDER, PARENT, write_arm
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from hydroid.arm.model import add_payload, load_model
 from hydroid.errors import HydroidError

@@ -2,8 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 from arms import BOOM, write_arm
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from mujoco.batch import Batch
 
 from hydroid.arm.export import locked_spec

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from hydroid.commands.app import COMMANDS as NAMES
-from hydroid.commands.app import click_command
+from hydroid.commands.app import COMMANDS as NAMES, click_command
 from hydroid.quantity_table import QUANTITIES
 
 ROOT = Path(__file__).parents[2]

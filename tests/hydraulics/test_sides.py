@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hydraulic_reference import changed, rotary, simulate
-from hydraulic_reference import wheel as lone_wheel
+from hydraulic_reference import changed, rotary, simulate, wheel as lone_wheel
 
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import nominal_joints

@@ -2,8 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from log_files import cells, faults, lines, place, read, save
 
 holes = st.lists(st.tuples(st.integers(2, 75), st.integers(1, 3)), max_size=4)

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import TRUTH as ARTICLE
-from conftest import noisy, step_log
+from conftest import TRUTH as ARTICLE, noisy, step_log
 
 import hydroid
 from hydroid.fitting.refinement import refine

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import TRUTH as MECH
-from conftest import noisy, step_log
+from conftest import TRUTH as MECH, noisy, step_log
 
 from hydroid import load_settings
 from hydroid.posterior.identifiability import Identifiability, identifiability

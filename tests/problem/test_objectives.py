@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from hydroid.errors import SettingsError
 from hydroid.problem.channels import norm, overall_objective, segment_bounds, segment_objectives

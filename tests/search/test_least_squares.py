@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hydroid.search.descent import Descent, Ending, start
 from hydroid.search.least_squares import least_squares, step

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
 from pymoo.problems import get_problem

@@ -1,4 +1,4 @@
-"""A fit's settings, a YAML file per job, from the log's columns to the search; and a study's, that vary them."""
+"""Settings of a fit, one YAML file per job, from the log to the search; and of a study, which vary them."""
 
 from collections.abc import Mapping
 from dataclasses import replace

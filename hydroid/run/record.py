@@ -205,7 +205,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     groups = ([name] if os.path.exists(name) else glob.glob(name) or [name] for name in names)
     for path in sorted({path for group in groups for path in group}):
         try:
-            runs.append(_read(path))
+            runs.append(_finished(path))
         except HydroidError as error:
             _log.warning("left out: %s", error)
     if not runs:
@@ -221,7 +221,7 @@ def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...
     return tuple(runs)
 
 
-def _read(path: str) -> Record:
+def _finished(path: str) -> Record:
     """Read a finished run; raises HydroidError: it is not finished or is damaged."""
     folder = RunFolder(Path(path))
     if (status := folder.identity().get("status")) != "done":

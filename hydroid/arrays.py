@@ -1,4 +1,7 @@
-"""Arrays by what they hold; shapes and units stand where one is made."""
+"""Arrays by what they hold, and records of them; shapes and units stand where one is made."""
+
+from dataclasses import dataclass, field
+from typing import TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,3 +11,11 @@ Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 Structs = NDArray[np.void]  # of a structured type
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
+def record(kind: type[T]) -> type[T]:
+    """Make a frozen dataclass that equals itself alone: whether arrays are equal has no one answer."""
+    return dataclass(frozen=True, eq=False)(kind)

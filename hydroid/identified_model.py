@@ -1,13 +1,12 @@
 """An estimate with its settings: from a run folder, a saved plant, a file of values, or nominal values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.estimate import NAME, FitSummary, ParameterEstimate, read_estimate
 from hydroid.files import find_config, is_file, write_atomic
 from hydroid.settings.fit import FitSettings
@@ -18,7 +17,7 @@ CONFIG, ARM, MODEL = "config.yaml", "arm.yaml", "model/arm.xml"
 PAIR = "model/pair.xml"  # the machine of two arms
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class IdentifiedModel:
     """A model at an estimate.
 

@@ -18,13 +18,13 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import record
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import finite
 from hydroid.files import write_atomic
@@ -40,7 +40,7 @@ from hydroid.settings.load import load
 Result = dict[str, Any]  # what `perform` returns, or {"failed": why}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Task:
     """One run: a cell, a seed, the settings with it, and the logs."""
 
@@ -102,7 +102,7 @@ Read = Callable[[Sequence[Path], FitSettings], list[Log]]  # reads logs as setti
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Row:
     """One run: its cell and seed, its measures by name (empty where it failed), and why it failed."""
 

@@ -8,13 +8,12 @@ what the laws of all joints leave, the logs make a joint turned round more likel
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.findings import Finding
 from hydroid.log import Log
 from hydroid.posterior.noise import fit_noise
@@ -34,7 +33,7 @@ FROM_STOPS, FROM_ZERO = 0.02, 3.0
 TINY = np.finfo(float).tiny
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Motion:
     """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints, shape (n, J).
 

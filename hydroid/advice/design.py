@@ -7,7 +7,7 @@ Only the simulated motion is kept within the limits; an arm that differs from th
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from hydroid.advice.experiment import (
     violation,
 )
 from hydroid.arm.model import load_machine, load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.posterior.linear import estimate_box, prior_slopes, white_posterior
@@ -149,7 +149,7 @@ class ExperimentSimulator:
         return angle
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Design:
     """A designed experiment beside the random ones it was chosen from.
 
@@ -183,7 +183,7 @@ class Design:
 
 def weakest(known: Posterior, directions: Array) -> float:
     """Relative standard deviation of the least known of some directions, (p, d)."""
-    return np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1])
+    return float(np.sqrt(np.linalg.eigh(directions.T @ known.covariance @ directions)[0][-1]))
 
 
 def design(

@@ -4,13 +4,13 @@ A command is a sequence of levels, each held for a random time, as in the articl
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.problem.bindings import Bindings
@@ -26,7 +26,7 @@ class Input(NamedTuple):
     level: Array
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Experiment:
     """Start pose [rad], shape (J,), and the inputs of the driven joints, by joint (0-based)."""
 

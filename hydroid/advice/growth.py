@@ -30,7 +30,7 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 
 from hydroid.advice.terms import Term, terms
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.posterior.linear import least_squares_rows
 from hydroid.posterior.noise import Noise, prior_weight, problem_noise
 from hydroid.posterior.uncertainty import Uncertainty
@@ -61,11 +61,11 @@ class Score:
 
     def chance(self, *, one_sided: bool) -> float:
         """Return the probability of such a statistic where the model lacks nothing."""
-        tail = student.sf(self.statistic if one_sided else abs(self.statistic), self.freedom)
+        tail = float(student.sf(self.statistic if one_sided else abs(self.statistic), self.freedom))
         return tail if one_sided else 2 * tail
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Explained:
     """What a fit has explained, and the noise that it has left.
 
@@ -87,28 +87,28 @@ class Explained:
         """Return the score of a change of the residuals, shape (R,)."""
         row = np.append(change, np.zeros(self.residual.size - change.size))
         row -= self.effects.T @ (self.effects @ row)
-        square = row @ row
+        square = float(row @ row)
         if not square > 0:
             return Score(0.0, 0.0, 0.0, 0.0, 1.0)
-        gain = -(row @ self.residual)
+        gain = -float(row @ self.residual)
         left = (self.residual + gain / square * row)[: change.size]
         variance, freedom = self._variance(row, self.noise_of(left))
-        deviation = np.sqrt(variance)
-        before = max(np.linalg.norm(self.residual[: change.size]), np.finfo(float).tiny)
-        saved = 1.0 - np.linalg.norm(left) / before
+        deviation = float(np.sqrt(variance))
+        before = max(float(np.linalg.norm(self.residual[: change.size])), np.finfo(float).tiny)
+        saved = 1.0 - float(np.linalg.norm(left)) / before
         return Score(gain / deviation, gain / square, saved, square / deviation, freedom)
 
     def _variance(self, row: Array, noise: Sequence[Noise]) -> tuple[float, float]:
         """Variance of the product of a row, (R + M + p,), with the residuals, and its degrees of freedom."""
-        variance = self.prior_weight**2 * np.sum(row[self.rows[-1].stop :] ** 2)
+        variance = self.prior_weight**2 * float(np.sum(row[self.rows[-1].stop :] ** 2))
         spectra: list[Array] = []
         for process, part in zip(noise, self.rows, strict=True):
             weighed = matmul_toeplitz(process.autocovariance, row[part])
-            variance += row[part] @ weighed
+            variance += float(row[part] @ weighed)
             power = np.real(np.conj(np.fft.rfft(row[part])) * np.fft.rfft(weighed))
             spectra.append(np.maximum(power, 0.0) / weighed.size)
         spectrum = np.concatenate(spectra)
-        equal = np.sum(spectrum) ** 2 / np.sum(spectrum**2)
+        equal = float(np.sum(spectrum) ** 2 / np.sum(spectrum**2))
         level = 0.5 * sum(process.effective_sample_size for process in noise)
         return variance, max(max(2 * equal, level) - 1, 1.0)
 
@@ -164,7 +164,7 @@ class Candidate:
     gain: float
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Refit:
     """What a short refinement leads to.
 

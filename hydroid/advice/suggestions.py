@@ -90,7 +90,7 @@ def next_actions(problem: Problem, known: Uncertainty) -> list[dict[str, Any]]:
             action |= {"total": len(names), "parameter": str(names[best])}
             action |= {"before_percent": 100 * wide[best], "after_percent": 100 * narrow[best]}
             # by which all deviations shrink on geometric average
-            useful.append((after, np.mean(np.log(wide / narrow)), action))
+            useful.append((after, float(np.mean(np.log(wide / narrow))), action))
     return [action for *_, action in sorted(useful, key=lambda one: one[:2], reverse=True)[:MOST_ACTIONS]]
 
 

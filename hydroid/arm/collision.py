@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import ModelError
 
 FARTHEST = 100.0  # distance beyond which MuJoCo need not look [m]
@@ -29,7 +29,7 @@ class Meeting:
     deepest: float  # when [s]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Clearance:
     """The smallest distance between any two bodies along a trajectory of T samples.
 
@@ -131,5 +131,5 @@ def _meetings(names: tuple[str, str], time: Array, depth: Array) -> Generator[Me
     samples = np.flatnonzero(depth)
     for run in np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1):
         begins, ends, worst = run[0], run[-1], run[np.argmax(depth[run])]
-        when = time[begins], time[ends]
-        yield Meeting(*names, *when, depth[worst], time[worst])
+        when = float(time[begins]), float(time[ends])
+        yield Meeting(*names, *when, float(depth[worst]), float(time[worst]))

@@ -1,14 +1,13 @@
 """An arm's compiled model: with a payload where a log has one, or beside its mirror image on one carrier."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import mujoco
 import numpy as np
 
 from hydroid.arm.collision import CollisionChecker
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import ModelError, SettingsError
 from hydroid.mjcf import mujoco_errors, read_mjcf
 from hydroid.settings.arm import Arm
@@ -43,7 +42,7 @@ def add_payload(spec: mujoco.MjSpec, arm: Arm, mass: float) -> mujoco.MjSpec:
     return loaded
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Machine:
     """A whole machine, all joints free, to be put into poses.
 

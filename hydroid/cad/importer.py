@@ -1,14 +1,13 @@
 """A URDF or MJCF -> the model of a serial arm that hydroid can simulate, and its meshes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.cad.chain import choose_chain
 from hydroid.cad.cylinders import take_cylinders
 from hydroid.cad.repair import repair_inertias, weigh
@@ -41,7 +40,7 @@ SCENE = """
 """sections of an MJCF; `arrange` puts lights and cameras around the arm"""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ImportedArm:
     """A serial arm out of a robot's file.
 

@@ -76,7 +76,7 @@ def weigh(spec: mujoco.MjSpec, notes: Notes, total: float | None, lost: Collecti
         if usual.mass <= MASSLESS or body.name in lost:
             # a slender link to the next joint; the last one goes on, half as long
             way = data.body(body.name).xmat.reshape(3, 3).T @ (there - here)
-            length, least, most = max(np.linalg.norm(way), 0.4 * longest, 0.1), SLIGHT, np.inf
+            length, least, most = max(float(np.linalg.norm(way)), 0.4 * longest, 0.1), SLIGHT, np.inf
             mass = USUAL * SLENDER * length**3
             usual = Inertial(mass, 0.5 * way, mass * length**2 / 12 * np.eye(3))
         if least <= USUAL * body.mass / usual.mass <= most:
@@ -165,4 +165,4 @@ def _stated_fault(body: mujoco.MjsBody, urdf: bool) -> str:
 
 def _gyration(tensor: Array, mass: float) -> float:
     """Return the largest radius of gyration [m]."""
-    return np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass)
+    return float(np.sqrt(np.linalg.eigvalsh(tensor)[-1] / mass))

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import LogError
 from hydroid.findings import WORDS, Finding, Level
 from hydroid.words import listed
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Log:
     """What was commanded and what was measured, T samples of J joints.
 

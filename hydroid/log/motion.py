@@ -1,11 +1,10 @@
 """How a joint moves in a log: how far and fast, which way, how long after its command, above which one."""
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.log.log import Log
 
 QUICK, SLOW = 0.05, 0.25  # standard deviations of the Gaussians [s]; the slow one leaves no sensor noise
@@ -13,7 +12,7 @@ LEAST_PATH = 3.0  # [deg] that tell a direction
 AGAINST = 0.75  # of the path goes against the command: it is logged the other way around
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class JointMotion:
     """What a log says of one measured joint (number, from 1)."""
 

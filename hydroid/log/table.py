@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
@@ -88,7 +88,7 @@ class Table:
         return Recording(self, tuple(signals), values, np.arange(len(values)))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Recording:
     """The used columns of one file, R rows of C signals.
 

@@ -8,12 +8,12 @@ Student's t. What an unseen log shows beyond all this is a further error of the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2, t as student
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.linear import start_deviations
@@ -24,7 +24,7 @@ from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Band:
     """The 95 % prediction band of one joint's angle in one log, and the error that was found.
 
@@ -44,11 +44,6 @@ class Band:
     error: float
     expected: float
     limit: float = np.inf
-
-    @property
-    def exists(self) -> bool:
-        """Whether the parameters are known well enough for a band."""
-        return bool(np.isfinite(self.expected))
 
     @property
     def model_error(self) -> float:
@@ -102,7 +97,7 @@ def prediction_bands(model: IdentifiedModel, log: Log, response: Array) -> dict[
         noise, error = noises[joint], log.angle[:, joint - 1] - response[:, column]
         unseen = np.radians(left_out.get(f"q{joint}", ()))
         wrong = max(np.mean(unseen**2) - np.mean(variance + noise**2), 0.0) if unseen.size else 0.0
-        widened = wrong * (student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
+        widened = wrong * float(student.ppf(0.5 + COVERAGE / 2, unseen.size or 1) / NORMAL) ** 2
         variance = variance + np.sum(start[joint] ** 2, axis=0)
         few = np.vstack([parts[:, :, column], start[joint]])
         square = np.sum((few @ few.T / few.shape[1]) ** 2) + widened**2
@@ -120,7 +115,7 @@ def _band(
     """
     variance = variance + noise**2
     half = np.sqrt(known.quantile**2 * variance + NORMAL**2 * widened)
-    inside, rms = np.mean(np.abs(error) <= half), np.sqrt(np.mean(error**2))
+    inside, rms = float(np.mean(np.abs(error) <= half)), np.sqrt(np.mean(error**2))
     return Band(noise, half, inside, rms, np.sqrt(np.mean(variance) + wrong))
 
 
@@ -134,7 +129,7 @@ def _limit(mean: float, square: float) -> float:
     if not np.isfinite(mean):
         return np.inf
     freedom = mean**2 / max(square, 1e-3 * mean**2)
-    return np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom)
+    return float(np.sqrt(mean * chi2.ppf(COVERAGE, freedom) / freedom))
 
 
 def start_effects(problem: Problem, theta: Array, levels: dict[int, float]) -> dict[int, Array]:

@@ -5,12 +5,12 @@ interpolated, so that everything is smooth in the parameters, and differences gi
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
@@ -20,7 +20,7 @@ from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Bench:
     """A joint whose quantities are wanted.
 
@@ -65,7 +65,7 @@ class Bench:
         return Movement(self, command, self.angle, max(round(1.2 / self.period), 2))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Movement:
     """A step of the command [%] from an angle [rad], held for some samples.
 

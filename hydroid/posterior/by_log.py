@@ -21,12 +21,11 @@ that alone determines a parameter is zero at the optimum.
 """
 
 from collections import defaultdict
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2, t as student
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.posterior.posterior import COVERAGE
 from hydroid.posterior.uncertainty import Source, Uncertainty, ends
 from hydroid.problem.problem import Problem
@@ -34,7 +33,7 @@ from hydroid.problem.problem import Problem
 FEW = 5.0  # degrees of freedom below which a standard deviation by log is rough: to a third, or worse
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ByLog:
     """What the differences between the G logs say about P parameters.
 

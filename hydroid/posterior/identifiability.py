@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.linear import least_squares_rows
@@ -93,7 +93,7 @@ def _fit_others(
     return others.from_unit(ended.point), 2 * ended.cost
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Identifiability:
     """The directions that are determined, and those that are not.
 

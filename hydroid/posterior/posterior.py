@@ -9,14 +9,14 @@ g' C g = |G^-T g|² (G. W. Oehlert, *A note on the delta method*, 1992).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import norm as normal
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import ParameterSet
@@ -30,7 +30,7 @@ WEAK_PRIOR = 10.0  # relative standard deviation of every parameter before any l
 STEP = 0.1  # step of the differences in standard deviations: wide enough for the small jumps that events make
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Known:
     """Some quantities at an estimate.
 
@@ -47,7 +47,7 @@ class Known:
     given: Mask
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Posterior:
     """What is known of p parameters that vary together at an estimate.
 

@@ -34,7 +34,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm as normal
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.linear import Linear, linearised, white_posterior
 from hydroid.posterior.noise import STEP, Noise, neighbours, problem_noise, transformed, unbiased
@@ -109,7 +109,7 @@ def flag_of(relative_sd: float, share: float = 1.0) -> Flag:
     return Flag.WEAK if alone > WEAK_ABOVE else Flag.IDENTIFIABLE
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Uncertainty:
     """How precisely the data determine P parameters, p of them free, at an estimate.
 

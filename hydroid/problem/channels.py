@@ -14,12 +14,11 @@ empty.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.errors import SettingsError
 from hydroid.log import Log
 from hydroid.settings.problem import ObjectiveSettings
@@ -29,7 +28,7 @@ Quantity = Literal["angle", "pressure_a", "pressure_b"]
 SIDES: tuple[Quantity, Quantity] = ("pressure_a", "pressure_b")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Channel:
     """One signal of one log.
 

@@ -9,18 +9,16 @@ G. H. Golub and V. Pereyra, 1973), which is to whiten the residuals for a start 
 is computed from such residuals, intervals too, holds for any start angle that the prior allows.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.problem.problem import OpenStart, Problem, compared_pressures, make_simulation
 
 STEP = np.radians(0.05)  # of the differences by a start angle
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StartSlopes:
     """What the start angles of one log do to its residuals.
 

@@ -6,11 +6,11 @@ measurement.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import SettingsError
 from hydroid.parameters import ParameterSet
 from hydroid.settings.problem import PriorSettings
@@ -21,7 +21,7 @@ CONSTRAINT_SD = 1e-5
 MAX_SWEEPS = 200  # projections on all priors in turn; two that are nearly parallel need the most
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Combination:
     """A prior on factors·theta, or on a ratio a / b.
 
@@ -136,7 +136,7 @@ def _combination(name: str, prior: PriorSettings, parameters: ParameterSet) -> _
         return None
     width = np.where(free, parameters.upper - parameters.lower, 0.0)
     step = factors * width**2 / np.sum((factors * width) ** 2)
-    sd = prior.sd or CONSTRAINT_SD * (np.abs(factors) @ width)
+    sd = prior.sd or CONSTRAINT_SD * float(np.abs(factors) @ width)
     if prior.ratio is None:
         return _Combination(name, factors, prior.value, sd, None, step)
     divisor = names.index(prior.ratio[1])

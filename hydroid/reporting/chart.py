@@ -5,13 +5,13 @@ own shade of them.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 
 Color = str  # ink, grey, pale or one of SERIES
 SERIES: tuple[Color, ...] = ("orange", "blue", "green", "pink", "yellow", "sky")
@@ -19,7 +19,7 @@ SERIES: tuple[Color, ...] = ("orange", "blue", "green", "pink", "yellow", "sky")
 _none = partial(np.empty, 0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Mark:
     """One thing drawn in a panel.
 
@@ -62,7 +62,7 @@ class Mark:
         return replace(self, x=self.x[at], y=self.y[at], end=self.end[at] if len(self.end) else self.end)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Panel:
     """A pair of axes.
 
@@ -84,7 +84,7 @@ class Panel:
     log_y: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Chart:
     """Panels that belong together, with one legend.
 

@@ -5,7 +5,6 @@ picture. Its script (`moving_arm.js`) draws the simulated arm over the measured 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import mujoco
@@ -13,14 +12,14 @@ import numpy as np
 import trimesh
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.cad.shapes import SHOWN
 from hydroid.fitting.validation import Prediction
 from hydroid.reporting.page import Plot, Section, Tab
 from hydroid.settings.arm import Arm
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Shape:
     """A shape of a body: its outermost corners in the body's frame [m], shape (n, 3)."""
 
@@ -109,7 +108,7 @@ _CAPTION = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MovingArm:
     """An arm and how it moves, in units of the picture.
 

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, record
 from hydroid.errors import HydroidError, RunError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.files import file_name, write_atomic
@@ -49,7 +49,7 @@ class Effort:
     ending: str
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FitResult:
     """The arrays of a fit.
 
@@ -70,7 +70,7 @@ class FitResult:
     baselines: Baselines
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Record:
     """A finished run.
 

@@ -7,11 +7,11 @@ events make.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 
 Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be simulated"""
@@ -25,7 +25,7 @@ CURVED = 0.3
 """part of the long step's slope; where the short step's is smaller, the long one's is mostly curvature"""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Box:
     """A point between its bounds, and how it may move.
 
@@ -61,7 +61,7 @@ class Box:
         return np.clip(moved, np.minimum(self.lower, self.at), np.maximum(self.upper, self.at))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Axes:
     """Steps from a point along p directions of its varied coordinates, all within the bounds.
 

@@ -1,6 +1,6 @@
 """Where least squares stands: the state between two steps, why it ended, and the residual's linear model."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from enum import Enum
 from typing import Any, Self
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.search.axes import Function
 
 WIDTH = 2.0**-26  # of the differences: the root of the rounding unit
@@ -37,7 +37,7 @@ class Ending(Enum):
         return self in (Ending.GAIN, Ending.SLOW, Ending.EXACT, Ending.NO_IMPROVEMENT)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Descent:
     """Least squares under way, or ended.
 
@@ -153,7 +153,7 @@ class LinearModel:
     def gain(self, s: Array) -> float:
         """Part of the cost that the linear model promises to save by a step."""
         after = self._right + self._triangle @ s
-        return 0.5 * (self._right @ self._right - after @ after)
+        return 0.5 * float(self._right @ self._right - after @ after)
 
     def reach(self, s: Array) -> Array:
         """Return the point of the box that a step leads to, shape (p,)."""

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.arrays import Array, Ints
+from hydroid.arrays import Array, Ints, record
 from hydroid.search.chromosomes import (
     Coding,
     Genes,
@@ -30,7 +30,7 @@ from hydroid.search.pareto import crowding, feasible, ranks
 from hydroid.settings.search import GeneticSettings
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Population:
     """Candidates and their objectives; nothing ever writes into its arrays.
 

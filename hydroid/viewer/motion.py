@@ -1,13 +1,12 @@
 """Arms in motion: a simulated machine beside the measured one, or a plant under its sliders."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from hydroid.arm.model import ALONE, Machine, load_machine
-from hydroid.arrays import Array, Mask
+from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
@@ -15,7 +14,7 @@ from hydroid.plant import Plant
 from hydroid.prediction import predict_log
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Motion:
     """A machine under the commands of logs.
 

@@ -206,12 +206,9 @@ def write_estimate(folder: Path, summary: FitSummary) -> None:
 def read_estimate(source: Path) -> tuple[Path, dict[str, Any], FitSummary | None]:
     """Read parameter values by name: of a folder, an `estimate.yaml`, or a YAML file of `K: 0.2` lines.
 
-    Returns:
-        The file, its values, unchecked where they are not an estimate's, and the estimate where there is one.
-
-    Raises:
-        RunError: the folder holds none.
-        SettingsError: the file cannot be read, or holds no values by name.
+    Returned are the file, its values, unchecked where they are not an estimate's, and the estimate where
+    there is one. Raises RunError: the folder holds none; SettingsError: the file cannot be read, or holds no
+    values by name.
     """
     file = source / NAME if source.is_dir() else source
     if source.is_dir() and not is_file(file):

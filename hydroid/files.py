@@ -22,15 +22,10 @@ _log = logging.getLogger(__name__)
 def write_atomic(path: Path, content: str | bytes, *, keep: Path | None = None) -> None:
     """Write a file so that readers see either the old content or the new, also after a crash.
 
-    The content reaches the disk before the file gets its name, so a power cut leaves the old file or the new
-    one. A killed process may leave a hidden file with the suffix PART.
-
-    Args:
-        path: the file.
-        content: its content; text is written as UTF-8.
-        keep: path in the same folder to which the old file, if any, is moved first. After a crash between the
-            two renamings only this file exists.
-    Raises RunError: the folder cannot be written, or the disk is full.
+    The content, text as UTF-8, reaches the disk before the file gets its name, so a power cut leaves the old
+    file or the new one. A killed process may leave a hidden file with the suffix PART. `keep` is a path in
+    the same folder to which the old file, if any, is moved first: after a crash between the two renamings
+    only it exists. Raises RunError: the folder cannot be written, or the disk is full.
     """
     with undisturbed():
         _write(path, content.encode() if isinstance(content, str) else content, keep)
@@ -120,13 +115,10 @@ def assets() -> Path:
 def find_config(
     name: str | Path, beside: Path | None = None, *, kind: Literal["config", "arm"] = "config"
 ) -> Path:
-    """Find a config file.
+    """Find a config file by a path, or the name of a shipped config with or without `.yaml`.
 
-    Args:
-        name: a path, or the name of a shipped config with or without `.yaml`.
-        beside: folder in which a relative path is looked up first.
-        kind: config of a fit, or file of an arm; decides which names the error lists.
-    Raises SettingsError: no such file, with the names of the shipped configs.
+    A relative path is looked up in `beside` first; `kind`, a fit's config or an arm's file, decides which
+    names the error lists. Raises SettingsError: no such file, with the names of the shipped configs.
     """
     shipped = assets() / "configs"
     folders = [Path(), shipped] if beside is None else [beside, Path(), shipped]

@@ -80,8 +80,6 @@ def load_identified(
         source: a run folder, the folder of a saved plant, an `estimate.yaml`, or a YAML file of values by
             name; None: no values.
         config: settings, a path or a shipped name; left out: those beside the estimate, or `default`.
-        overrides: settings to replace, by dotted key.
-        default: a shipped config.
         nominal: take parameters without a value as the settings and the arm's file have them.
 
     Raises:

@@ -52,10 +52,7 @@ def predict_log(model: IdentifiedModel, log: Log) -> Log:
 
 def simulate_log(settings: FitSettings, log: Log, values: Mapping[str, Any], source: str) -> Log:
     """Return `predict_log` for parameters by name; `source` is where they came from, for messages.
-
-    Raises:
-        SettingsError: a parameter is missing or unknown.
-        RunError: the simulation diverged.
+    Raises SettingsError: a parameter is missing or unknown; RunError: the simulation diverged.
     """
     return predict_log(identified(settings, values, source), log)
 

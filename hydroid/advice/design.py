@@ -189,18 +189,11 @@ def weakest(known: Posterior, directions: Array) -> float:
 def design(
     settings: FitSettings, theta: Array, logs: Sequence[Log], seed: int, progress: Progress = no_progress
 ) -> Design:
-    """Choose start pose, joints and commands of an experiment.
+    """Choose start pose, joints and commands of an experiment at an estimate, shape (P,), beside its logs.
 
     Random experiments are drawn and kept within the limits. The best few are then changed at random, and a
-    changed one replaces the worst of them where it is better. The same seed gives the same experiment.
-
-    Args:
-        settings: the model, the free parameters, the priors, and `design`.
-        theta: the present estimate, shape (P,).
-        logs: records whose information is there already; may be empty.
-        seed: of draws and changes.
-        progress: called with the number of experiments so far.
-    Raises SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
+    changed one replaces the worst of them where it is better. The same seed gives the same experiment. Raises
+    SettingsError: joints or poses that cannot be used, or no experiment within the limits was found.
     """
     effort, parameters = settings.design.effort, Bindings(settings).parameters
     rng = np.random.default_rng(seed)

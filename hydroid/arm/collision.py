@@ -53,10 +53,7 @@ class Clearance:
 class CollisionChecker:
     """Distances between the bodies of a compiled model whose joints are all hinges or slides.
 
-    Args:
-        model: compiled; contacts may be switched off.
-        source: for messages.
-    Raises ModelError: nothing in the model can collide.
+    Contacts may be switched off. Raises ModelError: nothing in the model, `source` in messages, can collide.
     """
 
     def __init__(self, model: mujoco.MjModel, source: str = "the model") -> None:
@@ -69,12 +66,7 @@ class CollisionChecker:
         """of the bodies of each pair of shapes"""
 
     def clearance(self, time: Array, angle: Array) -> Clearance:
-        """Return how near bodies come along a trajectory.
-
-        Args:
-            time: [s], shape (T,).
-            angle: of all joints in the model's order [rad], shape (T, nq).
-        """
+        """Return how near bodies come along a trajectory: time [s], (T,), and angles of all joints [rad]."""
         distance = np.stack([self._distances(pose, FARTHEST) for pose in angle])
         depths: dict[tuple[str, str], Array] = {}
         for pair in np.flatnonzero(distance.min(axis=0) < 0):
@@ -91,8 +83,7 @@ class CollisionChecker:
     def first_below(self, angle: Array, margin: float) -> tuple[int, tuple[str, str]] | None:
         """Return the first sample of a trajectory [rad], (T, nq), with two bodies nearer than a margin [m].
 
-        Returns:
-            The sample and the names of the bodies; None where every distance keeps the margin, 0 or more.
+        Also their names; None where every distance keeps the margin, 0 or more.
         """
         for sample, pose in enumerate(angle):
             distance = self._distances(pose, margin)

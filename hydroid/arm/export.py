@@ -66,14 +66,10 @@ def dressed_model(spec: mujoco.MjSpec, locked: LockedArm) -> mujoco.MjModel:
 def locked_spec(
     spec: mujoco.MjSpec, locked: LockedArm, model: mujoco.MjModel, motors: ArrayLike | None = None
 ) -> mujoco.MjSpec:
-    """Return an arm with locked joints.
+    """Return an arm's MJCF with joints locked; inertia, joints and time step are those of `model`.
 
-    Args:
-        spec: the arm's MJCF, for its looks.
-        locked: which of its bodies move as one.
-        model: inertia and joints of the locked arm, and the time step; `locked.model` or one like it.
-        motors: torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
-            None: no motors.
+    `motors` are torque per command [N·m/%] and torque without one [N·m] of the moving joints, shape (2, V);
+    None: no motors.
     """
     source = spec.copy()
     forces = source.actuators, source.sensors, source.equalities, source.keys, source.excludes, source.pairs
@@ -139,13 +135,8 @@ def write_fitted(
 ) -> None:
     """Write the fitted arm to `model/`, beside `arm.xml`, and a README that says what it is good for.
 
-    Args:
-        folder: `model/`.
-        fitted: the fitted arm.
-        timestep: MuJoCo's [s].
-        joints: names of the joints that take commands.
-        actuators: hydraulic parameters by joint (stage 2); None: the MJCF has motors (stage 1).
-    Raises RunError: the folder cannot be written.
+    `joints` names those that take commands; `actuators` are hydraulic parameters by joint (stage 2), or None:
+    the MJCF has motors (stage 1).
     """
     name, words = "fitted.xml", _MECHANICAL_README
     if actuators is not None:

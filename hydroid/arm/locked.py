@@ -72,13 +72,9 @@ class LockedArm:
 
 
 def lock(spec: mujoco.MjSpec, arm: Arm, moving: Mask, pose: Array) -> LockedArm:
-    """Lock all joints but the moving ones.
+    """Lock all joints of an arm's model but the `moving` ones, (J,), one at least.
 
-    Args:
-        spec: the arm's model, as `load_model` returns it.
-        arm: its settings, which name joints and links.
-        moving: which joints stay, shape (J,), one at least.
-        pose: angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
+    `pose` has the angles [rad], shape (J,), in the order of `arm.joint_names`; a moving joint's is its start.
     """
     names, columns = np.array(arm.joint_names), np.flatnonzero(moving)
     with quiet_mujoco():

@@ -62,11 +62,8 @@ class Machine:
         return CollisionChecker(self.model, self.arm.name)
 
     def joined(self, angle: Mapping[str, Array], rest: Array) -> Array:
-        """Return the angles of all joints [rad], shape (T, nq).
-
-        Args:
-            angle: of the arms that move, by their names [rad], shape (T, J).
-            rest: pose of the others [rad], shape (J,).
+        """Return the angles of all joints [rad], (T, nq), of arms that move, (T, J) by name; others rest,
+        (J,).
         """
         still = np.tile(rest, (max(map(len, angle.values())), 1))
         return np.hstack([angle.get(side, still) for side in self.sides])

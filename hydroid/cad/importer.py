@@ -62,13 +62,13 @@ class ImportedArm:
 def import_arm(
     path: Path, columns: Sequence[str] = (), tip: str | None = None, total_mass: float | None = None
 ) -> ImportedArm:
-    """Read a robot through MuJoCo's importer and take the arm out of it.
+    """Read a URDF or an MJCF through MuJoCo's importer and take the arm out of it.
 
     Args:
-        path: a URDF or an MJCF.
         columns: names of a log's columns, which help to choose among branches.
         tip: name of the link at which the arm ends; None: the tip that fits best.
         total_mass: of the links that move [kg]; None: masses are those of the file.
+
     Raises ModelError: the file cannot be read, or holds no arm.
     """
     notes = Notes()

@@ -23,9 +23,7 @@ def convert_meshes(
     """Turn the meshes into STL files in m and delete those that cannot be shown.
 
     `exact`: no link has its inertia by what the file says of its meshes, so that the best way may be taken.
-
-    Returns:
-        The files by their path from the model, and the bodies that lost a mesh.
+    Returned are the files by their path from the model, and the bodies that lost a mesh.
     """
     read = {name: mesh for name, path in files.items() if (mesh := _read_mesh(path, notes)) is not None}
     used = {geom.meshname for geom in spec.geoms}

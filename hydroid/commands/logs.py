@@ -108,18 +108,15 @@ def read_arms(
 ) -> "dict[str, Log]":
     """Read commands of an arm, or of the arms of a pair that move; return logs by the arm's name.
 
+    Columns that begin with `right_` and `left_` are those of the two arms. Without them every arm that moves
+    has the same commands: both move as mirror images.
+
     Args:
-        log: a file or a log. Columns that begin with `right_` and `left_` are those of the two arms. Without
-            them every arm that moves has the same commands: both move as mirror images.
-        settings: which map its columns.
         arm: right, left or both: the arms of the pair that move; None: the arm stands alone.
         pose: pose of the arm's file in which the arms stand; None: as logged.
         angles: read joint angles over time instead.
-        repair: fill holes up to `log.repair_s`.
 
-    Raises:
-        LogError: a fault that keeps the log from being used.
-        SettingsError: no such arm or pose.
+    Raises LogError: a fault that keeps the log from being used; SettingsError: no such arm or pose.
     """
     from hydroid.arm.model import ALONE, SIDES
     from hydroid.log import open_table
@@ -163,8 +160,7 @@ def run_logs(folder: Path) -> list[Path]:
 def problem_of(model: IdentifiedModel, logs: LogSources, *, repair: bool = False) -> "Problem":
     """Return the estimation problem of a model and logs, or those of its run where none is given.
 
-    Raises:
-        RunError: the simulation diverges at the model's parameters.
+    Raises RunError: the simulation diverges at the model's parameters.
     """
     read = read_logs(logs or run_logs(Path(model.source).parent), model.settings, repair=repair)
     from hydroid.problem.problem import Problem

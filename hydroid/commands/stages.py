@@ -148,18 +148,12 @@ def load_stage(
 def with_mechanics(
     mech: "ModelSource | None", config: ConfigSource, changes: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return changes of settings that hold the parameters of stage 1 at its estimate.
+    """Return changes of stage 2's settings `config` that hold the parameters of stage 1 at its estimate.
 
-    Args:
-        mech: a run folder or a result of stage 1, or a YAML file of values by name. Its masses hold, and its
-            damping and stiffness where `config` states no start or nominal value of its own. None: `config`
-            fixes them, or says what is known of them (a prior or a start), and they are estimated with the
-            others.
-        config: settings of stage 2.
-        changes: settings to replace; they have the last word.
-
-    Raises:
-        RunError, SettingsError: no values of stage 1 there, or one that stage 2 needs is missing.
+    Of a run folder or a result of stage 1, or a YAML file of values by name, the masses hold, and damping and
+    stiffness where `config` states no start or nominal value of its own. None: `config` fixes them, or says
+    what is known of them (a prior or a start), and they are estimated with the others. `changes` have the
+    last word. Raises RunError, SettingsError: no values there, or one that stage 2 needs is missing.
     """
     values, summary = ({}, None) if mech is None else open_values(mech)
     if summary is not None and summary.stage != "mech":

@@ -41,13 +41,10 @@ class Observation:
 
 
 def make_plugin(joints: Records, entries: Index, period: float, substeps: int) -> Plugin:
-    """Return the actuators of n candidates.
+    """Return the actuators of n candidates, of JOINT, (n, J), with substeps in MuJoCo's step, the period [s].
 
-    Args:
-        joints: of JOINT, shape (n, J); the coil of an infeasible candidate has no force.
-        entries: where M[i, j] stands in a row of MuJoCo's sparse mass matrix, shape (J, J).
-        period: MuJoCo's step [s].
-        substeps: in one of them.
+    The coil of an infeasible candidate has no force. `entries` say where M[i, j] stands in a row of MuJoCo's
+    sparse mass matrix, shape (J, J).
     """
     driven = joints.kind[0] != NONE
     order = np.argsort(driven, stable=True)

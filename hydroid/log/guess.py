@@ -54,14 +54,8 @@ def guess_columns(
 ) -> ColumnGuess:
     """Guess which columns are time, commands and angles, of which joints, in which units.
 
-        guess = guess_columns(open_table(Path("log.csv")), ["swing", "boom", "stick", "bucket"])
-
-    Args:
-        table: an opened log.
-        joints: names of the arm's joints, in order.
-        links: names of the links that they move, in order, which columns may have instead.
-        slides: joints (numbers, from 1) that slide: their positions are in m.
-    Raises LogError: no column looks like a time.
+    Columns may have the names of the links that the joints move instead; positions of joints (from 1) that
+    slide are in m. Raises LogError: no column looks like a time.
     """
     columns = [*_columns(table)]
     time = max((c for c in columns if c.kind == "time"), key=lambda c: _rises(c.values), default=None)

@@ -61,19 +61,14 @@ def check_log(
     backward: Collection[int] = (),
     repair: bool = False,
 ) -> tuple[Log | None, list[LogFinding]]:
-    """Find everything that is wrong with a log.
+    """Find everything that is wrong with a log: return it, None if any finding is an error, and all findings.
 
     Args:
-        path: the file.
-        settings: its columns, units and tolerances.
         ranges: of the joints [rad], shape (J, 2), (-inf, inf) for a continuous joint.
         outputs: joints (numbers, from 1) whose angles a fit compares; None: a joint whose angle column the
             file lacks is unmeasured, which else is an error.
         backward: joints (from 1) that a positive command turns to negative angles.
         repair: fill holes up to `settings.repair_s`.
-
-    Returns:
-        The log, None if any finding is an error; and all findings, errors first.
     """
     source, log, findings, compared = str(path), None, list[LogFinding](), outputs or ()
     try:
@@ -173,10 +168,8 @@ def write_log(path: Path, log: Log, settings: LogSettings, *, exact: bool = Fals
     (degrees for a value that was in radians) the last bit may differ. The command is written ahead by
     `settings.delay_s`, so that reading delays it to what `log` holds.
 
-    Raises:
-        LogError: the settings map no column for a joint that is driven, or a column for an angle that was not
-            measured.
-        RunError: the file cannot be written.
+    Raises LogError: the settings map no column for a joint that is driven, or one for an angle that was not
+    measured.
     """
     write_logs(path, [(log, settings)], exact=exact)
 

@@ -36,10 +36,7 @@ def open_workers(dask: str | None) -> Generator[DaskWorkers | None]:
     Args:
         dask: `local[:N]` starts N workers on this machine, one per core if N is left out; anything else is
             the address of a scheduler, or its scheduler file. None: no workers.
-
-    Raises:
-        SettingsError: Dask is not installed, or the address is refused.
-        RunError: no scheduler answers.
+    Raises SettingsError: Dask is not installed, or the address is refused; RunError: no scheduler answers.
     """
     if dask is None:
         yield None

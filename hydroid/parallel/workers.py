@@ -25,11 +25,7 @@ _lock = threading.Lock()
 
 
 class DaskWorkers:
-    """The workers of a scheduler, over which a problem spreads its candidates.
-
-    Args:
-        client: connected to the scheduler.
-    """
+    """The workers of a scheduler, to which a client is connected, for a problem's candidates."""
 
     def __init__(self, client: Any) -> None:
         self.client = client
@@ -41,19 +37,12 @@ class DaskWorkers:
         return max(1, len(self.client.nthreads()))
 
     def __call__(self, target: object, method: str, theta: Array, columns: int) -> Array:
-        """Apply `target.method`, which maps rows (m, P) to rows (m, columns), to theta on the workers.
+        """Apply `target.method`, which maps rows (m, P) to (m, columns), to theta, (n, P), on the workers.
 
-        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk.
-
-        Args:
-            target: can be pickled; it is sent once.
-            method: its name.
-            theta: shape (n, P).
-            columns: of the result.
-
-        Returns:
-            Shape (n, columns), in theta's order; NaN in the row of a candidate that kills its workers.
-        Raises RunError: the scheduler is gone, or a worker has other VERSIONS.
+        Each worker gets one chunk of the rows. When a worker dies, another one takes its chunk. The target
+        can be pickled, and is sent once. The result, (n, columns), is in theta's order; NaN in the row of a
+        candidate that kills its workers. Raises RunError: the scheduler is gone, or a worker has other
+        VERSIONS.
         """
         result = np.full((len(theta), columns), np.nan)
         with _lost_scheduler(self.client):

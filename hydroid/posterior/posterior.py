@@ -84,10 +84,8 @@ class Posterior:
         return np.linalg.norm(self.parts(slopes), axis=0)
 
     def add(self, rows: Array) -> "Posterior":
-        """Return it with further information N = rows' rows, for example measurements over their noise.
-
-        Args:
-            rows: derivatives per relative change over the standard deviation, shape (k, p).
+        """Return it with information N = rows' rows: derivatives per relative change over the sd of each, (k,
+        p).
         """
         return replace(self, root=regular(np.vstack([self.root, rows])))
 
@@ -111,14 +109,11 @@ class Posterior:
     ) -> Known:
         """Return the quantities that a function of the parameters, (n, P) -> (n, m), gives at the estimate.
 
-        The interval of a `positive` quantity is multiplicative. A quantity is not determined where parameters
-        known to 100 % each would determine it as well, or where the standard deviation of a positive one
-        exceeds the value: a first-order interval then means nothing.
-
-        Args:
-            function: is called with the estimate, and with all points of the differences at once.
-            positive: which quantities cannot be negative, shape (m,).
-            concerned: parameters on which any of them can depend, shape (P,); None: all.
+        It is called with the estimate, and with all points of the differences at once. The interval of a
+        `positive` quantity, (m,), is multiplicative. A quantity is not determined where parameters known to
+        100 % each would determine it as well, or where the standard deviation of a positive one exceeds the
+        value: a first-order interval then means nothing. `concerned` are parameters on which any can depend,
+        shape (P,); None: all.
         """
         concerned = np.ones_like(self.box.varied) if concerned is None else concerned
         own, inside = self.of(concerned), concerned[self.box.varied]

@@ -166,13 +166,10 @@ reach the second"""
 def speed_tests(
     bench: Bench, estimate: Candidates, sign: float, ending: str, word: str
 ) -> Callable[[Candidates], Measured]:
-    """Return what measures a joint in one direction, planned so that the estimate ends at its angle.
+    """Return what measures a joint in a direction, planned so that one candidate, the estimate, ends at its
+    angle.
 
-    Args:
-        bench: the joint.
-        estimate: one candidate.
-        sign: of the commands.
-        ending, word: at the end of names and labels.
+    `sign` is that of the commands; `ending` and `word` stand at the end of names and labels.
     """
     steps = {u: bench.movement(sign * u).through_pose(estimate) for u in COMMANDS}
     reached = {u: step.speed(estimate)[0] for u, step in steps.items()}

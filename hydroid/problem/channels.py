@@ -126,15 +126,9 @@ def overall_objective(error: Array, measured: Array, settings: ObjectiveSettings
 def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: ObjectiveSettings) -> Array:
     """Return one objective per segment, equations (21) and (22), shape (n, S).
 
-    A candidate whose error is not finite anywhere has inf in all segments: the first segments of a simulation
-    that diverged later count for nothing.
-
-    Args:
-        error: output error of each candidate, shape (n, T).
-        measured: measured output, shape (T,), in the unit of the error.
-        bounds: [first, end) of each segment in samples, shape (S, 2).
-        settings: the norm.
-    Raises SettingsError: relative, and the measured output is zero throughout a segment.
+    A candidate whose error, (n, T), is not finite anywhere has inf in all segments: the first segments of a
+    simulation that diverged later count for nothing. `bounds` are [first, end) of each segment in samples,
+    (S, 2). Raises SettingsError: relative, and the measured output, (T,), is zero throughout a segment.
     """
     columns = [overall_objective(error[:, a:b], measured[a:b], settings) for a, b in bounds]
     objectives = np.stack(columns, axis=1)
@@ -143,11 +137,9 @@ def segment_objectives(error: Array, measured: Array, bounds: Ints, settings: Ob
 
 
 def segment_bounds(samples: int, segments: int) -> Ints:
-    """Cut a record of so many samples into segments of equal length.
+    """Cut a record of so many samples into segments of equal length: [first, end) of each in samples, (S, 2).
 
-    Returns:
-        [first, end) of each segment in samples, shape (S, 2): increasing, gapless, from 0 to T.
-    Raises SettingsError: more segments than samples.
+    They are increasing and gapless, from 0 to T. Raises SettingsError: more segments than samples.
     """
     if segments > samples:
         what = f"{segments} segments do not fit into {samples} samples"

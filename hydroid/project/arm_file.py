@@ -130,13 +130,10 @@ TEMPLATE_MODEL = f"""\
 
 
 def arm_text(imported: ImportedArm, arm: Arm | None, sizes: Sequence[JointSize], title: str) -> str:
-    """Return the arm's file of an import, with an actuator of each joint.
+    """Return the arm's file of an import, with an actuator of each joint of sizes, (J,).
 
-    Args:
-        imported: the arm.
-        arm: what an earlier text of it, without sizes, says; None: this is that text.
-        sizes: of what moves its joints, (J,); empty: cylinders have a size that nothing uses.
-        title: says where the arm came from.
+    `arm` is what an earlier text of it says; None: this is that text, and cylinders have a size that nothing
+    uses. `title` says where the arm came from.
     """
     actuators = dict[str, dict[str, Any]]()
     if arm is None:

@@ -22,9 +22,7 @@ from hydroid.reporting.page import Page, Table
 
 
 def write_page(page: Page, out: Path) -> list[Path]:
-    """Write a report to the folder `out`: the page, its tables as CSV, and its data.
-    Raises RunError: the folder cannot be written.
-    """
+    """Write a report to the folder `out`: the page, its tables as CSV, and its data."""
     content = {**page.data, f"{page.name}.html": html(page)}
     for name, text in content.items():
         write_atomic(out / name, text)
@@ -32,9 +30,7 @@ def write_page(page: Page, out: Path) -> list[Path]:
 
 
 def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
-    """Write tables by name as CSV, to tables/ in the folder `out`.
-    Raises RunError: the folder cannot be written.
-    """
+    """Write tables by name as CSV, to tables/ in the folder `out`."""
     files = {out / "tables" / f"{name}.csv": table.csv() for name, table in tables.items()}
     for file, text in files.items():
         write_atomic(file, text)
@@ -42,9 +38,7 @@ def write_tables(tables: Mapping[str, Table], out: Path) -> list[Path]:
 
 
 def write_figures(page: Page, out: Path) -> list[Path]:
-    """Write every chart of a page to the folder `out` as PNG and SVG; return the files.
-    Raises RunError: the folder cannot be written.
-    """
+    """Write every chart of a page to the folder `out` as PNG and SVG; return the files."""
     from hydroid.reporting.figure import figure, saved, style
 
     written: list[Path] = []

@@ -191,9 +191,7 @@ class RunFolder:
 
     def settings(self) -> FitSettings:
         """Read back the resolved settings.
-
-        Raises:
-            RunError, SettingsError: they are missing or damaged.
+        Raises RunError, SettingsError: they are missing or damaged.
         """
         self.identity()  # raises the clearer error where the folder holds no run
         return load(self.path / CONFIG, FitSettings)

@@ -135,7 +135,6 @@ def keep_validation(model: IdentifiedModel, predictions: Sequence[Prediction]) -
 
     Nothing is stored of a model that is from no run, or whose settings are not the run's. A log that was
     validated before is replaced.
-    Raises RunError: the folder cannot be written.
     """
     folder, unseen = run_of(model), [p for p in predictions if p.unseen]
     if folder is None or not unseen or load_identified(folder).settings != model.settings:
@@ -189,14 +188,10 @@ _log = logging.getLogger(__name__)
 
 
 def read_runs(names: Sequence[str], out: str | Path | None) -> tuple[Record, ...]:
-    """Read finished runs that differ in nothing but their seeds; those that are not finished are left out.
+    """Read finished runs that differ in nothing but their seeds, in their order; unfinished ones are left
+    out.
 
-    Args:
-        names: run folders, or patterns of them, in any order.
-        out: the folder for what is to be written about them, if anything is.
-
-    Returns:
-        One run for each seed, in the order of the seeds.
+    `names` are run folders, or patterns of them; `out` is the folder for what is to be written about them.
     Raises RunError: no run is left, two differ in more than their seeds or in nothing, or `out` is a run.
     """
     if out is not None and RunFolder(Path(out)).exists:

@@ -92,8 +92,6 @@ def differentiate(
 
     Args:
         function: is called with all points of the differences at once, and with those of the shorter steps.
-        at: the point and its bounds.
-        axes: directions and steps.
         value: of the function at the point, shape (R,), where it is known.
         former: derivatives to keep along axes that fail, shape (p, R). Without them, axes that are not
             single coordinates must not fail; a coordinate's row is NaN.
@@ -128,13 +126,8 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
 
     The axes are those of the coordinates off their bounds. A coordinate at a bound has a direction of its
     own: the others change with it as the covariance says. So no direction leads out of the bounds to both
-    sides.
-
-    Args:
-        at: the point and its bounds.
-        root: G of C^-1 = G' G, of full rank, shape (p, p): a relative change v is |G v| standard deviations
-            long.
-        step: in standard deviations.
+    sides. `root` is G of C^-1 = G' G, of full rank, (p, p): a relative change v is |G v| standard deviations
+    long.
     """
     room = at.room
     deviation = np.linalg.norm(np.linalg.inv(root), axis=1)

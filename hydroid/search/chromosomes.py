@@ -92,19 +92,12 @@ CUTS = 2  # of the pointwise crossover (ours; the article gives none)
 
 
 def roulette(objective: Array, count: int, rng: Generator) -> Ints:
-    """Parents from the weighted roulette wheel, with replacement.
+    """Indices of `count` parents from the weighted roulette wheel, with replacement, by objectives J, (n,).
 
     The wheel needs a fitness to be proportional to, and the objective is to be small: the fitness is the
     distance to the worst feasible candidate of this population, max(J) - J. The worst itself and infeasible
-    candidates are never drawn; among equals, and where no candidate is feasible, all are equally likely.
-
-    Args:
-        objective: J of each candidate, shape (n,), not finite where infeasible.
-        count: how many to draw.
-        rng: source of randomness.
-
-    Returns:
-        Indices of the parents, shape (count,).
+    candidates, whose J is not finite, are never drawn; among equals, and where no candidate is feasible, all
+    are equally likely.
     """
     feasible = np.isfinite(objective)
     fitness = np.zeros(len(objective))
@@ -118,11 +111,9 @@ def roulette(objective: Array, count: int, rng: Generator) -> Ints:
 
 
 def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mask:
-    """Genes that n-point crossover swaps: every other stretch between randomly placed cuts.
+    """Genes that n-point crossover swaps, (pairs, length): every other stretch between randomly placed cuts.
 
-    Returns:
-        Shape (pairs, length). Cuts are distinct, between genes and uniformly placed; a string has no more
-        than length - 1 of them.
+    Cuts are distinct, between genes and uniformly placed; a string has no more than length - 1 of them.
     """
     order = rng.random((pairs, length - 1)).argsort(axis=1)
     starts = np.zeros((pairs, length), dtype=bool)
@@ -131,15 +122,9 @@ def pointwise_swaps(pairs: int, length: int, points: int, rng: Generator) -> Mas
 
 
 def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Genes:
-    """Children of neighbouring parents (0 with 1, 2 with 3, ...).
+    """Children of neighbouring parents (0 with 1, 2 with 3, ...), shape (n, length), n even, as the parents'.
 
-    Args:
-        parents: shape (n, length), n even.
-        settings: crossover type, and the chance P_c that a pair crosses at all.
-        rng: source of randomness.
-
-    Returns:
-        Shape (n, length); at each gene the two children of a pair hold what its two parents held.
+    At each gene the two children of a pair hold what its two parents held.
     """
     first, second = parents[0::2], parents[1::2]
     pairs, length = first.shape
@@ -155,12 +140,9 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
 
 
 def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> Genes:
-    """Mutate each element (each parameter) of each chromosome with chance P_m = `rate`.
+    """Mutate each element (each parameter) of each chromosome, (n, length), with chance P_m = `rate`.
 
     What changes in an element is the coding's: one random bit flips (binary), or it is redrawn (integer).
-
-    Returns:
-        Shape (n, length).
     """
     hit = rng.random((len(chromosomes), coding.parameters)) < rate
     return np.where(np.repeat(hit, coding.width, axis=1), coding.altered(chromosomes, rng), chromosomes)

@@ -26,14 +26,9 @@ def dominates(values: Array) -> Mask:
 
 
 def ranks(objectives: Array) -> Ints:
-    """Fast non-dominated sorting (Deb 2002): the front that each candidate belongs to.
+    """Fast non-dominated sorting (Deb 2002): the front of each candidate, (n,), by objectives, (n, m).
 
-    Args:
-        objectives: shape (n, m).
-
-    Returns:
-        Shape (n,): 0 for the candidates that nobody dominates, 1 for those that only these dominate, ...;
-        infeasible candidates share the last front.
+    0 for those that nobody dominates, 1 for those that only these dominate, ...; infeasible ones are last.
     """
     values = np.where(feasible(objectives)[:, None], objectives, np.inf)
     above = dominates(values)
@@ -55,15 +50,10 @@ def non_dominated(objectives: Array) -> Mask:
 
 
 def crowding(objectives: Array, rank: Ints) -> Array:
-    """Crowding distance (Deb 2002): the room each candidate has to itself on its front.
+    """Crowding distance (Deb 2002), (n,): the room that each of (n, m) has on its front, `rank`.
 
-    Args:
-        objectives: shape (n, m).
-        rank: front of each candidate, shape (n,).
-
-    Returns:
-        Shape (n,): over the objectives, the sum of the gaps between a candidate's two neighbours in terms of
-        the front's range; inf for the ends of a front, 0 for the infeasible.
+    The sum over the objectives of the gap between its two neighbours, in parts of the front's range; inf at
+    the ends of a front, 0 for the infeasible.
     """
     room = np.zeros(len(objectives))
     usable = feasible(objectives)
@@ -87,45 +77,27 @@ def _room(front: Array) -> Array:
 
 
 def segment_best(objectives: Array) -> Ints:
-    """The best candidate of each segment, the thin traces of figure 19.
+    """The best candidate of each segment, (S,), by objectives, (n, S): the thin traces of figure 19.
 
-    Args:
-        objectives: shape (n, S).
-
-    Returns:
-        Indices, shape (S,); one candidate may be best in several segments.
-    Raises SettingsError: no candidate is feasible.
+    One may be best in several segments. Raises SettingsError: no candidate is feasible.
     """
     return _ranked(objectives).argmin(axis=0)
 
 
 def average(points: Array, objectives: Array) -> Array:
-    """The article's estimate: the mean, parameter by parameter, of the best points of all segments.
+    """The article's estimate, (p,): the mean of the best of points, (n, p), of all segments, (n, S).
 
-    Args:
-        points: shape (n, p), any coordinates that are linear in the parameters.
-        objectives: shape (n, S).
-
-    Returns:
-        Shape (p,): as a rule not a candidate of the set, and inside the bounds where all candidates are.
-    Raises SettingsError: no candidate is feasible.
+    As a rule no candidate of the set, and inside the bounds where all are. The points' coordinates are linear
+    in the parameters. Raises SettingsError: no candidate is feasible.
     """
     return points[segment_best(objectives)].mean(axis=0)
 
 
 def utopia(points: Array, objectives: Array) -> Array:
-    """The candidate nearest to the utopia point F⁰.
+    """The candidate nearest to the utopia point F⁰, (p,), of a Pareto set of points, (n, p), by (n, S).
 
     The article's criterion 1 is the sum of squares of F - F⁰. Segments in which the arm moves far would
-    decide alone, so each objective is first divided by its range over the set; one without range is left
-    out.
-
-    Args:
-        points: shape (n, p).
-        objectives: shape (n, S), of the Pareto set only: other candidates would widen the ranges.
-
-    Returns:
-        Shape (p,), the first of equals.
+    decide alone, so each objective is first divided by its range over the set; one without range is left out.
     Raises SettingsError: no candidate is feasible.
     """
     values = _ranked(objectives)
@@ -136,14 +108,8 @@ def utopia(points: Array, objectives: Array) -> Array:
 
 
 def best(points: Array, overall: Array) -> Array:
-    """The candidate with the lowest norm over the whole record.
+    """The candidate, (p,), of points, (n, p), with the lowest norm over the whole record, (n,).
 
-    Args:
-        points: shape (n, p).
-        overall: shape (n,).
-
-    Returns:
-        Shape (p,), the first of equals.
     Raises SettingsError: no candidate is feasible.
     """
     return points[segment_best(overall[:, None])[0]]

@@ -81,18 +81,16 @@ class Record(NamedTuple):
 
 
 class SteppedArm:
-    """One arm in MuJoCo, which candidates take in turn and compiled code steps.
+    """One arm in MuJoCo, a copy of a model, which candidates take in turn and compiled code steps.
 
     Args:
-        model: of the arm; it is copied.
         columns: the moving joints with actuators, and those they couple with, shape (J,).
         pushed: all others, whose torques are given, shape (P,).
         steps: of MuJoCo in one sample.
         rollout: the compiled one, with the arguments of `roll`, which it is by default.
 
     Attributes:
-        model: with the values of the candidate that was started last.
-        data: its state.
+        model, data: with the values of the candidate that was started last, and its state.
     """
 
     def __init__(
@@ -121,14 +119,11 @@ class SteppedArm:
         )
 
     def start(self, values: dict[str, Array], row: int, pose: Array) -> Array:
-        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest.
-
-        `values` is what candidates change in the model, as `Scenario.values` returns it. Call it within
+        """Put the candidate of a row of `values` into `pose` [rad], shape (V,), at rest; within
         `quiet_mujoco`.
 
-        Returns:
-            What holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m],
-            shape (V,).
+        `values` is what candidates change in the model, as `Scenario.values` returns it. Returned is what
+        holds it there, tau0 = g(q0) of equation (1), and springs that are not slack there [N·m], shape (V,).
         """
         model, data = self.model, self.data
         for name, value in values.items():

@@ -27,18 +27,12 @@ class Prescribed:
     """The torque that makes some joints follow their logged motion, whatever the arm does to them.
 
     A prescribed joint gets an armature so large that nothing on the arm can move it, and the torque that
-    gives that armature the logged acceleration; a critically damped servo of the same scale takes up
-    what integration leaves over. The arm feels the joint's true motion, inertia coupling included.
-
-    Args:
-        model: the stepped model; gets the armature, and springs that pull towards angle 0.
-        log: the record whose angles are followed.
-        joints: prescribed joints among the arm's, 0-based.
-        columns: their positions among the moving joints.
-        settings: low-pass of the motion, steps per sample.
+    gives that armature the logged acceleration; a critically damped servo of the same scale takes up what
+    integration leaves over. The arm feels the joint's true motion, inertia coupling included. The stepped
+    model gets the armature, and springs that pull towards angle 0.
 
     Attributes:
-        columns: as given.
+        columns: positions of the joints, which are 0-based among the arm's, among the moving ones.
         angle: at the start of each step [rad], shape (steps, P).
         velocity: during it [rad/s], shape (steps, P).
         torque: [N·m], shape (steps, P).
@@ -184,17 +178,13 @@ STOP_REACH = np.radians(1.0)  # how near an end of its range a joint must start 
 class Chain:
     """The actuators of an arm, for any candidates.
 
-    Args:
-        arm: the arm's settings, for its stops and actuators.
-        locked: the arm that is stepped.
-        active: which of the arm's joints have hydraulics, shape (J,).
-        substeps: of valves and oil in one MuJoCo step.
-        pushed: columns of the moving joints whose torques are given instead: in stage 1 all.
+    `active` says which of the arm's joints have hydraulics, shape (J,), and `substeps` how many of valves and
+    oil there are in a MuJoCo step.
 
     Attributes:
-        columns: all other moving joints, with and without actuator: they couple through their inertia.
+        columns: the moving joints that couple through their inertia: all but `pushed`.
         joints: the same among the arm's joints, 0-based.
-        pushed: as given.
+        pushed: columns of the moving joints whose torques are given instead: in stage 1 all.
     """
 
     def __init__(self, arm: Arm, locked: LockedArm, active: Mask, substeps: int, pushed: Index) -> None:

@@ -29,10 +29,10 @@ Follow = Callable[[SteppedArm, int], tuple[Array, Observation | None]]
 
 
 class Simulation:
-    """Simulates candidates on one log.
+    """Simulates candidates on one log; in stage 2 the scenario's active joints have hydraulics.
 
     Args:
-        scenario: what is simulated; in stage 2 its active joints have hydraulics.
+        scenario: what is simulated.
         arm: the arm's settings, for its linkages.
         substeps: of valves and oil in one MuJoCo step; None: stage 1, without hydraulics.
         pressures: active joints whose chamber pressures are wanted in the response, 0-based.
@@ -53,11 +53,11 @@ class Simulation:
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
-        """Simulate n candidates, whatever n is.
+        """Return what the outputs' sensors read, and the pressures asked for, at the log's samples of n
+        candidates.
 
-        Returns:
-            What the outputs' sensors read, and the pressures asked for, at the log's samples; the first is
-            the start. A candidate without a force-stroke curve, or that diverged, is infeasible.
+        The first sample is the start. A candidate without a force-stroke curve, or that diverged, is
+        infeasible.
         """
         scenario, n, wanted = self.scenario, len(candidates), self._pressures
         samples = 1 + len(scenario.command) // scenario.settings.steps

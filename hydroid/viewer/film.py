@@ -28,11 +28,8 @@ AZIMUTH, ELEVATION = 125.0, -18.0  # where a camera looks to at first [deg]
 
 
 class Stage:
-    """Renders a motion by MuJoCo's renderer; it is a context.
+    """Renders a motion by MuJoCo's renderer in pictures of a size [px]; it is a context.
 
-    Args:
-        motion: what moves.
-        size: width and height of a picture [px].
     Raises RunError: this machine cannot render.
     """
 
@@ -74,20 +71,9 @@ class Stage:
 def render_motion(
     motion: Motion, kind: str, span: tuple[float, float], progress: Progress = no_progress
 ) -> bytes:
-    """Render a motion as a film, or the beginning of its span as a picture.
+    """Return the content of a film of a motion in a span [s], or of a picture of its beginning (.png).
 
-    Args:
-        motion: what moves.
-        kind: .mp4, .gif or .png.
-        span: from when to when [s].
-        progress: called with what is done, how much of it, and how much there is.
-
-    Returns:
-        The file's content.
-
-    Raises:
-        SettingsError: a span without time.
-        RunError: this machine cannot render, or cannot write films.
+    Raises SettingsError: a span without time; RunError: this machine cannot render, or cannot write films.
     """
     begin, end = max(span[0], 0.0), min(span[1], motion.time[-1])
     if not begin < end:

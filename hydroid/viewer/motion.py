@@ -69,11 +69,10 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, angle: Array) -> None:
 
 
 class Sliders:
-    """A plant with all joints on the viewer's sliders; its physics can be pushed about.
+    """A plant with all joints on the viewer's sliders, from a pose of the arm's file or the settings' start
+    pose.
 
-    Args:
-        plant: the plant.
-        pose: where it begins, a pose of the arm's file; by default the settings' start pose.
+    Its physics can be pushed about.
     """
 
     duration, ghost = np.inf, None
@@ -98,11 +97,7 @@ class Sliders:
 
 
 class Replay:
-    """A simulated motion from its start to its end.
-
-    Args:
-        motion: what is shown.
-    """
+    """A simulated motion from its start to its end."""
 
     def __init__(self, motion: Motion) -> None:
         self.model, self._motion = motion.machine.model, motion

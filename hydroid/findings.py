@@ -65,7 +65,7 @@ WORDS: dict[str, tuple[str, str]] = {
         "Widen the bound if such values are possible. Otherwise the model lacks something.",
     ),
     "strained prior": (
-        "The estimate is {score:.1f} standard deviations {side} its prior of {0}.",
+        "The estimate of {0} is {score:.1f} standard deviations {side} its prior.",
         "Either the prior is wrong, or the parameter makes up for an error of the model.",
     ),
     "logs disagree": (
@@ -141,7 +141,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "unreadable": ("{what}", "{hint}"),
     "layout": ("{what}", ""),
     # its columns
-    "absent joints": ("holds nothing of joint{s} {names}", ""),
+    "absent joints": ("has no column of joint{s} {names}", ""),
     # its rows and cells
     "torn row": (
         "the row should have {cells} cells, as the header has, and numbers in them{rows}",
@@ -221,7 +221,7 @@ WORDS: dict[str, tuple[str, str]] = {
     ),
     "no rest": (
         "begins with a command{after}",
-        "the first sample is the start pose: begin a log with a second of rest",
+        "its first sample alone gives the start pose: begin a log with a second of rest",
     ),
 }
 """statement and hint by kind; a hint may be empty"""

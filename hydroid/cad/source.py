@@ -57,8 +57,6 @@ def read_source(path: Path, notes: Notes) -> tuple[mujoco.MjSpec, dict[str, Path
     Raises ModelError: missing, not XML, of another kind, or refused by MuJoCo.
     """
     where = str(path)
-    if not is_file(path):
-        raise ModelError("no such robot", where=where, hint="give a URDF or an MJCF file")
     usd = path.suffix.lower() in (".usd", ".usda", ".usdc", ".usdz")
     root = ElementTree.Element("usd") if usd else _parsed(path)
     kind = "xacro" if any("xacro" in str(part.tag).lower() for part in root.iter()) else str(root.tag)

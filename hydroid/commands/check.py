@@ -134,7 +134,7 @@ def convert(
         guess = guess_columns(open_table(path, LogSettings()), most)
         layout = LogSettings.model_validate(guess.log)
         ranges = np.full((max(layout.joints, default=1), 2), np.inf) * [-1, 1]
-        lines = [*guess.reasons] + ([f"not used: {', '.join(guess.unused)}"] if guess.unused else [])
+        lines = [*guess.reasons]
     read, findings = check_log(path, layout, ranges, repair=repair)
     if read is None:
         raise findings[0].error()

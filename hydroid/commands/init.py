@@ -68,9 +68,8 @@ def init(
     )
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     guessed = "The log's columns, guessed. Check them, and correct them in fit.yaml:"
-    unused = [f"not used: {', '.join(project.unused)}"] if project.unused else []
     look = f"Next: look at {project.folder / 'arm.png'}, then"
-    parts = {"The arm:": project.notes, guessed: [*project.columns, *unused], look: project.commands}
+    parts = {"The arm:": project.notes, guessed: project.columns, look: project.commands}
     for heading, group in parts.items():
         lines += ["", heading, *(f"  {line}" for line in group)] if group else []
     keys = ("files", "notes", "columns", "unused", "commands")

@@ -55,7 +55,7 @@ SHARED = """
     arm (right|left|both): Simulate the two-arm machine of the arm's file; the value names the arms that move.
         Columns such as right_u2_pct and left_q2_deg belong to one arm. All others apply to every arm that
         moves.
-    pose (NAME): The start pose, one of the arm's file [default: the first angles of the log].
+    pose (NAME): The start pose, by its name in the arm's file [default: the first angles of the log].
 
     algorithm (NAME): Search: ga, nsga2 or multistart.
     start (RUN|YAML): Start the search from the values of an estimate.

@@ -101,7 +101,8 @@ def suggest(
     if actions := content["actions"]:
         title = "Predicted effect of each action on standard deviations"
         tables["next_actions"] = Table.of(title, ACTIONS, actions)
-    lines = [*tables.values(), *(f"- {finding}" for finding in findings), *written(tables, out)]
+    said = [line for one in findings for line in (f"- {one}", f"  {one.numbers.get('command', '')}")]
+    lines = [*tables.values(), *filter(str.strip, said), *written(tables, out)]
     return Result(lines, content, findings)
 
 

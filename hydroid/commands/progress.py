@@ -97,9 +97,8 @@ class FitProgress(Progress):
 
     def refining(self, name: str, simulated: int, rms: float) -> None:
         """Take the name of a least squares, its number of simulations, and its rms error [rad] so far."""
-        for number, joint in enumerate(self._joints, start=1):
-            name = name.replace(f"joint {number} ", f"{joint} ")
-        name = name.replace("refined", "all joints together")
+        alone = (joint for k, joint in enumerate(self._joints, start=1) if f" joint {k} " in name)
+        name = next(alone, name.replace("refined", "all joints together"))
         self(f"{name}: simulations", simulated, None, f"rms error {math.degrees(rms):.3g} deg")
 
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from hydroid.fitting.validation import Prediction
     from hydroid.run.record import Record
 
-MOST_ROWS = 12  # joints of all fits that a terminal shows; of more those of the best fit
-
 
 @command
 def validate(
@@ -92,12 +90,10 @@ def validate(
         "verdict": [{"fit": name} | one.model_dump() for name in fits for one in fits[name]],
         "results": [row for one in every for row in one.plain(arm.joint_names)],
     }
-    few = fits if sum(map(len, fits.values())) <= MOST_ROWS else {best: fits[best]}
-    details = [page.tables["verdict"], page.tables["errors"]]
-    lines = [*verdict_lines(few), *(line for step in steps for line in next_lines(step))]
+    lines = [*verdict_lines(fits), *(line for step in steps for line in next_lines(step))]
     if seen := [one.log.source for one in results[best] if one.unseen is False]:
         lines.insert(1, f"The fit was made with {listed(seen, 3)}: that tests nothing.")
-    return Result([*lines, *written(page, out)], content, every, page, details=details)
+    return Result([*lines, *written(page, out)], content, every, page, details=[page.tables["errors"]])
 
 
 @command

@@ -26,7 +26,7 @@ class ColumnGuess(NamedTuple):
 
     Attributes:
         log: a `log` section of a fit's settings.
-        reasons: a line for each column that it uses, and for what is uncertain.
+        reasons: a line for each column that it uses, for what is uncertain, and for the other columns.
         unused: the other columns.
     """
 
@@ -88,7 +88,9 @@ def guess_columns(
     used = {time.name} | {c.name for pairs in (commands, angles) for pair in pairs.values() for c in pair}
     log = {"time": {"column": time.name, "unit": unit}, "command": None, "angle": None}
     log |= {"period_s": min(PERIODS, key=lambda p: max(p, step) / max(min(p, step), 1e-9)), "joints": entries}
-    return ColumnGuess(log, tuple(reasons), tuple(name for name in table.names if name and name not in used))
+    unused = tuple(name for name in table.names if name and name not in used)
+    reasons += [f"not used: {listed(unused)}"] if unused else []
+    return ColumnGuess(log, tuple(reasons), unused)
 
 
 def _columns(table: Table) -> Iterator[_Column]:

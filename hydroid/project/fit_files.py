@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from hydroid.project.arm_file import JointSize
+from hydroid.project.arm_file import JointSize, rounded
 from hydroid.project.layout import Layout
 from hydroid.settings.arm import Arm
 from hydroid.settings.cylinder import LinearActuator
@@ -136,7 +136,7 @@ def fit_text(arm: Arm, layout: Layout | None, sizes: Sequence[JointSize], file: 
 
 def short(value: float) -> str:
     """Write three digits of a number."""
-    return f"{float(f'{value:.3g}'):g}"
+    return f"{rounded(value):g}"
 
 
 def _log(arm: Arm, layout: Layout | None) -> str:
@@ -146,7 +146,6 @@ def _log(arm: Arm, layout: Layout | None) -> str:
     lines = [
         "# GUESSED from the log: check every line.",
         *(f"# - {reason}" for reason in layout.reasons),
-        *([f"# - not used: {', '.join(layout.unused)}"] if layout.unused else []),
         "log:",
         *(f"  {key}: {flow(value)}" for key, value in section.items() if key != "joints"),
         "  joints:",

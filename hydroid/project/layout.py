@@ -85,7 +85,7 @@ def find_layout(table: Table, arm: Arm, order: Sequence[str] = ()) -> Layout:
 
 def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
     """Yield what a user should know of a joint and its angles in the log."""
-    angle, (path, against) = motion.log.angle[:, motion.joint - 1], motion.directed
+    angle, against = motion.log.angle[:, motion.joint - 1], motion.directed[1]
     what, unit, factor = ("positions", "m", 1.0) if joint.slides else ("angles", "deg", np.degrees(1))
     low, high, margin = angle.min(), angle.max(), angle_margin(*joint.limits)
     if not joint.continuous and (low < joint.limits[0] - margin or high > joint.limits[1] + margin):
@@ -95,8 +95,7 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
             "-1, or change the range in arm.xml"
         )
     if wrong:
-        way = np.radians(path) * factor * np.array([max(against, 1 - against), 1.0])
-        share = f"{way[0]:.3g} of {way[1]:.3g} {unit}"
+        share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
     if motion.log.driven[motion.joint - 1] and motion.dead_band > 10:
         yield f"{joint.name} does not move below about {motion.dead_band:g} % of command: a dead band"

@@ -15,7 +15,7 @@ from hydroid.cad.shapes import MESHES
 from hydroid.errors import RunError, SettingsError
 from hydroid.files import undisturbed, write_atomic
 from hydroid.log import open_table
-from hydroid.project.arm_file import LIFT, TEMPLATE_FILE, TEMPLATE_MODEL, JointSize, arm_text, joint_sizes
+from hydroid.project.arm_file import TEMPLATE_FILE, TEMPLATE_MODEL, JointSize, arm_text, joint_sizes
 from hydroid.project.fit_files import fit_text
 from hydroid.project.layout import find_layout
 from hydroid.reporting.figure import arm_picture
@@ -111,10 +111,8 @@ def write_project(
         notes, reasons = imported.notes if imported else (), layout.reasons if layout else ()
         guessed = [joint.name for joint in arm.joints if isinstance(joint.actuator, RotaryActuator)]
         if imported and guessed:
-            what = (
-                f"{listed(guessed)}: no cylinder is known, a stand-in lifts the arm {LIFT:g} times at 150 bar"
-            )
-            notes = (*notes, f"{what}. It serves to predict angles; pressures and forces mean nothing")
+            what = "no cylinder is known. A stand-in predicts angles; its pressures and forces mean nothing"
+            notes = (*notes, f"{listed(guessed)}: {what}")
         page = PAGE.format(name=arm.name, commands="\n".join(steps))
         for heading, lines in (("What was assumed of the arm", notes), ("The log's columns", reasons)):
             page += f"\n## {heading}\n\n" + "".join(f"- {line}\n" for line in lines) if lines else ""

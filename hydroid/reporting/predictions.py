@@ -76,7 +76,7 @@ def prediction_sections(predictions: Sequence[Prediction], arm: Arm, fits: Verdi
         for one in predictions
         for row in one.plain(arm.joint_names)
     ]
-    note = "fit: 0 % for the mean of the measured angle. expected: rms error that the fit leads to expect."
+    note = "fit: 100 % is perfect, 0 % as bad as a constant. expected: the rms error that the fit predicts."
     for row in rows:
         if row["joint"] in arm.slides:
             row |= {key: error and 1e3 * np.radians(error) for key, error in row.items() if "_deg" in key}

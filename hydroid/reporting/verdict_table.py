@@ -15,9 +15,9 @@ from hydroid.words import listed
 
 _SIGNS = {"predicts": "✓", "predicts roughly": "!", "not tested": "?"}  # of verdicts; all others are a ✗
 _NOTE = (
-    "rms errors in deg over the logs that drive the joint. The last three columns are simple models, fitted "
-    "to the same logs, here on the {logs} ones: no motion; mean speeds by command; dead band, exponent, "
-    "speed and lag."
+    "rms errors in deg over the logs that drive the joint. The last three columns are the errors of simple "
+    "models on the {logs} logs: no motion, mean speeds by command, and nine numbers (dead band, exponent, "
+    "speed, lag)."
 )
 
 Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit

@@ -12,6 +12,7 @@ from command_line import Run
 import hydroid
 from hydroid.commands.stages import with_mechanics
 from hydroid.estimate import FitSummary, ParameterEstimate, write_estimate
+from hydroid.findings import Finding
 
 ROOT = Path(__file__).parents[2]
 QUICK = ["--set=search.ga.population=6", "--set=search.ga.generations=2", "--set=refinement.iterations=1"]
@@ -108,6 +109,18 @@ def test_analyse_tells_what_a_log_determines(short: Path, hydroid_cli: Run, tmp_
     assert rows["S"]["profile_interval"] is not None
     for name in ("parameters", "directions"):
         assert (tmp_path / "told" / "tables" / f"{name}.csv").stat().st_size > 0
+
+
+def test_a_term_to_free_is_said_with_its_command(
+    short: Path, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch
+):
+    numbers = {"error": 2.0, "freed": 1.0, "command": "hydroid fit-hyd a.csv"}
+    said = {"tested": 1, "rms_deg": 2.0, "left_out_deg": 2.0, "terms": [], "actions": []}
+    advised = said, [Finding("term missing", "warning", ("delay",), numbers)]
+    monkeypatch.setattr("hydroid.advice.suggestions.advice", lambda *_: advised)
+    Path("values.yaml").write_text(yaml.safe_dump(VALUES | {"K": 1.5, "S": 80.0}))
+    printed = hydroid_cli("suggest", short, "--fit", "values.yaml").out
+    assert "falls too.\n  hydroid fit-hyd a.csv\n" in printed
 
 
 def test_the_second_stage_walks_through(short: Path, hydroid_cli: Run, tmp_path: Path):

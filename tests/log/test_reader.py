@@ -160,7 +160,7 @@ def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
 def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
     path = edited(tmp_path, lambda rows: [row.__delitem__(slice(2, 5, 2)) for row in rows])
     log, (note,) = read(path, outputs=[1])
-    assert (note.level, note.what) == ("note", "holds nothing of joint 2")
+    assert (note.level, note.what) == ("note", "has no column of joint 2")
     assert log.driven.tolist() == log.measured.tolist() == [True, False]
     (fault,) = faults(path, outputs=[2])
     assert "'u2_pct' (command of joint 2)" in fault.what

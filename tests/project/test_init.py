@@ -204,7 +204,7 @@ ROWS = count(-99)
         (
             2,
             lambda u: -u,
-            r"boom_joint moves against its command \(\S+ of \S+ deg\): the command's sign",
+            r"boom_joint moves against its command \(on \d+% of its way\): the command's sign",
             -10,
         ),
         (5, lambda q: q + 2, r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset", 10),

@@ -11,8 +11,9 @@ from hydroid.errors import RunError, SettingsError
 from hydroid.files import is_file, write_atomic
 from hydroid.findings import Finding
 from hydroid.settings.document import read_yaml
-from hydroid.settings.load import Settings, load
+from hydroid.settings.load import JointNumber, NotNegative, Settings, load
 
+Interval = tuple[float | None, float | None]  # its ends; null: it has no limit there
 NAME = "estimate.yaml"  # name of the file in a run folder and beside a saved plant
 
 
@@ -28,9 +29,9 @@ class ParameterEstimate(Settings):
     """standard deviation, in the unit of the value"""
     sd_by_log: float | None = None
     """the same from the differences between several logs; null where one log alone determines the value"""
-    interval: tuple[float | None, float | None] = (None, None)
+    interval: Interval = (None, None)
     """95 % interval"""
-    interval_by_log: tuple[float | None, float | None] = (None, None)
+    interval_by_log: Interval = (None, None)
     """the same from `sd_by_log`"""
     flag: str | None = None
     """how well the logs determine it: a value of `posterior.uncertainty.Flag`"""
@@ -47,7 +48,7 @@ class NamedEstimate(Settings):
     """One of the estimates that a fit compared: null errors where its simulation diverged."""
 
     values: dict[str, float]
-    rms_deg: Annotated[float, Field(ge=0)] | None = None
+    rms_deg: NotNegative | None = None
     """rms error of the compared angles [deg]"""
     objective: float | None = None
     """over the whole record: [deg], or [-] where `objective.relative` is set"""
@@ -83,7 +84,7 @@ class QuantityEstimate(Settings):
     unit: str
     sd: float | None = None
     """standard deviation, in the unit of the value; null: not determined"""
-    interval: tuple[float | None, float | None] = (None, None)
+    interval: Interval = (None, None)
     """95 % interval"""
 
     @property
@@ -105,7 +106,7 @@ class CurveEstimate(Settings):
     """what `at` is, with its unit"""
     at: tuple[float, ...]
     value: tuple[float, ...]
-    interval: tuple[tuple[float | None, float | None], ...]
+    interval: tuple[Interval, ...]
     """95 % interval at each point by itself"""
 
 
@@ -148,7 +149,7 @@ class FitSummary(Settings):
     stage: Literal["mech", "hyd"]
     estimate: dict[str, ParameterEstimate]
     """by parameter"""
-    joints: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    joints: tuple[JointNumber, ...] = ()
     """joints that take commands, numbered from 1: those that the fit's logs drive or that it compared"""
     final: str | None = None
     """name of the final one among `estimates`; `joint`: a joint refinement of both stages"""

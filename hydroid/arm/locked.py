@@ -7,14 +7,13 @@ moving nothing but the fixed parts is fused, and the result is the whole arm wit
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, cast
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hydroid.arrays import Array, Index, Mask
+from hydroid.arrays import Array, Index, Mask, record
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.arm import Arm
 
@@ -37,7 +36,7 @@ column of its mass in `masses`, -1 where no setting names it; its mass in the mo
 inertia about that for 1 kg [m²]"""
 
 
-@dataclass(frozen=True)
+@record
 class LockedArm:
     """A model with only the moving joints, and the way from link masses to its bodies."""
 

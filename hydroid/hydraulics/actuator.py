@@ -11,11 +11,9 @@ hydraulics (kind NONE): their inertia couples. The plugin integrates viscous dam
 must be 0.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from hydroid.arrays import Array, Index, Structs
+from hydroid.arrays import Array, Index, Structs, record
 from hydroid.hydraulics.cylinder import GIVE, fills, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
@@ -24,7 +22,7 @@ from hydroid.hydraulics.solenoid import drive, resting_stroke
 START_PRESSURE = 50e5  # in chamber B at the start where neither settings nor log say [Pa]; ours
 
 
-@dataclass(frozen=True)
+@record
 class Observation:
     """What can be measured on actuators; flows are means over the last step. Joints without one have zeros.
 

@@ -13,6 +13,9 @@ pressure rests at vapour pressure, which is taken for 0, and y remembers the mis
 lost.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 from typing import Any
 
 import numpy as np
@@ -32,19 +35,19 @@ four_bar = compilable(linkage.four_bar)
 
 
 @compilable
-def volume(travel: Any, area: Any, dead: Any) -> Any:
+def volume(travel, area, dead) -> Any:
     """Volume of a chamber [m³] that opens with `travel` [m] at `area` [m²]."""
     return np.maximum(dead + area * travel, SMALLEST * dead)
 
 
 @compilable
-def filling(travel: Any, area: Any, dead: Any) -> Any:
+def filling(travel, area, dead) -> Any:
     """ln(V/V_0) of a chamber that opens with `travel` [m] at `area` [m²]."""
     return np.log(volume(travel, area, dead) / dead)
 
 
 @compilable
-def rod(angle: float, c: Any) -> Any:
+def rod(angle: float, c) -> Any:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of one cylinder at a joint angle [rad]."""
     psi, first, second = angle, 1.0, 0.0
     if c.rocker > 0.0:
@@ -54,7 +57,7 @@ def rod(angle: float, c: Any) -> Any:
 
 
 @compilable
-def bent(angle: Any, c: Any) -> Any:
+def bent(angle, c) -> Any:
     """Way of a rotary actuator at an angle [rad], its moment arm, relative to that in the middle, and slope.
 
     A joint that a linkage of unknown size turns is taken for a rotary actuator whose moment arm
@@ -69,7 +72,7 @@ def bent(angle: Any, c: Any) -> Any:
     )
 
 
-def fills(angle: Array, c: Any) -> tuple[Array, Array]:
+def fills(angle: Array, c) -> tuple[Array, Array]:
     """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a rotary actuator."""
     travel, linear, dead = rod_motion(angle, c)[0], c.kind == LINEAR, c.dead_volume
     sides = (c.a.area, travel, travel), (c.b.area, c.stroke - travel, -travel)
@@ -77,7 +80,7 @@ def fills(angle: Array, c: Any) -> tuple[Array, Array]:
     return a, b
 
 
-def rod_motion(angle: Array, c: Any) -> list[Array]:
+def rod_motion(angle: Array, c) -> list[Array]:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of COEFFICIENTS at angles [rad], elementwise.
 
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
@@ -93,7 +96,7 @@ def rod_motion(angle: Array, c: Any) -> list[Array]:
 
 
 @compilable
-def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
+def stop_damping(travel, speed, stroke, penetration) -> Any:
     """F_c / ẋ of the hard stops [N·s/m], equation (9): K_p × penetration, only while moving further in.
 
     F_c opposes the motion at both ends; the article's sign at the lower one would push the rod out of the
@@ -104,13 +107,13 @@ def stop_damping(travel: Any, speed: Any, stroke: Any, penetration: Any) -> Any:
 
 
 @compilable
-def friction_damping(speed: Any, friction: Any) -> Any:
+def friction_damping(speed, friction) -> Any:
     """Dry friction [N] of the seals over speed [m/s], smooth through rest [N·s/m]."""
     return friction / np.sqrt(speed * speed + SLIDING * SLIDING)
 
 
 @compilable
-def contact_torque(depth: Any, contact: Any) -> Any:
+def contact_torque(depth, contact) -> Any:
     """Torque [N·m] of what a joint rests on, at the angle [rad] left until they part.
 
     The stiffness `contact` [N·m/rad] is below 0, and so is the angle, if it holds the joint from above.
@@ -118,9 +121,7 @@ def contact_torque(depth: Any, contact: Any) -> Any:
     return np.abs(contact) * select(depth * contact > 0.0, depth, 0.0)
 
 
-def holding_pressures(
-    force: Any, area_a: Any, area_b: Any, supply: Any, tank: Any, level: Any
-) -> tuple[Any, Any]:
+def holding_pressures(force, area_a, area_b, supply, tank, level) -> tuple[Any, Any]:
     """Chamber pressures p_A, p_B [Pa] that hold the arm at the start of a run, elementwise (ours).
 
     They satisfy A_A p_A − A_B p_B = force. Balance leaves their common level open: p_B is `level`,

@@ -4,6 +4,9 @@ A component's law is a plain Python function of floats or of arrays that broadca
 first). Marked `compilable`, the very same function is compiled into the kernel.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -18,12 +21,12 @@ def compilable(function: F) -> F:
     return register_jitable(function)
 
 
-def select(condition: Any, yes: Any, no: Any) -> Any:
+def select(condition, yes, no) -> Any:
     """Return `yes` where `condition` holds, else `no`."""
     return np.where(condition, yes, no)
 
 
-def implicit_weight(speed: Any) -> Any:
+def implicit_weight(speed) -> Any:
     """Weight of the new state in a linearised step, from rate times step (dimensionless).
 
     One half, the second-order trapezoidal rule, while the step resolves the rate; towards one, backward
@@ -33,16 +36,16 @@ def implicit_weight(speed: Any) -> Any:
 
 
 @overload(implicit_weight)
-def _compiled_weight(speed: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(speed: Any) -> Any:
+def _compiled_weight(speed) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(speed) -> Any:
         return 0.5 if speed <= 2.0 else 1.0 - 1.0 / speed
 
     return scalar
 
 
 @overload(select)
-def _compiled_select(condition: Any, yes: Any, no: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    def scalar(condition: Any, yes: Any, no: Any) -> Any:
+def _compiled_select(condition, yes, no) -> Any:  # pyright: ignore[reportUnusedFunction]
+    def scalar(condition, yes, no) -> Any:
         return yes if condition else no
 
     return scalar

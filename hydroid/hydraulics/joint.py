@@ -6,7 +6,8 @@ these functions; the components' laws, called here, also work on numpy. They run
 so a branch leaves out what is switched off.
 """
 
-from typing import Any
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from hydroid.hydraulics.valve import notched, port_flow, slot_share
 
 
 @compilable
-def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
+def begin(c, z, w, angle: float, velocity: float) -> None:
     """Geometry and chamber pressures at the start of the step."""
     z.angle, z.velocity = angle, velocity
     w.way, w.speed, w.torque, w.resistance, w.oil_stiffness = 0.0, velocity, 0.0, 0.0, 0.0
@@ -44,7 +45,7 @@ def begin(c: Any, z: Any, w: Any, angle: float, velocity: float) -> None:
 
 
 @compilable
-def _follow(side: Any, z: Any, delayed: float) -> float:
+def _follow(side, z, delayed: float) -> float:
     """Mean of what the pilot stage has of the command during a step, first-order behind it."""
     left = (z.pilot - delayed) * (1.0 - side.pilot_keep)
     z.pilot -= left
@@ -52,7 +53,7 @@ def _follow(side: Any, z: Any, delayed: float) -> float:
 
 
 @compilable
-def command(c: Any, z: Any, w: Any, delayed_a: float, delayed_b: float) -> None:
+def command(c, z, w, delayed_a: float, delayed_b: float) -> None:
     """Take the delayed commands [%]: each coil's drive changes `fresh` sub-steps into this step."""
     w.a.before, w.b.before = z.a.drive, z.b.drive
     z.a.drive = drive(_follow(c.a, z.a, delayed_a), c.a, c)
@@ -61,7 +62,7 @@ def command(c: Any, z: Any, w: Any, delayed_a: float, delayed_b: float) -> None:
 
 
 @compilable
-def _move_plunger(c: Any, side: Any, z: Any, w: Any, substep: int, step: float) -> None:
+def _move_plunger(c, side, z, w, substep: int, step: float) -> None:
     part = min(max(substep + 1.0 - side.fresh, 0.0), 1.0)
     pull = w.before + part * (w.after - w.before)
     motion, weight = (z.stroke, z.speed), side.plunger_weight
@@ -69,7 +70,7 @@ def _move_plunger(c: Any, side: Any, z: Any, w: Any, substep: int, step: float) 
 
 
 @compilable
-def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
+def move_spool(c, z, w, substep: int, step: float) -> float:
     """Advance both plungers; the mean spool displacement of the sub-step [m], equation (6)."""
     before = z.a.stroke - z.b.stroke
     _move_plunger(c, c.a, z.a, w.a, substep, step)
@@ -78,7 +79,7 @@ def move_spool(c: Any, z: Any, w: Any, substep: int, step: float) -> float:
 
 
 @compilable
-def opened(side: Any, travel: float) -> float:
+def opened(side, travel: float) -> float:
     """Opening of a side's pump edge [m²] at a spool travel towards it [m], without leakage."""
     share = slot_share(travel, side)
     if side.opening_exponent != 1.0:
@@ -87,7 +88,7 @@ def opened(side: Any, travel: float) -> float:
 
 
 @compilable
-def net_opening(c: Any, z: Any, displacement: float) -> float:
+def net_opening(c, z, displacement: float) -> float:
     """Mean opening of a sub-step [m²], below 0 towards B, at a spool displacement [m]."""
     net = opened(c.a, displacement) if displacement > 0.0 else -opened(c.b, -displacement)
     left = (z.opening - net) * (1.0 - c.opening_keep)
@@ -96,7 +97,7 @@ def net_opening(c: Any, z: Any, displacement: float) -> float:
 
 
 @compilable
-def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> None:
+def _fill(c, w, supply: float, pump_area: float, tank_area: float) -> None:
     # oil that cavitates pushes with vapour pressure, whatever volume is missing, and does not resist
     w.filled = 1.0 if w.pressure > 0.0 else 0.0
     w.pushing = max(w.pressure, 0.0)
@@ -104,7 +105,7 @@ def _fill(c: Any, w: Any, supply: float, pump_area: float, tank_area: float) -> 
 
 
 @compilable
-def meter(c: Any, w: Any, area: float, supply: float) -> None:
+def meter(c, w, area: float, supply: float) -> None:
     """Flows into both chambers from `supply` pressure [Pa], and how they fall with the chambers' own.
 
     `area` is the net opening [m²].
@@ -118,7 +119,7 @@ def meter(c: Any, w: Any, area: float, supply: float) -> None:
 
 
 @compilable
-def _press(w: Any, lever: float, rate: float) -> float:
+def _press(w, lever: float, rate: float) -> float:
     """How a chamber answers to flow and motion; its stiffness at the joint times the step."""
     w.lever, w.rate = lever, rate
     relax = w.filled * rate * w.relief
@@ -128,7 +129,7 @@ def _press(w: Any, lever: float, rate: float) -> float:
 
 
 @compilable
-def load(c: Any, z: Any, w: Any, step: float) -> None:
+def load(c, z, w, step: float) -> None:
     """Torque, oil stiffness and resistance of the sub-step, with both chambers eliminated."""
     turn = w.way + 0.5 * step * w.speed
     arm, rub = w.arm + w.slope * turn, 0.0
@@ -161,14 +162,14 @@ def load(c: Any, z: Any, w: Any, step: float) -> None:
 
 
 @compilable
-def coast(c: Any, z: Any, w: Any, step: float) -> None:
+def coast(c, z, w, step: float) -> None:
     """The load of a joint without actuator, the same in all sub-steps."""
     w.drag, w.stiffness, w.push = c.damping, 0.0, z.hold
     w.weight = implicit_weight(step * c.damping / w.inertia)
 
 
 @compilable
-def _take_flow(z: Any, w: Any, mean: float) -> None:
+def _take_flow(z, w, mean: float) -> None:
     gain = w.rise * (w.inflow - w.lever * mean)
     flow = w.inflow - w.weight * w.filled * w.relief * gain
     w.pressure += gain
@@ -177,7 +178,7 @@ def _take_flow(z: Any, w: Any, mean: float) -> None:
 
 
 @compilable
-def settle(c: Any, z: Any, w: Any, gain: float, step: float) -> None:
+def settle(c, z, w, gain: float, step: float) -> None:
     """Take over a velocity gain [rad/s]: pressures, oil, way and torque of the sub-step."""
     mean = w.speed + w.weight * gain
     if c.kind != NONE:

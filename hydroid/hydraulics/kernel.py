@@ -25,6 +25,9 @@ MuJoCo's step.
 Every candidate is computed from its own numbers in a fixed order, so threads change no bit.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 import hashlib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -46,7 +49,7 @@ SOURCE = int.from_bytes(hashlib.sha256(b"".join(p.read_bytes() for p in _FILES))
 
 
 @compilable
-def eliminate(matrix: Any, start: int, stop: int) -> None:
+def eliminate(matrix, start: int, stop: int) -> None:
     """Factorise rows `start` to `stop` of a symmetric positive matrix, (J, J), in place as L D Lᵀ.
 
     Only diagonal and upper half are used: they come to hold D⁻¹ and Lᵀ, and from `stop` on what is left.
@@ -63,7 +66,7 @@ def eliminate(matrix: Any, start: int, stop: int) -> None:
 
 
 @compilable
-def substitute(matrix: Any, vector: Any) -> None:
+def substitute(matrix, vector) -> None:
     """Replace `vector`, (J,), by the solution of a system that is factorised throughout."""
     size = matrix.shape[0]
     for k in range(size):
@@ -116,7 +119,7 @@ def make_pad(joints: int) -> Pad:
 
 
 @compilable
-def couple(pad: Pad, order: Any, idle: int, step: float) -> None:
+def couple(pad: Pad, order, idle: int, step: float) -> None:
     """Add the pump's line to the system of the velocities."""
     line = pad.line[0]
     for a in range(idle, order.size):
@@ -128,7 +131,7 @@ def couple(pad: Pad, order: Any, idle: int, step: float) -> None:
 
 
 @compilable
-def release(pad: Pad, order: Any, idle: int, step: float) -> None:
+def release(pad: Pad, order, idle: int, step: float) -> None:
     """Let the line's pressure follow from the velocities, and all actuators take their part of it."""
     line = pad.line[0]
     for a in range(idle, order.size):
@@ -139,7 +142,7 @@ def release(pad: Pad, order: Any, idle: int, step: float) -> None:
 
 
 @compilable
-def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, arm: Any, pad: Pad) -> None:
+def look_ahead(plugin: Plugin, state, commands, now: int, arm, pad: Pad) -> None:
     """Look ahead over one step of one candidate; writes torques and armatures of its `arm` in MuJoCo.
 
     `state` is its actuators', (J,) of JOINT_STATE; of the commands [%], (.., J), that at `now` holds. The
@@ -218,7 +221,7 @@ def look_ahead(plugin: Plugin, state: Any, commands: Any, now: int, arm: Any, pa
 
 
 @compilable
-def take_over(plugin: Plugin, state: Any, arm: Any, pad: Pad) -> None:
+def take_over(plugin: Plugin, state, arm, pad: Pad) -> None:
     """Take over one candidate's true new velocities from MuJoCo, and give it the new angles."""
     order, entries, period, change = plugin.order, plugin.entries, plugin.period, pad.gain
     for a in range(order.size):

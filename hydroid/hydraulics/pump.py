@@ -30,6 +30,9 @@ pump. (Between joints whose draws differ this is not f gᵀ: the predicted veloc
 the sub-step, no oil is lost.) Where P would pass the relief pressure, δ is what is missing to it.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 from typing import Any
 
 import numpy as np
@@ -38,7 +41,7 @@ from hydroid.hydraulics.elementwise import compilable
 
 
 @compilable
-def delivery(pressure: float, share: float, relief: float, c: Any) -> Any:
+def delivery(pressure: float, share: float, relief: float, c) -> Any:
     """Flow Q_P [m³/s] of the pump at a line pressure [Pa], and -dQ_P/dP; `share` is φ."""
     full = share * c.pump_flow
     left = relief - pressure
@@ -48,7 +51,7 @@ def delivery(pressure: float, share: float, relief: float, c: Any) -> Any:
 
 
 @compilable
-def come_up(line: Any, c: Any, step: float) -> float:
+def come_up(line, c, step: float) -> float:
     """Advance φ and the time of the demand by a sub-step [s]; the mean of φ."""
     before, target = line.share, c.pump_idle
     if line.demanded > 0.0:
@@ -62,7 +65,7 @@ def come_up(line: Any, c: Any, step: float) -> float:
 
 
 @compilable
-def begin_line(line: Any, c: Any, z: Any, demanded: bool, step: float) -> None:
+def begin_line(line, c, z, demanded: bool, step: float) -> None:
     """The line at the start of a step, from the state of a joint; `demanded`: whether a command is not 0."""
     line.pressure, line.share, line.demand = z.line, z.share, z.demand
     line.demanded = 1.0 if demanded else 0.0
@@ -71,7 +74,7 @@ def begin_line(line: Any, c: Any, z: Any, demanded: bool, step: float) -> None:
 
 
 @compilable
-def draw(line: Any, c: Any, w: Any) -> None:
+def draw(line, c, w) -> None:
     """Add what one actuator takes from the line in a sub-step, and how that answers to pressure and speed."""
     if line.pressure > c.supply_pressure:
         w.a.give, w.b.give = 0.0, 0.0
@@ -86,7 +89,7 @@ def draw(line: Any, c: Any, w: Any) -> None:
 
 
 @compilable
-def open_line(line: Any, c: Any, step: float) -> None:
+def open_line(line, c, step: float) -> None:
     """Make the sums of `draw` ready for the sub-step: δ at the present speeds, and 1/D."""
     flow, fall = delivery(line.pressure, come_up(line, c, step), c.relief, c)
     line.softness = 1.0 / (c.line_volume / (c.bulk_modulus * step) + fall + line.softness)
@@ -97,7 +100,7 @@ def open_line(line: Any, c: Any, step: float) -> None:
 
 
 @compilable
-def fill(line: Any, w: Any, step: float) -> None:
+def fill(line, w, step: float) -> None:
     """Give one actuator the flow and the torque of the line's change."""
     w.a.inflow += w.a.give * line.change
     w.b.inflow += w.b.give * line.change
@@ -106,7 +109,7 @@ def fill(line: Any, w: Any, step: float) -> None:
 
 
 @compilable
-def close_line(line: Any, c: Any) -> None:
+def close_line(line, c) -> None:
     """Take over the line's change, and be ready for the next sub-step."""
     line.pressure = min(max(line.pressure + line.change, 0.0), c.relief)
     line.drawn, line.softness, line.swept = line.taken, 0.0, 0.0

@@ -16,6 +16,9 @@ two act.) Such a curve exists if F1 > F2 > 0, x2 > x1 > 0 and F1/F2 < (x2/x1)².
 are ours.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 from typing import Any
 
 import numpy as np
@@ -26,7 +29,7 @@ FULL_SCALE = 10.0  # voltage at full command, and from which the current is I_ma
 
 
 @compilable
-def side_voltage(command: Any, onset: Any, dead_band: Any = 0.0) -> Any:
+def side_voltage(command, onset, dead_band=0.0) -> Any:
     """Voltage of the amplifier that moves the joint in the command's positive direction, (2) and (3).
 
     For side A give (u, A), for side B (-u, C): command towards this side [%] and voltage at the smallest
@@ -37,26 +40,26 @@ def side_voltage(command: Any, onset: Any, dead_band: Any = 0.0) -> Any:
 
 
 @compilable
-def drive(command: Any, side: Any, c: Any) -> Any:
+def drive(command, side, c) -> Any:
     """Drive k i² [N·m²] of a side's coil at a command towards it [%]: equations (2) to (5)."""
     current = coil_current(side_voltage(command, side.onset, side.dead_band), c.current_max, c.current_min)
     return c.coil * current * current
 
 
 @compilable
-def coil_current(voltage: Any, current_max: Any, current_min: Any) -> Any:
+def coil_current(voltage, current_max, current_min) -> Any:
     """Coil current [A], equation (4): I_min at 0 V, I_max from 10 V on, a straight line between."""
     share = np.minimum(np.maximum(voltage, 0.0), FULL_SCALE) / FULL_SCALE
     return current_min + share * (current_max - current_min)
 
 
-def curve_exists(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any) -> Any:
+def curve_exists(force_1, force_2, stroke_1, stroke_2) -> Any:
     """Whether a force-stroke curve runs through (stroke_1, force_1) and (stroke_2, force_2), elementwise."""
     rising = (force_1 > force_2) & (force_2 > 0) & (stroke_2 > stroke_1) & (stroke_1 > 0)
     return rising & (force_1 * stroke_1**2 < force_2 * stroke_2**2)
 
 
-def force_curve(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any, rated_current: Any) -> Any:
+def force_curve(force_1, force_2, stroke_1, stroke_2, rated_current) -> Any:
     """Return the curve's constants k [N·m²/A²] and δ [m] from forces [N], strokes [m] and i0 [A].
 
     Where no curve exists, it is a coil without force: k = 0, δ = stroke_2.
@@ -68,13 +71,13 @@ def force_curve(force_1: Any, force_2: Any, stroke_1: Any, stroke_2: Any, rated_
 
 
 @compilable
-def coil_force(drive: Any, stroke: Any, gap: Any) -> Any:
+def coil_force(drive, stroke, gap) -> Any:
     """Force on the plunger [N], equation (5), from drive k i² [N·m²], stroke [m] and gap δ [m]."""
     reach = stroke + gap
     return drive / (reach * reach)
 
 
-def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
+def resting_stroke(drive, gap, stiffness) -> Any:
     """Stroke [m] where spring and coil balance: K x (x + δ)² = k i².
 
     Newton's method from ∛(k i²/K), which lies beyond the only root of a convex function, so that every
@@ -90,7 +93,7 @@ def resting_stroke(drive: Any, gap: Any, stiffness: Any) -> Any:
 
 
 @compilable
-def plunger_weight(damping: Any, step: Any, c: Any) -> Any:
+def plunger_weight(damping, step, c) -> Any:
     """Weight of the new state in `plunger_step`; at rest, spring and coil are together at most 3 K stiff.
 
     The damping is λ of this side [N·s/m].
@@ -100,7 +103,7 @@ def plunger_weight(damping: Any, step: Any, c: Any) -> Any:
 
 
 @compilable
-def plunger_step(motion: Any, drive: Any, damping: Any, step: Any, weight: Any, c: Any) -> Any:
+def plunger_step(motion, drive, damping, step, weight, c) -> Any:
     """Advance m ẍ + λ ẋ + K x = F, x >= 0, by one linearised step [s].
 
     `motion` is stroke [m] and speed [m/s]; returned are those after the step. The drive k i² [N·m²] holds

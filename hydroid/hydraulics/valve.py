@@ -19,6 +19,9 @@ B→T as multiples of those of P→B and P→A. So a load that is lowered can be
 the other chamber fills from the tank through an anti-cavitation check valve.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 from typing import Any
 
 import numpy as np
@@ -31,13 +34,13 @@ NOTCHES = (0.04, 0.1, 0.25, 0.5)  # parts of the full opening where the notches 
 
 
 @compilable
-def slot_share(travel: Any, side: Any) -> Any:
+def slot_share(travel, side) -> Any:
     """Part of a side's slot that spool travel towards it [m] has passed, 0 to 1."""
     return np.minimum(np.maximum(travel - side.overlap, 0.0) / side.slot_width, 1.0)
 
 
 @compilable
-def notched(share: Any, side: Any) -> Any:
+def notched(share, side) -> Any:
     """Part of the full opening, from the part that the power law gives: 0 to 1, as the result.
 
     Where all four factors are 1, the result is the power law's, to the bit.
@@ -50,13 +53,13 @@ def notched(share: Any, side: Any) -> Any:
     return (share + more) / (1.0 + whole)
 
 
-def conductance(flow_coefficient: Any) -> Any:
+def conductance(flow_coefficient) -> Any:
     """C_q √(2/ρ) [m/(s √Pa)]: flow per opening and root of the pressure drop."""
     return flow_coefficient * np.sqrt(2.0 / DENSITY)
 
 
 @compilable
-def root(drop: Any, transition: Any) -> Any:
+def root(drop, transition) -> Any:
     """Regularised sgn(Δp) √|Δp| [√Pa] and its derivative [1/√Pa] at a pressure drop [Pa]."""
     square = drop * drop
     scale = square + transition * transition
@@ -65,7 +68,7 @@ def root(drop: Any, transition: Any) -> Any:
 
 
 @compilable
-def port_flow(pressure: Any, supply: Any, pump_area: Any, tank_area: Any, c: Any) -> Any:
+def port_flow(pressure, supply, pump_area, tank_area, c) -> Any:
     """Flow Q [m³/s] into a chamber at a pressure [Pa] through its two edges, openings [m²], (7) and (8).
 
     Also returns -dQ/dp [m³/(s Pa)], which is never negative, the part of Q that comes from the pump, at

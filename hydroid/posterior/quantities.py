@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.estimate import CurveEstimate, QuantityEstimate, finite
+from hydroid.estimate import CurveEstimate, Interval, QuantityEstimate, finite
 from hydroid.hydraulics.cylinder import rod_motion, volume
 from hydroid.hydraulics.records import LINEAR, Records, coefficients
 from hydroid.posterior.bench import Bench, make_bench
@@ -68,7 +68,7 @@ def _add_joint(result: Quantities, problem: Problem, uncertainty: Uncertainty, j
     concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
     positive = np.array([column.positive for column in columns])
     known = uncertainty.posterior.propagate(values, positive, concerned)
-    curve, given, unit = list[tuple[float, float, tuple[float | None, float | None]]](), True, ""
+    curve, given, unit = list[tuple[float, float, Interval]](), True, ""
     for i in np.flatnonzero(np.isfinite(known.value)).tolist():
         (name, label, unit_, _, command), value = columns[i], float(known.value[i])
         interval = finite(known.interval[i, 0]), finite(known.interval[i, 1])

@@ -54,7 +54,7 @@ class FitSettings(Settings):
     hydraulics: HydraulicSettings = HydraulicSettings()
     priors: dict[str, PriorSettings] = {}
     """what is known besides the logs, each under a name of your choice"""
-    payloads: dict[str, Annotated[float, Field(gt=0)]] = {}
+    payloads: dict[str, Positive] = {}
     """mass that the gripper holds, by the log's file name [kg]"""
     log: LogSettings = LogSettings()
     simulation: SimulationSettings = SimulationSettings()

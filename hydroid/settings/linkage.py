@@ -6,6 +6,9 @@ by the law of cosines the cylinder is c(q) long. By virtual work, τ dq = F dc, 
 its numbers are ours.)
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 import math
 from typing import Any, Literal
 
@@ -19,7 +22,7 @@ Vector = tuple[float, float, float]
 DIGITS = 9  # of lengths in m and angles in deg that are read off a model: what is finer is its rounding
 
 
-def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> Any:
+def triangle(angle, a, b, theta0, shortest=0.0) -> Any:
     """Travel x [m], moment arm r = dx/dq [m/rad] and dr/dq of a cylinder, elementwise.
 
     The hydraulic kernel compiles this very function.
@@ -37,7 +40,7 @@ def triangle(angle: Any, a: Any, b: Any, theta0: Any, shortest: Any = 0.0) -> An
     return length - shortest + slides * angle, arm + slides, (cosine - arm * arm) / length
 
 
-def four_bar(angle: Any, bars: Any) -> Any:
+def four_bar(angle, bars) -> Any:
     """Angle ψ [rad] of a rocker that turns a joint by a coupler, dψ/dq and d²ψ/dq², elementwise.
 
     The hydraulic kernel compiles this very function. In the parent's plane the joint's axis is the origin and

@@ -47,7 +47,7 @@ class MultistartSettings(Settings):
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = 10
     """number of start points"""
-    horizons: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 1.0, 5.0, 20.0)
+    horizons: tuple[Positive, ...] = (0.25, 1.0, 5.0, 20.0)
     """lengths of the logs' beginnings that a start is fitted to before the whole logs, from the first
     command on [s]; those in which nothing moves yet are left out"""
     iterations: Count = 100

@@ -15,6 +15,9 @@ integrated is the angle alone, with load and lever arm taken at the middle of th
 actuator stand still. Leakage is left out, so nothing sags.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 import ctypes
 from typing import Any
 
@@ -42,7 +45,7 @@ SETTLED = 1e-9  # part of the pump's flow, or of its pressure, that may be left 
 
 
 @compilable
-def rod_speed(c: Any, w: Any, supply: float) -> Any:
+def rod_speed(c, w, supply: float) -> Any:
     """Speed at which a chamber fills [m/s], its flow from the pump [m³/s], and how that rises with P.
 
     Args:
@@ -76,7 +79,7 @@ def rod_speed(c: Any, w: Any, supply: float) -> Any:
 
 
 @compilable
-def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any) -> float:
+def line_pressure(plugin: Plugin, work, line, share: float, some) -> float:
     """Pressure of the line [Pa] at which the actuators take what the pump gives with its φ at `share`.
 
     Newton's method from the last step's, within a bracket: what is taken rises with the pressure, and what is
@@ -108,14 +111,14 @@ def line_pressure(plugin: Plugin, work: Any, line: Any, share: float, some: Any)
 
 
 @compilable
-def linkage(c: Any, angle: float) -> Any:
+def linkage(c, angle: float) -> Any:
     """Travel of a joint's rod [m] and its moment arm [m/rad] at an angle; of a rotary actuator as `bent`."""
     way, arm, _ = rod(angle, c) if c.kind == LINEAR else bent(angle, c)
     return way, arm
 
 
 @compilable
-def store_oil(c: Any, z: Any, w: Any, supply: float, speed: float, angle: float) -> None:
+def store_oil(c, z, w, supply: float, speed: float, angle: float) -> None:
     """Store the oil and flows of a joint's chambers as `actuator.observe` reads them.
 
     A joint that stands has tank pressure in one chamber, and in the other what holds the load w.push [N].
@@ -140,7 +143,7 @@ def store_oil(c: Any, z: Any, w: Any, supply: float, speed: float, angle: float)
 
 
 @compilable
-def meter(c: Any, z: Any, w: Any, substeps: int, step: float) -> None:
+def meter(c, z, w, substeps: int, step: float) -> None:
     """Advance the plungers over a step; w.travel becomes the mean opening [m²], below 0 towards B."""
     net = 0.0
     for i in range(substeps):
@@ -149,7 +152,7 @@ def meter(c: Any, z: Any, w: Any, substeps: int, step: float) -> None:
 
 
 @compilable
-def weigh(c: Any, w: Any, angle: float, torque: float) -> None:
+def weigh(c, w, angle: float, torque: float) -> None:
     """Lever and load of a joint that a torque [N·m] must hold at an angle [rad]."""
     w.arm = linkage(c, angle)[1]
     lever = max(abs(w.arm), LEAST_LEVER)
@@ -161,7 +164,7 @@ def weigh(c: Any, w: Any, angle: float, torque: float) -> None:
 
 
 @compilable
-def share_pump(plugin: Plugin, state: Any, pad: Any, demanded: bool) -> float:
+def share_pump(plugin: Plugin, state, pad, demanded: bool) -> float:
     """Advance the pump over a step; the pressure of its line [Pa], inf where its flow has no limit."""
     last = plugin.order[plugin.order.size - 1]
     c, line = plugin.coefficients[last], pad.line[0]
@@ -175,9 +178,7 @@ def share_pump(plugin: Plugin, state: Any, pad: Any, demanded: bool) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def roll_quasi_static(
-    arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE
-) -> None:
+def roll_quasi_static(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
     """Roll one candidate out, as `rollout.roll` does; joints that follow a log take its angle."""
     order, idle, period, substeps = plugin.order, plugin.idle, plugin.period, plugin.substeps
     commands, followed, taken = course

@@ -7,6 +7,9 @@ are those of `mujoco.batch`. Only an error of MuJoCo's, not a divergence, would 
 raising; a model that gets through `SteppedArm.start` has none to expect.
 """
 
+# pyright: reportMissingParameterType=false
+# a law takes floats or arrays that broadcast, and compiled code whatever has its fields
+
 import ctypes
 import logging
 import threading
@@ -170,7 +173,7 @@ def _addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
 
 
 @compilable
-def write_sample(arm: Any, record: Any, state: Any, k: int) -> None:
+def write_sample(arm, record, state, k: int) -> None:
     """Record the sample that step k ends, if it ends one."""
     if (k + 1) % arm.steps == 0:
         record.angle[k // arm.steps] = arm.angle
@@ -179,7 +182,7 @@ def write_sample(arm: Any, record: Any, state: Any, k: int) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def roll(arm: Any, plugin: Plugin, state: Any, course: Any, record: Any, source: int = SOURCE) -> None:
+def roll(arm, plugin: Plugin, state, course, record, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for numba's cache."""
     commands, torque, taken = course
     pad, past = make_pad(state.size), commands.shape[0] - torque.shape[0]
@@ -203,12 +206,12 @@ class _Announcement(event.Listener):
     def __init__(self) -> None:
         self._made = False
 
-    def on_start(self, event: Any) -> None:
+    def on_start(self, event) -> None:
         if not self._made:
             _log.warning("compiling the simulation, once on this machine ...")
         self._made = True
 
-    def on_end(self, event: Any) -> None:
+    def on_end(self, event) -> None:
         pass
 
 

@@ -1,14 +1,14 @@
 """What is simulated: a log's joints, start and commands, and in stage 2 the chain from command to torque."""
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hydroid.arm.locked import LockedArm, lock
-from hydroid.arrays import Array, Index, Mask, Structs
+from hydroid.arrays import Array, Index, Mask, Structs, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
 from hydroid.hydraulics.kernel import Plugin
@@ -76,7 +76,7 @@ def smooth(angle: Array, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sections, angle, axis=0, padlen=min(len(angle) - 1, 100)))
 
 
-@dataclass(frozen=True)
+@record
 class Candidates:
     """Physical values of n candidates, joints and links in the arm's order.
 
@@ -94,7 +94,7 @@ class Candidates:
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
 
 
-@dataclass(frozen=True)
+@record
 class Response:
     """Simulated angles [rad], shape (n, T, K), of the K output joints.
 
